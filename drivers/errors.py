@@ -157,8 +157,12 @@ class Rejected(DriveError):
         **params: Param,
     ) -> None:
         super().__init__(
-            code, drive=drive, parameter=parameter, value=value, limit=limit, remedy=remedy,
-            abort_code=abort_code, **params,
+            as_text(
+                code,
+                {"drive": drive, "parameter": parameter, "value": _fact(value), "limit": limit,
+                 "abort_code": abort_code, **params},
+            ),
+            drive=drive, parameter=parameter, value=value, limit=limit, remedy=remedy,
         )  # fmt: skip
         self.abort_code = abort_code
 
@@ -198,7 +202,7 @@ class MotionHalted(NotAllowed):
         remedy: str | Text | None = None,
         **params: Param,
     ) -> None:
-        super().__init__(code, drive=drive, remedy=remedy, **params)
+        super().__init__(as_text(code, {"drive": drive, **params}), drive=drive, remedy=remedy)
         self.halt = halt
 
 

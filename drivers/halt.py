@@ -1,6 +1,6 @@
 """Why a cyclic loop ended a motion by force: a value from the loop up to the error of a tool.
 
-Words are made here once, by `Halted.words`, for people. Nothing decides by them: what may be tried
+`Halted.text` is its message for people. Nothing decides by them: what may be tried
 after a halt depends on `Halted.cause` alone.
 """
 
@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Literal, NamedTuple
+
+from texts.message import Text, as_text, text
 
 Quantity = Literal["position", "speed", "torque", "following error"]
 
@@ -65,7 +67,7 @@ class Halted:
     quantity: Quantity | None = None
     value: float | None = None
     limit: float | None = None
-    note: str = ""
+    note: str | Text = ""
 
     @classmethod
     def beyond(cls, quantity: Quantity, value: float, limit: float) -> Halted:
@@ -73,23 +75,28 @@ class Halted:
         return cls(_CAUSE_OF[quantity], quantity, value, limit)
 
     @property
-    def words(self) -> str:
+    def text(self) -> Text:
         """For people: the page, the log and messages."""
+        note = as_text(self.note)
         if self.cause in ENVELOPE_CAUSES and self.value is not None and self.limit is not None:
-            return (
-                f"{self.quantity} {self.value:g} is beyond the limit of {self.limit:g}: "
-                "the axis is braked and disabled"
-            )
+            return text(
+                "motion.beyond-limit", quantity=quantity_key(self.quantity),
+                value=f"{self.value:g}", limit=f"{self.limit:g}",
+            )  # fmt: skip
         if self.cause is HaltCause.EXPIRED:
-            return "the setpoints were not renewed in time: the axis is braked and disabled"
+            return text("motion.expired")
         if self.cause is HaltCause.LEFT_ENABLED:
-            return f"the drive left Operation enabled: {self.note}"
+            return text("motion.left-enabled", note=note)
         if self.cause is HaltCause.CONTRADICTION and self.value is not None:
-            return (
-                f"606Ch says {self.value:.6g}, the position says {self.limit or 0.0:.6g} (raw "
-                f"units of 606Ch; {self.note}): the axis is braked and disabled"
+            return text(
+                "motion.contradiction", speed=self.value, from_position=self.limit or 0.0, note=note
             )
-        return self.note or _WORDS[self.cause]
+        return note if self.note else text(_TEXTS[self.cause])
+
+    @property
+    def words(self) -> str:
+        """The same in English."""
+        return self.text.words()
 
     def to_wire(self) -> dict[str, Any]:
         """As a map of plain values, for a message to another process."""
@@ -98,7 +105,7 @@ class Halted:
             "quantity": self.quantity,
             "value": self.value,
             "limit": self.limit,
-            "note": self.note,
+            "note": self.note.to_wire() if isinstance(self.note, Text) else self.note,
         }
 
     @classmethod
@@ -108,21 +115,28 @@ class Halted:
         Raises:
             ValueError, KeyError: the map is none that `to_wire` made.
         """
+        note = wire["note"]
         return cls(
-            HaltCause(wire["cause"]), wire["quantity"], wire["value"], wire["limit"], wire["note"]
-        )
+            HaltCause(wire["cause"]), wire["quantity"], wire["value"], wire["limit"],
+            Text.from_wire(note) if isinstance(note, Mapping) else note,
+        )  # fmt: skip
 
 
-_WORDS: Mapping[HaltCause, str] = {
-    HaltCause.POSITION: "the position is beyond its limit",
-    HaltCause.SPEED: "the speed is beyond its limit",
-    HaltCause.TORQUE: "the torque is beyond its limit",
-    HaltCause.FOLLOWING: "the following error is beyond its limit",
-    HaltCause.COMMANDED: "it was halted",
-    HaltCause.LOST: "the cyclic data stopped coming",
-    HaltCause.UNFIT: "a setpoint does not fit its object: the axis is braked",
-    HaltCause.CONTRADICTION: "measured position and speed contradict each other",
+_TEXTS: Mapping[HaltCause, str] = {
+    HaltCause.POSITION: "motion.position",
+    HaltCause.SPEED: "motion.speed",
+    HaltCause.TORQUE: "motion.torque",
+    HaltCause.FOLLOWING: "motion.following",
+    HaltCause.COMMANDED: "motion.commanded",
+    HaltCause.LOST: "motion.lost",
+    HaltCause.UNFIT: "motion.unfit",
+    HaltCause.CONTRADICTION: "motion.measured-contradict",
 }
+
+
+def quantity_key(quantity: Quantity | None) -> str:
+    """The name of a quantity as the catalogue selects by it."""
+    return (quantity or "").replace(" ", "-")
 
 
 class LoopState(NamedTuple):

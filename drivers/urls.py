@@ -159,7 +159,7 @@ def link_for(url: str | BusUrl) -> Link:
     """
     bus = parse_url(url) if isinstance(url, str) else url
     if bus.is_virtual:
-        raise NotAllowed("link.wire-running-demo", bus=bus)
+        raise NotAllowed("link.wire-running-demo", bus=str(bus))
     text = str(bus)
     if bus.scheme == "mlink":
         from drivers.mlink.link import mlink_link

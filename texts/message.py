@@ -121,6 +121,15 @@ def joined(parts: Iterable[Text | str], joint: str = "; ") -> Text:
     return Text(JOINED, {"joint": joint, **named})
 
 
+def parts_of(message: Text | None) -> list[Text]:
+    """The messages that were `joined`; the message itself where it is one; none of None."""
+    if message is None:
+        return []
+    if message.code != JOINED:
+        return [message]
+    return [part for part in message.params.values() if isinstance(part, Text)]
+
+
 def is_code(words: str) -> bool:
     """Whether this is the form of a code rather than a sentence."""
     return _CODE.fullmatch(words) is not None

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from enum import Enum
 from functools import cache
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
@@ -116,10 +117,14 @@ def _pattern(message: Text, language: Language) -> str | None:
 def _argument(value: Param, language: Language) -> object:
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, int) and not isinstance(value, Enum):
-        return FluentInt(value, useGrouping=False)
-    if isinstance(value, float):
-        return _Real(value)
+    # numpy's numbers are registered as such, but are neither int nor float.
+    number: object = value
+    if isinstance(number, Enum):
+        return _as_words(value, language)
+    if isinstance(number, Integral):
+        return FluentInt(int(number), useGrouping=False)
+    if isinstance(number, Real):
+        return _Real(float(number))
     return _as_words(value, language)
 
 

@@ -11,7 +11,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
-from backend.api.models import Problem
+from backend.api.models import MessageInfo, Problem
 from backend.people.errors import Forbidden, NoSuchPerson, NotLoggedIn, TooOften
 from drivers.errors import (
     Busy,
@@ -23,6 +23,7 @@ from drivers.errors import (
     ProtocolError,
     Rejected,
 )
+from texts.message import Param, Text, as_text, language, text
 
 log = logging.getLogger(__name__)
 
@@ -75,35 +76,47 @@ class WrongMethod(DriveError):
 
     kind = "wrong-method"
 
-    def __init__(self, message: str, methods: list[str]) -> None:
-        super().__init__(message, limit=", ".join(methods))
+    def __init__(self, code: str | Text, /, methods: list[str], **params: Param) -> None:
+        super().__init__(as_text(code, params), limit=", ".join(methods))
         self.methods = methods
 
 
 def problem_of(error: Exception) -> Problem:
-    """Problem details of any error. What is not a DriveError is ours, and says so."""
+    """Problem details of any error, in the language of whoever asks.
+
+    What is not a DriveError is ours, and says so.
+    """
+    spoken = language()
     if not isinstance(error, DriveError):
         return Problem(
             type="urn:servodeck:internal",
             title="Internal error",
             status=500,
             detail=f"{type(error).__name__}: {error}",
-            remedy="this is a defect of servodeck; report it with the log",
+            remedy=text("error.defect").words(spoken),
         )
     status = _status(error)
-    value = _scalar(error.value)
+    value, advice = _scalar(error.value), error.advice_text
     return Problem(
         type=f"urn:servodeck:{error.kind}",
         title=_TITLES.get(error.kind, "Drive error"),
         status=status,
-        detail=error.message,
+        detail=error.text.words(spoken),
         drive=error.drive,
         parameter=error.parameter,
         value=value,
         limit=error.limit,
-        remedy=error.advice,
-        code=error.code if isinstance(error, Rejected) else None,
+        remedy=None if advice is None else advice.words(spoken),
+        code=error.code or None,
+        params=message_of(error.text).params,
+        advice=None if advice is None else message_of(advice),
+        abort_code=error.abort_code if isinstance(error, Rejected) else None,
     )
+
+
+def message_of(message: Text) -> MessageInfo:
+    """A message for the API."""
+    return MessageInfo.model_validate(message.to_wire())
 
 
 def _status(error: DriveError) -> int:

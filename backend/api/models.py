@@ -23,6 +23,17 @@ Finite = Annotated[float, Field(ge=-_MOST, le=_MOST, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=1e-9, le=_MOST, allow_inf_nan=False)]
 
 
+class MessageInfo(BaseModel):
+    """A message without words: a code of the catalogue and its facts.
+
+    Empty codes carry words that others made in ``params.words``; the code ``+`` strings the other
+    params together with ``params.joint``.
+    """
+
+    code: str
+    params: dict[str, str | int | float | MessageInfo | None] = Field(default_factory=dict)
+
+
 class Problem(BaseModel):
     """RFC 9457 problem details, with what a person needs to act."""
 
@@ -35,7 +46,14 @@ class Problem(BaseModel):
     value: Raw | None = None
     limit: str | None = None
     remedy: str | None = None
-    code: int | None = Field(default=None, description="SDO abort or Modbus exception code")
+    code: str | None = Field(
+        default=None, description="what happened, as a stable code", examples=["canopen.not-open"]
+    )
+    params: dict[str, str | int | float | MessageInfo | None] = Field(
+        default_factory=dict, description="facts of the code, by name; the unit ends the name"
+    )
+    advice: MessageInfo | None = Field(default=None, description="the remedy as code and facts")
+    abort_code: int | None = Field(default=None, description="SDO abort or Modbus exception code")
 
 
 class JobInfo(Message):

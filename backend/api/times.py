@@ -20,4 +20,4 @@ def in_utc(moment: datetime | None) -> datetime | None:
     try:
         return moment.astimezone(UTC)
     except OverflowError as error:
-        raise OutOfRange("api.no-time-utc", value=str(moment), moment=moment) from error
+        raise OutOfRange("api.no-time-utc", value=str(moment), moment=str(moment)) from error

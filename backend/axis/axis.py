@@ -27,6 +27,7 @@ from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, OutOfRange, ProtocolError
 from profiles.schema import Raw
+from texts.message import text
 
 __all__ = ["Axis", "Envelope"]
 
@@ -263,8 +264,7 @@ class Axis(ScaledAxis):
         except DriveError:
             return
         if faults and not error.names_faults:
-            error.message += f" ({', '.join(faults)})"
-            error.args = (error.message,)
+            error.text = text("axis.with-faults", cause=error.text, faults=", ".join(faults))
             error.names_faults = True
 
     async def leave_cyclic(self, session: CyclicSession, timeout_s: float) -> None:

@@ -14,7 +14,7 @@ from contextlib import asynccontextmanager
 from backend.axis import loop
 from backend.axis.axis import Axis
 from backend.axis.cyclic import CyclicSession
-from backend.axis.restoring import CLEANUP_TIMEOUT_S, PUT_BACK_LATER, RestoreFailed, shielded
+from backend.axis.restoring import CLEANUP_TIMEOUT_S, RestoreFailed, shielded
 from backend.drive.drive import Drive
 from backend.drive.identity import confirm_identity
 from drivers.cia402 import Mode, State

@@ -9,6 +9,7 @@ from backend.scales.units import AxisUnits
 from backend.scales.words import halt_remedy, halt_words
 from drivers.errors import motion_halted
 from drivers.motion.guard import SpeedGuard
+from texts.message import text
 
 _WINDOW_S = 0.5
 """Polls come every 20 to 60 ms, and not evenly."""
@@ -44,7 +45,7 @@ class PolledGuard:
             name = self._axis.drive.name
             raise motion_halted(
                 name, halt, words=halt_words(halt, self._units), drive=name,
-                remedy=halt_remedy(halt, "check load and limits"),
+                remedy=halt_remedy(halt, text("axis.check-load-and-limits")),
             )  # fmt: skip
 
     def interrupt(self) -> None:

@@ -11,6 +11,7 @@ from backend.drive.drive import Drive
 from backend.drive.identity import confirm_identity
 from drivers.errors import DriveError, LinkTimeout
 from profiles.schema import Raw
+from texts.message import joined, parts_of
 
 #: Deadline of a cleanup.
 CLEANUP_TIMEOUT_S = 5.0
@@ -95,11 +96,11 @@ def _tell_first(earlier: BaseException | None, late: DriveError) -> None:
     """A cleanup that fails must not hide why it was due: that comes first in its words."""
     if not isinstance(earlier, DriveError) or earlier is late:
         return
-    late.message = f"{earlier.message}; {late.message}"
-    late.args = (late.message,)
     # Each piece of advice once, however many cleanups failed one after the other.
-    advice = "; ".join(r for r in (earlier.remedy, late.remedy) if r)
-    late.remedy = "; ".join(dict.fromkeys(advice.split("; "))) or None
+    known = (*parts_of(earlier.remedy_text), *parts_of(late.remedy_text))
+    advice = list({each.words(): each for each in known}.values())
+    late.text = joined((earlier.text, late.text))
+    late.own_remedy = joined(advice) if advice else None
 
 
 async def shielded(cleanup: Callable[[], Awaitable[None]], timeout_s: float, drive: str) -> None:

@@ -66,7 +66,7 @@ def _existing(config: Path | None, database: str | None, blobs: str | None = Non
     records = station_records(config, database, blobs)
     file = records.store.sqlite_file
     if file is not None and not file.exists():
-        raise NotAllowed("command.no-database", value=str(file), file=file)
+        raise NotAllowed("command.no-database", value=str(file), file=str(file))
     return records
 
 

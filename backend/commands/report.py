@@ -124,7 +124,7 @@ def recompute(
             data = file.read_bytes()
         except OSError as error:
             raise BadMeasurement(
-                "command.cannot-read", value=str(file), file=file, strerror=error.strerror
+                "command.cannot-read", value=str(file), file=str(file), strerror=error.strerror
             ) from error
         found = unpack(data, file.name)
         # The analysis takes seconds to import; no other command shall wait for it.

@@ -176,7 +176,7 @@ def bytes_of(file: Path) -> bytes:
         return file.read_bytes()
     except OSError as error:
         raise NotAllowed(
-            "command.cannot-read-name-file", file=file, strerror=error.strerror
+            "command.cannot-read-name-file", file=str(file), strerror=error.strerror
         ) from error
 
 

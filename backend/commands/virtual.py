@@ -17,6 +17,7 @@ from backend.station.demo import DemoBench
 from drivers.errors import NotAllowed
 from drivers.urls import parse_url
 from drivers.virtual.mechanics.spec import load_mechanics, standard_mechanics
+from texts.message import prose
 
 
 def virtual(
@@ -60,7 +61,7 @@ def _one_drive(file: Path, folder: Path, nvm: Path | None) -> DemoBench:
     try:
         return DemoBench(file, folder, nvm)
     except NotAllowed as error:
-        error.message = error.message.removeprefix(f"bench file {file}: ")
+        error.text = prose(error.message.removeprefix(f"bench file {file}: "))
         raise
 
 

@@ -31,7 +31,7 @@ async def existing(drive: Drive, keys: Iterable[str | None]) -> dict[str, Readin
         try:
             found[key] = await drive.read(key)
         except Rejected as refusal:
-            if refusal.code not in ABSENT:
+            if refusal.abort_code not in ABSENT:
                 raise
     return found
 

@@ -156,7 +156,7 @@ async def set_probe(drive: Drive, number: int, settings: ProbeSettings) -> Readi
     if reading.raw != raw:
         raise Rejected(
             "drive.not-keep-setting-probe",
-            code=0,
+            abort_code=0,
             drive=drive.name,
             parameter=probe.function_key,
             value=reading.raw,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from drivers.codec import encode
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from profiles.schema import Parameter, Raw
+from texts.message import text
 
 
 def checked(drive: str, parameter: Parameter, raw: Raw) -> Raw:
@@ -65,10 +66,11 @@ def named(
     error.at(parameter=parameter.key)
     if value is not None and error.value is None:
         error.value = value
-    prefix = f"{drive}: {parameter.key} {parameter.name}: "
     if anonymous:
-        error.message = prefix + error.message
-        error.args = (error.message,)
+        error.text = text(
+            "drive.of-parameter", drive=drive, parameter=parameter.key, name=parameter.name,
+            cause=error.text,
+        )  # fmt: skip
     return error
 
 

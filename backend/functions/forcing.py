@@ -191,7 +191,7 @@ class ForcingSession:
                     if isinstance(kept, int)
                     else text("functions.cannot-read-back", drive_name=drive.name, key=place.key)
                 ),
-                code=0,
+                abort_code=0,
                 drive=drive.name,
                 parameter=place.key,
                 value=kept,

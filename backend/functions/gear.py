@@ -12,6 +12,7 @@ from backend.scales.units import encoder_counts
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed, Rejected
 from profiles.schema import Raw
+from texts.message import Text, joined, text
 
 #: Numbers that keep their value and so change their meaning with the gear.
 _COUNTED_ROLES = (
@@ -93,7 +94,7 @@ async def _write_all(
         if kept != value.raw:
             raise Rejected(
                 "functions.keeps-instead",
-                code=0,
+                abort_code=0,
                 drive=drive.name,
                 parameter=key,
                 value=value.raw,
@@ -103,13 +104,12 @@ async def _write_all(
 
 
 async def _put_back(axis: Axis, before: dict[str, int], error: BaseException) -> None:
-    left: list[str] = []
+    left: list[Text] = []
     for key, raw in before.items():
         try:
             await axis.drive.write(key, raw)
         except DriveError as other:
-            left.append(f"{key} (was {raw}): {other.message}")
+            left.append(text("functions.value-not-restored", key=key, raw=raw, cause=other.text))
             axis.drive.owed.add({key: raw})
     if left and isinstance(error, DriveError):
-        error.message += f"; not put back: {'; '.join(left)}"
-        error.args = (error.message,)
+        error.text = text("functions.not-restored", cause=error.text, left=joined(left))

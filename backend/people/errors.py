@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from drivers.errors import NotAllowed
+from texts.message import Param, Text, as_text, text
 
 
 class NotLoggedIn(NotAllowed):
@@ -22,8 +23,8 @@ class TooOften(NotAllowed):
 
     kind = "too-often"
 
-    def __init__(self, message: str, wait_s: float) -> None:
-        super().__init__(message, remedy=f"wait {wait_s:.0f} s, then try again")
+    def __init__(self, code: str | Text, /, wait_s: float, **params: Param) -> None:
+        super().__init__(as_text(code, params), remedy=text("people.wait", wait_s=wait_s))
         self.wait_s = wait_s
 
 

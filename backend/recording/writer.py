@@ -273,7 +273,7 @@ class RecordingWriter:
             "recording.not-written-free-some",
             value=str(self.path),
             path=self.path.name,
-            strerror=error.strerror or error,
+            strerror=str(error.strerror or error),
         )
 
 

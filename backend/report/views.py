@@ -111,8 +111,10 @@ def view_of(tool: object, result: dict[str, object]) -> AnyView:
     }  # fmt: skip
     kind = kinds.get(tool)
     if kind is None:
-        raise BadMeasurement("report.report-cannot-show-measures", value=str(tool), tool=tool)
+        raise BadMeasurement("report.report-cannot-show-measures", value=str(tool), tool=str(tool))
     try:
         return kind.model_validate(result)
     except ValidationError as error:
-        raise BadMeasurement("report.result-not-complete", tool=tool, cause=str(error)) from error
+        raise BadMeasurement(
+            "report.result-not-complete", tool=str(tool), cause=str(error)
+        ) from error

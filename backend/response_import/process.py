@@ -23,6 +23,7 @@ from backend.response_import.evaluation import ImportSettings, evaluate_signals,
 from backend.response_import.preview import preview
 from backend.response_import.stored import pack_import
 from drivers.computer.processes import limit_memory
+from texts.message import Text, text
 
 #: An evaluation that takes longer is ended: the largest file takes a fraction of it.
 LIMIT_S = 120.0
@@ -85,7 +86,13 @@ async def import_in_process(task: ImportTask, limit_s: float = LIMIT_S) -> dict[
             last=last[0],
         ) from None
     if "error" in answer:
-        raise BadRecording(**answer["error"])
+        refused = answer["error"]
+        remedy = refused.pop("remedy")
+        raise BadRecording(
+            Text.from_wire(refused.pop("text")),
+            remedy=None if remedy is None else Text.from_wire(remedy),
+            **refused,
+        )
     result: dict[str, Any] = answer["ok"]
     return result
 
@@ -100,14 +107,15 @@ def main() -> None:
         answer = {"ok": task.run()}
     except BadRecording as error:
         answer = {"error": {
-            "message": error.message, "parameter": error.parameter, "value": error.value,
-            "limit": error.limit, "remedy": error.remedy,
+            "text": error.text.to_wire(), "parameter": error.parameter, "value": error.value,
+            "limit": error.limit,
+            "remedy": None if error.own_remedy is None else error.own_remedy.to_wire(),
         }}  # fmt: skip
     except MemoryError:
+        most_gib = _MEMORY_BYTES >> 30
         answer = {"error": {
-            "message": f"{task.name} needs more memory than is given to an import",
-            "value": task.name, "limit": f"{_MEMORY_BYTES >> 30} GiB",
-            "remedy": "export a shorter part of the recording, or fewer columns",
+            "text": text("import.too-much-memory", name=task.name, most_gib=most_gib).to_wire(),
+            "value": task.name, "limit": f"{most_gib} GiB", "remedy": None,
         }}  # fmt: skip
     json.dump(answer, sys.stdout, default=float)
 

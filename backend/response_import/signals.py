@@ -247,7 +247,7 @@ def _clock(
             place=place(row),
             steps_ms=steps[at] * 1e3,
             usual_ms=usual * 1e3,
-            count_nonzero=np.count_nonzero(uneven),
+            count_nonzero=int(np.count_nonzero(uneven)),
         )
     rate = 1.0 / pace
     _check_rate(rate, name, f"sample rate (time in {unit})")

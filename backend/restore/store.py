@@ -125,7 +125,7 @@ class RestoreList:
                 file.unlink(missing_ok=True)
             except OSError as error:
                 raise StorageFailed(
-                    "restore.cannot-removed", file=file, strerror=error.strerror
+                    "restore.cannot-removed", file=str(file), strerror=error.strerror
                 ) from error
         self._taken_over.clear()
 

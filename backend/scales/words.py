@@ -3,56 +3,50 @@
 from __future__ import annotations
 
 from backend.scales.units import AxisUnits
-from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted
+from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted, quantity_key
 from drivers.motion.feedback import Disagreement, disagreement
+from texts.message import Text, text
 
-_TEACH = "set it under “Scales” on the Overview page"
 _MEANING = {
-    Disagreement.SCALE: "the scale of 606Ch is not what the profile or the drive states",
-    Disagreement.SIGN: "one of the two has the wrong sign",
-    Disagreement.SPEED_STANDS: "606Ch does not follow the motion",
-    Disagreement.POSITION_STANDS: "6064h does not follow the motion",
-}
-_REMEDY = {
-    Disagreement.SCALE: f"find the true unit of 606Ch, and {_TEACH}",
-    Disagreement.SIGN: "look at the polarity 607Eh: its bits 6 and 7 belong together",
-    Disagreement.SPEED_STANDS: "look whether this drive fills 606Ch in this mode and maps it; "
-    f"where its unit is coarser than stated, {_TEACH}",
-    Disagreement.POSITION_STANDS: "look at the encoder and its plug; do not move the axis until "
-    "its position is told again",
+    Disagreement.SCALE: "scales.speed-scale-wrong",
+    Disagreement.SIGN: "scales.speed-sign-wrong",
+    Disagreement.SPEED_STANDS: "scales.speed-does-not-follow",
+    Disagreement.POSITION_STANDS: "scales.position-does-not-follow",
 }
 
 
-def halt_words(halt: Halted, units: AxisUnits | None) -> str:
+def halt_words(halt: Halted, units: AxisUnits | None) -> Text:
     """The cause with its figures in rev, rpm and %; in raw units where ``units`` are not known."""
     if units is None or halt.value is None or halt.limit is None:
-        return halt.words
+        return halt.text
     if halt.cause is HaltCause.CONTRADICTION:
         told, seen = units.velocity(halt.value), units.velocity(halt.limit)
-        name = units.names["velocity"]
-        meaning = _MEANING[disagreement(halt.value, halt.limit)]
-        return (
-            f"606Ch says {_figure(told)} {name}, the position says {_figure(seen)} {name}: "
-            f"{meaning}. The axis is braked and disabled"
-        )
+        return text(
+            "scales.speed-contradicts-position", speed=_figure(told), from_position=_figure(seen),
+            unit=units.names["velocity"], meaning=text(_meaning(halt.value, halt.limit)),
+        )  # fmt: skip
     if halt.cause not in ENVELOPE_CAUSES:
-        return halt.words
+        return halt.text
     convert, unit = {
         HaltCause.SPEED: (units.velocity, units.names["velocity"]),
         HaltCause.TORQUE: (units.torque, "%"),
     }.get(halt.cause, (units.position, units.names["position"]))
     value, limit = apart(convert(halt.value), convert(halt.limit))
-    return (
-        f"{halt.quantity} {value} {unit} is beyond the limit of {limit} {unit}: "
-        "the axis is braked and disabled"
-    )
+    return text(
+        "motion.beyond-limit-in", quantity=quantity_key(halt.quantity), value=value, limit=limit,
+        unit=unit,
+    )  # fmt: skip
 
 
-def halt_remedy(halt: Halted, otherwise: str) -> str:
+def halt_remedy(halt: Halted, otherwise: Text) -> Text:
     """What to do about it: for a contradiction its own, else what the tool says."""
     if halt.cause is not HaltCause.CONTRADICTION or halt.value is None or halt.limit is None:
         return otherwise
-    return _REMEDY[disagreement(halt.value, halt.limit)]
+    return text(_meaning(halt.value, halt.limit)).remedy() or otherwise
+
+
+def _meaning(speed: float, from_position: float) -> str:
+    return _MEANING[disagreement(speed, from_position)]
 
 
 def apart(value: float, limit: float) -> tuple[str, str]:

@@ -81,7 +81,8 @@ class DemoBench:
         if not answer.get("ready"):
             self.stop()
             raise LinkLost(
-                "station.virtual-drives-not-start", get=answer.get("error", "the process ended")
+                "station.virtual-drives-not-start",
+                get=str(answer.get("error", "the process ended")),
             )
         wires = answer["wires"]
         if isinstance(wires, dict):

@@ -57,7 +57,7 @@ class Records:
             raise Busy(
                 "station.another-servodeck-uses-state",
                 value=str(self.store.folder),
-                folder=self.store.folder,
+                folder=str(self.store.folder),
             )
 
     def release(self) -> None:

@@ -63,7 +63,7 @@ def make_backup(
         StorageFailed: disk or database; no archive then.
     """
     if archive.exists() and not overwrite:
-        raise BackupFailed("store.exists-already", value=str(archive), archive=archive)
+        raise BackupFailed("store.exists-already", value=str(archive), archive=str(archive))
     try:
         archive.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".servodeck-", dir=archive.parent) as folder:
@@ -77,8 +77,8 @@ def make_backup(
         raise StorageFailed(
             "store.backup-not-written",
             value=str(archive),
-            archive=archive,
-            strerror=error.strerror or error,
+            archive=str(archive),
+            strerror=str(error.strerror or error),
         ) from error
     return parts
 
@@ -134,7 +134,9 @@ def _online_copy(source: Path, target: Path) -> Path:
 
 
 def _damaged(source: Path, found: str) -> BackupFailed:
-    return BackupFailed("store.database-damaged", value=str(source), source=source, found=found)
+    return BackupFailed(
+        "store.database-damaged", value=str(source), source=str(source), found=found
+    )
 
 
 def _shared_copy(store: Store, folder: Path) -> Path:

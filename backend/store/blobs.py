@@ -132,4 +132,4 @@ class Blobs:
 
     def _failed(self, what: str, error: Exception) -> BlobFailed:
         # Every kind of store has its own errors; a botocore error is no OSError.
-        return BlobFailed("store.contents-not", value=self.place, what=what, error=error)
+        return BlobFailed("store.contents-not", value=self.place, what=what, error=str(error))

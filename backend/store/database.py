@@ -215,7 +215,7 @@ class Store:
                 raise DatabaseFailed(
                     "store.database-cannot-made",
                     value=str(file),
-                    file=file,
+                    file=str(file),
                     strerror=error.strerror,
                 ) from error
         # No error text, and so no log, may repeat what was stored: hashes of passwords too.

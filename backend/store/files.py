@@ -68,6 +68,6 @@ def _failed(path: Path, error: OSError) -> StorageFailed:
     return StorageFailed(
         "store.not-written",
         value=str(path),
-        path=path.name or path,
-        strerror=error.strerror or error,
+        path=str(path.name or path),
+        strerror=str(error.strerror or error),
     )

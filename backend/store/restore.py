@@ -41,11 +41,11 @@ def restore(
     """
     used = folder.exists() and any(path.name != FolderLock.NAME for path in folder.iterdir())
     if used and not replace:
-        raise BackupFailed("store.not-empty-nothing-changed", value=str(folder), folder=folder)
+        raise BackupFailed("store.not-empty-nothing-changed", value=str(folder), folder=str(folder))
     with FolderLock(folder) as lock:
         if not lock.held:
             raise BackupFailed(
-                "store.running-servodeck-uses-nothing", value=str(folder), folder=folder
+                "store.running-servodeck-uses-nothing", value=str(folder), folder=str(folder)
             )
         try:
             folder.parent.mkdir(parents=True, exist_ok=True)
@@ -60,9 +60,9 @@ def restore(
             raise StorageFailed(
                 "store.not-restored",
                 value=str(folder),
-                archive=archive,
-                folder=folder,
-                strerror=error.strerror or error,
+                archive=str(archive),
+                folder=str(folder),
+                strerror=str(error.strerror or error),
             ) from error
     return Restored(parts, entries, aside, copied)
 
@@ -73,11 +73,16 @@ def _unpack(archive: Path, folder: Path) -> int:
             parts = backup.read_manifest(file, str(archive))
             needed = sum(part.bytes for part in parts.values())
             if shutil.disk_usage(folder).free < needed:
-                raise StorageFailed("store.needs-bytes-disk-not", value=needed, archive=archive)
+                raise StorageFailed(
+                    "store.needs-bytes-disk-not", value=needed, archive=str(archive)
+                )
             backup.unpack(file, parts, folder, str(archive))
     except zipfile.BadZipFile as error:
         raise BackupFailed(
-            "store.no-whole-backup-nothing", value=str(archive), archive=archive, cause=str(error)
+            "store.no-whole-backup-nothing",
+            value=str(archive),
+            archive=str(archive),
+            cause=str(error),
         ) from error
     return len(parts)
 

@@ -19,6 +19,7 @@ from backend.work.jobs import JobResult
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed
 from drivers.link import Progress
 from profiles.schema import Raw
+from texts.message import text
 
 #: Tag of the sets that are made before something is loaded.
 UNDO = "undo"
@@ -144,11 +145,10 @@ async def load_set(
             report.append(await _write_verified(drive, key, raw))
         except LinkLost as error:
             # Half a set is in force now: which half, and how to take it back.
-            error.message += (
-                f"; {number} of {len(chosen)} rows were written before {key}; what was there "
-                f"before is in the set “{backup}”"
-            )
-            error.args = (error.message,)
+            error.text = text(
+                "set.written-in-part", cause=error.text, written=number, rows=len(chosen), key=key,
+                backup=backup,
+            )  # fmt: skip
             raise
     return {
         "written": sum(row.ok for row in report),
@@ -178,7 +178,7 @@ def _check_identity(drive: Drive, content: ParameterSet, accepted: bool) -> bool
             drive=drive.name,
             value=other[0].theirs,
             limit=other[0].ours,
-            other=other[0],
+            other=str(other[0]),
         )
     return bool(other)
 

@@ -233,7 +233,7 @@ class SdoChannel:
             except _BlockUnanswered:
                 self.no_block_transfer = True
             except Rejected as refusal:
-                if refusal.code != sdo.ABORT_COMMAND:
+                if refusal.abort_code != sdo.ABORT_COMMAND:
                     raise
                 self.no_block_transfer = True
         stop = sdo.expedited(index, subindex, data) if at_any_rate else b""

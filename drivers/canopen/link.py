@@ -357,7 +357,7 @@ class CanopenLink:
 
 def _object(address: Address) -> tuple[int, int]:
     if address.index is None:
-        raise NotAllowed("canopen.exists-over-modbus", parameter=str(address), address=address)
+        raise NotAllowed("canopen.exists-over-modbus", parameter=str(address), address=str(address))
     return address.index, address.subindex
 
 

@@ -87,7 +87,7 @@ def upload(index: int, subindex: int, block_above: int | None = None) -> Transfe
     try:
         return (yield from block_upload(index, subindex))
     except Rejected as refusal:
-        if refusal.code != ABORT_COMMAND:
+        if refusal.abort_code != ABORT_COMMAND:
             raise
     return (yield from upload(index, subindex))
 

@@ -22,6 +22,7 @@ from drivers.halt import HaltCause, Halted
 from drivers.link import LinkEvent, ScopeBlock
 from drivers.motion.playback import AxisLoop
 from drivers.motion.setpoint_plan import Motion, Phase
+from texts.message import text
 
 _BLOCK_S = 0.025
 _HEARTBEAT_S = 0.05
@@ -29,10 +30,8 @@ _OPERATIONAL = b"\x05"
 _BRAKE_WHEN_SILENT_S = 0.05
 _GIVE_UP_WHEN_SILENT_S = 0.3
 _LATENESS_KEPT = 4096
-_SILENT = Halted(HaltCause.LOST, note="its cyclic data stopped coming")
-_SILENT_BRAKED = Halted(
-    HaltCause.LOST, note="its cyclic data stopped coming: it is told to brake, heard or not"
-)
+_SILENT = Halted(HaltCause.LOST, note=text("canopen.cyclic-data-stopped-coming"))
+_SILENT_BRAKED = Halted(HaltCause.LOST, note=text("canopen.cyclic-data-stopped-coming-told"))
 
 
 class LoopClock(Protocol):
@@ -202,7 +201,7 @@ class SyncLoop:
 
     def halt_and_wait(self) -> None:
         """Stop everything and wait until nothing is enabled, at most 1.5 s. Blocks."""
-        self.halt(None, Halted(HaltCause.COMMANDED, note="the cyclic exchange ends"))
+        self.halt(None, Halted(HaltCause.COMMANDED, note=text("canopen.cyclic-exchange-ends")))
 
         def still() -> bool:
             return self._bus_lost or all(
@@ -282,7 +281,7 @@ class SyncLoop:
                 lost, self._bus_lost = not self._bus_lost, True
                 self._lock.notify_all()
             if lost:
-                self.abandon(None, Halted(HaltCause.LOST, note=error.message))
+                self.abandon(None, Halted(HaltCause.LOST, note=error.text))
                 self._tell(LinkEvent("state", None, f"cyclic exchange interrupted: {error}"))
             return
         self._bus_lost = False

@@ -65,18 +65,21 @@ class MlinkLayout:
     def place(self, station: int, address: Address) -> Place:
         """See `drivers.modbus.layout.Layout.place`."""
         if address.index is None:
-            raise NotAllowed("mlink.no-object-mlink-reaches", address=address)
+            raise NotAllowed("mlink.no-object-mlink-reaches", address=str(address))
         rival = self._rivals.get(station, {}).get((address.index, address.subindex))
         if rival:
             raise NotAllowed(
-                "mlink.mlink-cannot-tell-both", parameter=str(address), address=address, rival=rival
+                "mlink.mlink-cannot-tell-both",
+                parameter=str(address),
+                address=str(address),
+                rival=rival,
             )
         count = words_of(address.type)
         if count > _MAX_WORDS:
             raise NotAllowed(
                 "mlink.mlink-moves-most-32",
                 parameter=str(address),
-                address=address,
+                address=str(address),
                 type=address.type,
             )
         blocks = self.limits(station).max_registers > _MAX_WORDS

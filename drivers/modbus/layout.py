@@ -66,7 +66,9 @@ class TableLayout:
     def place(self, station: int, address: Address) -> Place:
         """See `Layout.place`."""
         if address.register is None:
-            raise NotAllowed("modbus.no-modbus-register", parameter=str(address), address=address)
+            raise NotAllowed(
+                "modbus.no-modbus-register", parameter=str(address), address=str(address)
+            )
         order = self._orders.get(station, self._default_order)
         return Place(address.register, words_of(address.type), address.type, order)
 

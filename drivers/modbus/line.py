@@ -250,7 +250,7 @@ class Line:
             text = EXCEPTION_TEXTS.get(code, "the drive refused for a reason Modbus does not name")
             raise Rejected(
                 "modbus.station-exception",
-                code=code,
+                abort_code=code,
                 remedy=EXCEPTION_REMEDIES.get(code, UNKNOWN_EXCEPTION_REMEDY),
                 station=query.station,
                 text=text,

@@ -263,7 +263,7 @@ class RegisterLink:
     def _failed_block(
         self, station: int, batch: _Batch, block: Block, attempt: int, error: DriveError
     ) -> None:
-        busy = isinstance(error, Rejected) and error.code == BUSY
+        busy = isinstance(error, Rejected) and error.abort_code == BUSY
         if busy and attempt < self._settings.retries:
             self._line.count_retry(station)
             batch.wait_s = _BUSY_S * 2**attempt
@@ -397,7 +397,7 @@ def _summary(found: Sequence[Found], damaged: Sequence[int]) -> str:
 def _again(error: DriveError) -> DriveError:
     """The same error as a new object: callers fill in which parameter it was about."""
     if isinstance(error, Rejected):
-        return Rejected(error.text, code=error.code, remedy=error.remedy_text)
+        return Rejected(error.text, abort_code=error.abort_code, remedy=error.remedy_text)
     return type(error)(error.message, value=error.value, limit=error.limit, remedy=error.remedy)
 
 

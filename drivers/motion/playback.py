@@ -35,6 +35,7 @@ from drivers.motion.setpoint_plan import (
     Motion,
     Phase,
 )
+from texts.message import text
 
 STOP_S = 0.1
 """From any speed to standstill; shorter than the 200 ms in which a lost setpoint must end."""
@@ -43,11 +44,9 @@ _RESTLESS = 2
 """Increments per cycle that encoder noise may make of an axis at rest."""
 _ALIVE_STATES = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 _STANDARD = cia402.Dialect()
-_DISABLED = Halted(HaltCause.COMMANDED, note="the axis is being disabled")
-_PAUSED = Halted(HaltCause.COMMANDED, note="the motion was ended")
-_RESTLESS_STILL = Halted(
-    HaltCause.COMMANDED, note="it did not come to rest by its ramp: it is stopped and disabled"
-)
+_DISABLED = Halted(HaltCause.COMMANDED, note=text("cyclic.axis-being-disabled"))
+_PAUSED = Halted(HaltCause.COMMANDED, note=text("cyclic.motion-ended"))
+_RESTLESS_STILL = Halted(HaltCause.COMMANDED, note=text("cyclic.not-come-rest-ramp"))
 _STALE_CYCLES = 3
 """Samples that may be older than what a mailbox told before an axis was enabled anew."""
 _SETTLES = 2

@@ -24,7 +24,7 @@ def require_fits(trajectory: Trajectory) -> None:
         raise NotAllowed(
             "cyclic.not-setpoint-cyclic-motion",
             parameter=str(trajectory.target),
-            target=trajectory.target,
+            target=str(trajectory.target),
         )
     _check_type(trajectory.target, trajectory.values)
     if trajectory.offset_target is not None and trajectory.offset_values is not None:
@@ -47,7 +47,7 @@ def _check_type(address: Address, values: npt.NDArray[np.int64]) -> None:
             limit=f"{low}…{high}",
             min_values=values.min(),
             max_values=values.max(),
-            address=address,
+            address=str(address),
             low=low,
             high=high,
         )

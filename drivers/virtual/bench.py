@@ -101,7 +101,7 @@ def load_bench(path: Path = STANDARD_BENCH) -> BenchSpec:
         raise NotAllowed(
             "virtual.bench-file-see-docs",
             value=str(path),
-            path=path,
+            path=str(path),
             place=place,
             first=first["msg"],
         ) from error
@@ -117,14 +117,14 @@ def load_bench(path: Path = STANDARD_BENCH) -> BenchSpec:
 
 
 def _wrong(path: Path, why: str) -> NotAllowed:
-    return NotAllowed("virtual.bench-file", value=str(path), path=path, why=why)
+    return NotAllowed("virtual.bench-file", value=str(path), path=str(path), why=why)
 
 
 def _check_names(bench: BenchSpec, path: Path) -> None:
     names = [axis.name for axis in bench.axis]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise NotAllowed("virtual.bench-file-two-axes", value=twice, path=path)
+        raise NotAllowed("virtual.bench-file-two-axes", value=twice, path=str(path))
 
 
 def _check_ports(axis: AxisSpec, path: Path) -> None:
@@ -144,7 +144,7 @@ def _check_ports(axis: AxisSpec, path: Path) -> None:
                 "virtual.bench-file-no-port",
                 value=url,
                 limit=kinds,
-                path=path,
+                path=str(path),
                 drive_name=axis.name,
                 profile_title=profile.title,
                 scheme=bus.scheme,
@@ -154,9 +154,9 @@ def _check_ports(axis: AxisSpec, path: Path) -> None:
                 "virtual.bench-file-virtual-drive",
                 value=url,
                 limit="canopen://virtual0, canopen://slcan/PATH",
-                path=path,
+                path=str(path),
                 drive_name=axis.name,
-                bus=bus,
+                bus=str(bus),
             )
         last = _LAST_STATION[bus.scheme]
         if not 1 <= station <= last:
@@ -164,7 +164,7 @@ def _check_ports(axis: AxisSpec, path: Path) -> None:
                 "virtual.bench-file-station-outside",
                 value=station,
                 limit=f"1 to {last}",
-                path=path,
+                path=str(path),
                 drive_name=axis.name,
                 url=url,
                 last=last,
@@ -176,4 +176,6 @@ def _check_stations(bench: BenchSpec, path: Path) -> None:
         stations = [station for _, station in bench.on(url)]
         twice = sorted({s for s in stations if stations.count(s) > 1})
         if twice:
-            raise NotAllowed("virtual.bench-file-station-given", value=twice[0], path=path, url=url)
+            raise NotAllowed(
+                "virtual.bench-file-station-given", value=twice[0], path=str(path), url=url
+            )

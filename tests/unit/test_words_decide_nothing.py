@@ -62,7 +62,7 @@ ALLOWED: dict[tuple[str, str], str] = {
     ): "what is printed has no space at its end",
     (
         "backend/commands/virtual.py",
-        'error.message = error.message.removeprefix(f"bench file {file}: ")',
+        'error.text = prose(error.message.removeprefix(f"bench file {file}: "))',
     ): "the file is a temporary one, which nobody who reads the message knows",
     (
         "backend/recording/capture.py",

@@ -94,7 +94,10 @@ async def save_scope_snapshot(store: TheStore, name: str, request: Request) -> S
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         raise BadSnapshot(
-            "api-scope.no-snapshot-scope", value=name, first=first["loc"], other_first=first["msg"]
+            "api-scope.no-snapshot-scope",
+            value=name,
+            first=str(first["loc"]),
+            other_first=first["msg"],
         ) from error
     file = await asyncio.to_thread(store.save_snapshot, name, content)
     return SnapshotInfo(name=file, bytes=len(content), header=SnapshotHeader.model_validate(header))

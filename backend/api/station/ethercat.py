@@ -33,6 +33,7 @@ from drivers.ethercat.link import EthercatLink
 from drivers.ethercat.process import firmware, permissions
 from drivers.ethercat.process.survey import ExchangeFigures, Survey, SurveyedStation
 from drivers.ethercat.wire.al_status import AlState
+from texts.message import language
 
 router = APIRouter()
 
@@ -293,6 +294,7 @@ def _station(
     reference = seen.station == next(
         (s.station for s in survey.stations if s.distributed_clock), None
     )
+    remedy = why.remedy() if why else None
     return SegmentStation(
         station=seen.station,
         name=seen.name,
@@ -305,8 +307,8 @@ def _station(
         firmware=seen.firmware,
         answers=not seen.lost,
         state=seen.state,
-        error=why.text if why else "",
-        remedy=why.remedy if why else "",
+        error=why.words(language()) if why else "",
+        remedy=remedy.words(language()) if remedy else "",
         behind_station=seen.parent,
         behind_port=seen.parent_port,
         distributed_clock=seen.distributed_clock,

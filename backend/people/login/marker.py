@@ -63,7 +63,7 @@ class AccountsMarker:
             raise AccountsGone(
                 "people.cannot-read-not-known",
                 value=str(self.path),
-                path=self.path,
+                path=str(self.path),
                 strerror=error.strerror,
             ) from error
 
@@ -97,6 +97,6 @@ class AccountsMarker:
             "people.station-accounts-database-no",
             value=str(database),
             since=since,
-            database=database,
-            folder=folder,
+            database=str(database),
+            folder=str(folder),
         )

@@ -31,6 +31,7 @@ from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange, motion_halted
 from drivers.motion.setpoint_plan import Phase
+from texts.message import text
 
 _RENEW_S, _LOOK_S = 0.05, 0.02
 _STATE_TIMEOUT_S = 5.0
@@ -347,5 +348,5 @@ def _raise_if_ended(axis: Axis, session: CyclicSession) -> None:
             halt,
             words=halt_words(halt, axis.known_units),
             drive=axis.drive.name,
-            remedy=halt_remedy(halt, "see the Alarms page; check the envelope"),
+            remedy=halt_remedy(halt, text("jog.see-alarms-check-envelope")),
         )

@@ -8,14 +8,12 @@ from backend.scales.words import halt_remedy, halt_words
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, NotAllowed, motion_halted
 from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted
+from texts.message import text
 
 #: Ends that the loop makes by itself for what a tool has asked of the axis. A smaller motion or
 #: other gains may mend them; nothing mends any other end but a person.
 _OF_THE_MOTION = ENVELOPE_CAUSES | {HaltCause.EXPIRED}
-_LOOK = (
-    "see the Alarms page; without an alarm look at the emergency stop, the drive's supply and "
-    "whoever else may disable it, then measure again"
-)
+_LOOK = text("measuring.look-why-it-ended")
 
 
 class Interrupted(NotAllowed):
@@ -44,7 +42,9 @@ def interrupted(error: NotAllowed) -> Interrupted:
 def interrupted_by(axis: Axis, halt: Halted) -> Interrupted:
     """A halt of this axis that nothing else may be tried after."""
     name, words = axis.drive.name, halt_words(halt, axis.known_units)
-    error = Interrupted(f"{name}: {words}", drive=name, remedy=halt_remedy(halt, _LOOK))
+    error = Interrupted(
+        "motion.halted", drive=name, where=name, cause=words, remedy=halt_remedy(halt, _LOOK)
+    )
     error.halt = halt
     return error
 

@@ -94,7 +94,7 @@ async def _until_done(
         if busy and status in spec.failed:
             raise Rejected(
                 "moves.drive-reports-identification-failed",
-                code=status,
+                abort_code=status,
                 drive=drive.name,
                 parameter=spec.status_key,
                 value=status,

@@ -23,6 +23,7 @@ from profiles.schema import (
     WaitStep,
     WriteStep,
 )
+from texts.message import text
 
 _POLL_S = 0.1
 
@@ -95,10 +96,11 @@ async def _carry_out(
                 await _step(axis, step)
             except DriveError as error:
                 left = len(procedure.steps) - number - 1
-                error.message = (
-                    f"{procedure.title}, step {number + 1} ({words[number]}): {error.message}"
-                    + (f"; the {left} steps after it were not done" if left else "")
-                )
+                error.text = text(
+                    "moves.procedure-step-before-others" if left else "moves.procedure-step",
+                    procedure=procedure.title, number=number + 1, step=words[number],
+                    cause=error.text, left=left,
+                )  # fmt: skip
                 raise
             if isinstance(step, WaitStep):
                 await left_alone.aclose()
@@ -154,7 +156,7 @@ async def _poll(axis: Axis, step: PollStep) -> None:
         if raw in step.failed:
             raise Rejected(
                 "moves.reads-means-failed",
-                code=raw,
+                abort_code=raw,
                 drive=drive.name,
                 parameter=step.key,
                 value=raw,

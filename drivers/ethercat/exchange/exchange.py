@@ -22,12 +22,13 @@ from drivers.ethercat.wire.steps import Pause, Steps
 from drivers.halt import HaltCause, Halted
 from drivers.motion.playback import AxisLoop
 from drivers.motion.setpoint_plan import Motion, limits_of
+from texts.message import text
 
 _NOT_YET, _OP_TRIES, _OP_PAUSE_S = (0x001B, 0x002D), 5, 0.2
 """Process data or SYNC0 stayed away (AL status codes of ETG.1020 table 2)."""
 _LEAVE_S, _SETTLE_DC_S, _SETTLE_S = 0.5, 0.4, 0.02
-_STOPPING = Halted(HaltCause.COMMANDED, note="the cyclic exchange is being stopped")
-_NO_ANSWER = Halted(HaltCause.LOST, note="the drive no longer answers")
+_STOPPING = Halted(HaltCause.COMMANDED, note=text("ethercat.cyclic-exchange-being-stopped"))
+_NO_ANSWER = Halted(HaltCause.LOST, note=text("ethercat.drive-no-longer-answers"))
 
 
 class Exchange:

@@ -148,7 +148,7 @@ def _direction(
                 parameter=str(address),
                 limit=f"{most} objects" + (f", {room} bytes" if room is not None else ""),
                 station=station,
-                address=address,
+                address=str(address),
                 reason=reason,
             )
         else:

@@ -95,7 +95,7 @@ def write_mapping(station: Station, setup: StationSetup) -> Steps[None]:
                 parameter=error.parameter,
                 remedy=(
                     text("ethercat.try-process-data-fixed-others")
-                    if error.code == _READ_ONLY
+                    if error.abort_code == _READ_ONLY
                     else error.remedy_text
                 ),
                 station=station.number,

@@ -17,6 +17,7 @@ from drivers.ethercat.wire import foe, sii
 from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.mailbox import Mailbox
 from drivers.ethercat.wire.steps import Pause, Steps, Write
+from texts.message import Text, joined, text
 
 Where = Literal["auto", "BOOT", "PREOP"]
 Tell = Callable[[float, str], None]
@@ -108,25 +109,21 @@ def _in_boot(
     try:
         yield from _send(box, name, data, password=password, tell=tell)
     except DriveError as error:
-        error.message += yield from _words_after_failure(station, managers, clock)
+        after = yield from _after_failure(station, managers, clock)
+        error.text = joined((error.text, after))
         raise
     tell(1.0, "the file is in the drive: it starts with it, do not switch off")
     yield from _back(station, managers, clock)
     yield from identify(station, clock)
 
 
-def _words_after_failure(
-    station: Station, managers: bytes, clock: Callable[[], float]
-) -> Steps[str]:
+def _after_failure(station: Station, managers: bytes, clock: Callable[[], float]) -> Steps[Text]:
     """Try to bring the drive back; what the user must know of how that went."""
     try:
         yield from restore_mailbox(station, managers, clock)
     except DriveError as error:
-        return (
-            f"; the drive does not come back ({error.message}): it may be without firmware, load"
-            " it again before you switch anything off"
-        )
-    return "; the drive is back in PREOP"
+        return text("ethercat.not-back-after-failure", cause=error.text)
+    return text("ethercat.back-after-failure")
 
 
 def _back(station: Station, managers: bytes, clock: Callable[[], float]) -> Steps[None]:
@@ -163,9 +160,13 @@ def _send(box: Mailbox, name: str, data: bytes, *, password: int, tell: Tell) ->
     try:
         yield from foe.write_file(box, name, data, password=password, on_progress=progress)
     except Rejected as error:
-        error.message += f", after {sent} of {len(data)} bytes"
+        error.text = text(
+            "ethercat.refused-after-bytes", cause=error.text, sent_bytes=sent, size_bytes=len(data)
+        )
         raise
     except DriveError as error:
-        error.message = f"the download broke off after {sent} of {len(data)} bytes: {error.message}"
-        error.remedy = "load the file again before you switch anything off"
+        error.text = text(
+            "ethercat.download-broke-off", cause=error.text, sent_bytes=sent, size_bytes=len(data)
+        )
+        error.own_remedy = error.text.remedy()
         raise

@@ -28,6 +28,7 @@ from drivers.ethercat.process import protocol, realtime
 from drivers.ethercat.process.operations import Operations
 from drivers.ethercat.process.protocol import Message
 from drivers.halt import HaltCause, Halted
+from texts.message import text
 
 _LAST_WORDS_S = 5
 _STATUS_S = 0.2
@@ -35,7 +36,7 @@ _PATIENT_FRAME_US = 30_000
 _SERVER_SILENT_S = 3.0
 _SILENT = Halted(
     HaltCause.LOST,
-    note=f"the server has been silent for {_SERVER_SILENT_S:g} s: the axis is braked",
+    note=text("ethercat.server-silent-axis-braked", server_silent_s=_SERVER_SILENT_S),
 )
 
 

@@ -144,7 +144,7 @@ class HostProcess:
             raise LinkLost(
                 "ethercat.ethercat-process-cannot-started",
                 interface=self._interface,
-                strerror=error.strerror or error,
+                strerror=str(error.strerror or error),
             ) from error
         ours.setblocking(False)
         self._socket = ours

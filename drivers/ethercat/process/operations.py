@@ -26,6 +26,7 @@ from drivers.ethercat.wire.frames import ROOM_BYTES
 from drivers.ethercat.wire.information import ObjectInfo
 from drivers.ethercat.wire.lanes import Done, Lanes, Urgency
 from drivers.halt import HaltCause, Halted
+from texts.message import text
 
 _CONTROL_WORD = 0x6040
 _MAX_STEPS_PER_CYCLE = 16
@@ -33,7 +34,7 @@ _STARVED_CYCLES = 8
 _NS_PER_BYTE = 80
 """100 Mbit/s: a frame may not become so long that process data wait for it."""
 _FIND_TRIES = 3
-_ENDED = Halted(HaltCause.COMMANDED, note="the motion was ended")
+_ENDED = Halted(HaltCause.COMMANDED, note=text("ethercat.motion-ended"))
 """A search that lost a frame has not seen everything; one that loses some each time is told."""
 
 

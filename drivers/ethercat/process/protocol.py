@@ -14,6 +14,7 @@ import msgpack  # type: ignore[import-untyped]
 
 from drivers import errors
 from drivers.errors import DriveError, Rejected
+from texts.message import Text, Wire
 
 #: A message is a closed set of keys, but its values differ by operation: the boundary is here.
 Message = dict[str, Any]
@@ -26,11 +27,11 @@ class WireError(TypedDict):
     """A `DriveError` on its way to the server."""
 
     kind: str
-    message: str
+    text: Wire
     parameter: str | None
     limit: str | None
-    remedy: str | None
-    code: int | None
+    remedy: Wire | None
+    abort_code: int | None
 
 
 _KINDS: dict[str, type[DriveError]] = {
@@ -76,27 +77,28 @@ def error_to_wire(error: DriveError) -> WireError:
     """The error as a map."""
     return WireError(
         kind=error.kind,
-        message=error.message,
+        text=error.text.to_wire(),
         parameter=error.parameter,
         limit=error.limit,
-        remedy=error.remedy,
-        code=error.code if isinstance(error, Rejected) else None,
+        remedy=None if error.own_remedy is None else error.own_remedy.to_wire(),
+        abort_code=error.abort_code if isinstance(error, Rejected) else None,
     )
 
 
 def error_from_wire(wire: WireError) -> DriveError:
     """The same error again, of the same class."""
-    if wire["code"] is not None:
+    remedy = None if wire["remedy"] is None else Text.from_wire(wire["remedy"])
+    if wire["abort_code"] is not None:
         return Rejected(
-            wire["message"],
-            code=wire["code"],
+            Text.from_wire(wire["text"]),
+            abort_code=wire["abort_code"],
             parameter=wire["parameter"],
             limit=wire["limit"],
-            remedy=wire["remedy"],
+            remedy=remedy,
         )
     return _KINDS.get(wire["kind"], DriveError)(
-        wire["message"],
+        Text.from_wire(wire["text"]),
         parameter=wire["parameter"],
         limit=wire["limit"],
-        remedy=wire["remedy"],
+        remedy=remedy,
     )

@@ -204,7 +204,7 @@ class Roster:
         """AL state and status of a station in words."""
         words = f"station {station.number} is in {state_name(station.al_state)}"
         if station.al_state & ERROR_BIT:
-            words += f": {al_status_text(station.al_code).text}"
+            words += f": {al_status_text(station.al_code)}"
         return words
 
     def event(self, kind: str, station: int | None, text: str, code: int | None = None) -> None:

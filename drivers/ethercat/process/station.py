@@ -93,10 +93,10 @@ class Station:
         told = al_status_text(self.al_code)
         raise LinkLost(
             "ethercat.station-al-status-answers",
-            remedy=(told.remedy_text or text("ethercat.try-switch-drive-off")),
+            remedy=(told.remedy() or text("ethercat.try-switch-drive-off")),
             station=self.number,
             state_name=state_name(self.al_state),
-            text=told.text,
+            status=told,
             al_code=self.al_code,
         )
 
@@ -186,11 +186,11 @@ def _refused(station: Station, target: AlState) -> NotAllowed:
     return NotAllowed(
         "ethercat.station-refuses-al-status",
         limit=f"AL status {station.al_code:#06x}",
-        remedy=(known.remedy_text or None),
+        remedy=known.remedy(),
         station=station.number,
         target=target.name,
         state_name=state_name(station.al_state),
-        text=known.text,
+        status=known,
         al_code=station.al_code,
     )
 

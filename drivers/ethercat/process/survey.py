@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from drivers.ethercat.process.protocol import Message
-from drivers.ethercat.wire.al_status import ERROR_BIT, AlText, al_status_text, state_name
+from drivers.ethercat.wire.al_status import ERROR_BIT, al_status_text, state_name
 from drivers.ethercat.wire.esc import Finding, Port, PortCounters
+from texts.message import Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,7 @@ class SurveyedStation:
         return "" if self.lost else state_name(self.al)
 
     @property
-    def al_text(self) -> AlText | None:
+    def al_text(self) -> Text | None:
         """Why it is in this state and what to do, where it says so."""
         return al_status_text(self.al_code) if self.al & ERROR_BIT and not self.lost else None
 

@@ -9,32 +9,36 @@ from drivers.errors import DriveError, ProtocolError, Rejected
 from drivers.ethercat.wire.mailbox import FOE, Mail, Mailbox
 from drivers.ethercat.wire.registers import GONE_S
 from drivers.ethercat.wire.steps import Pause, Steps
+from texts.message import joined, prose, text
 
 ERASE_S, PACKET_S = 30.0, 10.0
 """Drives that erase their memory first, or check the whole file at the end, take their time."""
 
 _WRITE, _DATA, _ACK, _ERROR, _BUSY = 2, 3, 4, 5, 6
 
-_ERRORS = {
-    0x8000: "unspecified error",
-    0x8001: "no such file",
-    0x8002: "access denied",
-    0x8003: "the drive's memory is full",
-    0x8004: "not allowed in this state",
-    0x8005: "wrong packet number",
-    0x8006: "the file exists already",
-    0x8007: "no such user or password",
-    0x8008: "only possible in the BOOT state",
-    0x8009: "not possible in the BOOT state",
-    0x800A: "the drive has no right to do that",
-    0x800B: "program error: the file is not for this drive",
-    0x800C: "wrong checksum",
-    0x800D: "the firmware does not fit the hardware",
-    0x800F: "no file there to read",
-    0x8010: "the file header is missing",
-    0x8011: "flash memory error",
-    0x8012: "the file is not compatible",
-}
+#: Error codes of ETG.1000.6 with words in the catalogue.
+_ERRORS = frozenset(
+    {
+        0x8000,
+        0x8001,
+        0x8002,
+        0x8003,
+        0x8004,
+        0x8005,
+        0x8006,
+        0x8007,
+        0x8008,
+        0x8009,
+        0x800A,
+        0x800B,
+        0x800C,
+        0x800D,
+        0x800F,
+        0x8010,
+        0x8011,
+        0x8012,
+    }
+)
 
 
 def write_file(
@@ -96,10 +100,10 @@ def _until_acknowledged(box: Mailbox, mail: bytes, packet: int, timeout_s: float
 
 def _refused(answer: bytes) -> Rejected:
     code = int.from_bytes(answer[2:6], "little")
-    text = _ERRORS.get(code, "a reason of the maker's own")
+    reason = text(f"ethercat.foe-{code:04x}" if code in _ERRORS else "ethercat.foe-other")
     told = answer[6:].split(b"\0", 1)[0].decode("utf-8", "replace").strip()
-    words = f"{text}: {told}" if told else text
-    return Rejected("ethercat.drive-refused-file-foe", code=code, words=words, number=code)
+    words = joined((reason, prose(told)), ": ") if told else reason
+    return Rejected("ethercat.drive-refused-file-foe", abort_code=code, words=words)
 
 
 def _is_foe(mail: Mail) -> bool:

@@ -73,7 +73,7 @@ def object_of(address: Address) -> tuple[int, int]:
     """
     if address.index is None:
         raise NotAllowed(
-            "ethercat.no-object-index-ethercat", parameter=str(address), address=address
+            "ethercat.no-object-index-ethercat", parameter=str(address), address=str(address)
         )
     return address.index, address.subindex
 
@@ -92,7 +92,7 @@ def fitted(address: Address, data: bytes) -> bytes:
     raise ProtocolError(
         "ethercat.came-bytes-type",
         parameter=str(address),
-        address=address,
+        address=str(address),
         bytes=len(data),
         type=address.type,
         size=size,

@@ -111,7 +111,7 @@ def _read_whole(station: Station, index: int, sizes: dict[int, int]) -> Steps[di
         data = yield from coe.upload(station.box, index, 0, complete=True)
     except Rejected as error:
         station.single_only.add(index)
-        if error.code in _NO_COMPLETE_ACCESS and len(station.single_only) >= 3:
+        if error.abort_code in _NO_COMPLETE_ACCESS and len(station.single_only) >= 3:
             station.complete_access = False
         return {}
     except DriveError:

@@ -67,7 +67,7 @@ def open_pty(path: Path) -> tuple[int, int]:
         raise NotAllowed("virtual.virtual-serial-drives-need", limit="Linux, macOS")
     ours = path.is_symlink() and str(path.readlink()).startswith("/dev/pts/")
     if (path.exists() or path.is_symlink()) and not ours:
-        raise LinkLost("virtual.exists-no-virtual-wire", path=path)
+        raise LinkLost("virtual.exists-no-virtual-wire", path=str(path))
     master, slave = os.openpty()
     tty.setraw(slave)
     set_blocking(master, False)

@@ -121,7 +121,7 @@ def test_a_repeated_segment_is_not_taken_twice() -> None:
 
 
 def test_unknown_abort_codes_keep_their_number() -> None:
-    assert "0x12345678" in abort_text(0x12345678).text
+    assert "0x12345678" in abort_text(0x12345678).words()
     assert rejected(0x06010002, parameter="6041:00", writing=True).message == (
         "the drive refused the write of 6041:00: the object can only be read (abort 06010002h)"
     )

@@ -67,7 +67,7 @@ async def test_read_many_mixes_whole_objects_single_ones_and_refusals(rig: Rig) 
         assert answers[:4] == [b"\x03", b"\x22\x11", b"\x33", b"\x77\x66\x55\x44"]
         refused = answers[4]
         assert isinstance(refused, Rejected)
-        assert refused.code == 0x06020000
+        assert refused.abort_code == 0x06020000
         assert refused.parameter == "7777:00"
         assert answers[5] == b"DICT-1 drive"
         assert rig.do("state")["frames"] - frames < 60  # type: ignore[index]

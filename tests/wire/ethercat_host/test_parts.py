@@ -218,8 +218,8 @@ def _division(data: bytes) -> int:
 
 
 def test_al_status_in_words() -> None:
-    assert al_status_text(0x001B).text.startswith("sync manager watchdog")
-    assert "0x9abc" in al_status_text(0x9ABC).text
+    assert al_status_text(0x001B).words().startswith("sync manager watchdog")
+    assert "0x9abc" in al_status_text(0x9ABC).words()
     assert state_name(0x14) == "SAFEOP + error"
 
 

@@ -96,7 +96,7 @@ async def test_a_drive_with_a_mailbox_unlike_ours_is_read_and_written(bus: Bus) 
             assert answers[:3] == [b"\x02", b"\x11\x22", b"\x33\x44"]
             refused = answers[3]
             assert isinstance(refused, Rejected), "an abort as response 84h"
-            assert refused.code == 0x06020000
+            assert refused.abort_code == 0x06020000
         await bus.link.write(SERVO, RECORD[1], b"\x55\x66")
         assert await bus.link.read(SERVO, RECORD[1]) == b"\x55\x66"
         await bus.link.write(SERVO, RECORD[1], b"\x11\x22")

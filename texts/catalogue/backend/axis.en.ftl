@@ -1,5 +1,6 @@
 axis_606ch-6064h-opposite-signs = { $drive }: 606Ch and 6064h have opposite signs
     .remedy = look at the polarity 607Eh: its bits 6 and 7 belong together; then move again
+axis_check-load-and-limits = check load and limits
 axis_cyclic-exchange-runs-already = { $url }: the cyclic exchange runs already
     .remedy = stop the exchange first to choose another cycle
 axis_cyclic-exchange-writes-control = { $drive }: the cyclic exchange writes the control word
@@ -47,3 +48,4 @@ axis_stop-pressed = { $drive }: STOP was pressed
     .remedy = start a new motion when it is safe
 axis_try-remove-cause-named-try = remove the cause named and try again
 axis_try-see-alarms-page = see the Alarms page
+axis_with-faults = { $cause } ({ $faults })

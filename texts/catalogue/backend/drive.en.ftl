@@ -22,6 +22,7 @@ drive_not-keep-setting-probe = { $drive }: { $parameter } does not keep the sett
     .remedy = perhaps process data of the running exchange hold this object; end it
 drive_nothing-written = { $identity_warning }: nothing is written to it
     .remedy = check the cables; if it was exchanged, accept it on the Connect page
+drive_of-parameter = { $drive }: { $parameter } { $name }: { $cause }
 drive_outside = { $label }: { $shown } is outside { $limit }
     .remedy = choose a value from { $limit }
 drive_read = { $label } is read-only

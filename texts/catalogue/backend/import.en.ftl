@@ -86,3 +86,5 @@ import_unpacks-more-bytes-save-fewer = { $value } unpacks to more than { $max_un
     .remedy = save fewer variables
 import_vectors-differ-length = { $name }: the vectors differ in length: { $value }
     .remedy = save vectors of one length
+import_too-much-memory = { $name } needs more memory than is given to an import
+    .remedy = export a shorter part of the recording, or fewer columns

@@ -1,3 +1,4 @@
+cyclic_axis-being-disabled = the axis is being disabled
 cyclic_braking = { $where } is braking: { $why }
     .remedy = wait until it stands
 cyclic_cycle-cannot-told-drive = a cycle of { NUM($cycle_us, format: "g") } µs cannot be told to the drive
@@ -6,7 +7,9 @@ cyclic_limit-cannot-watched-not = { $where }: the { $name } limit cannot be watc
     .remedy = configure the cyclic data with { NUM($index, format: "04X") }h
 cyclic_mode-setpoint-needs-mode = { $where } is in mode { $mode }, this setpoint needs mode { $wanted } ({ $mode_names })
     .remedy = choose the mode when enabling the axis
+cyclic_motion-ended = the motion was ended
 cyclic_motion-needs-operation-enabled = { $where } is in { QUOTED($state) }, a motion needs 'Operation enabled'
+cyclic_not-come-rest-ramp = it did not come to rest by its ramp: it is stopped and disabled
 cyclic_not-cyclic-data = { $where }: { NUM($index, format: "04X") }h is not in the cyclic data
     .remedy = configure the cyclic data with this target
 cyclic_not-setpoint-cyclic-motion = { $target } is not a setpoint for cyclic motion

@@ -13,6 +13,7 @@ jog_left-travel-limit-jog = { $drive } left the travel limit of the jog
     .remedy = check load and gearing; an external force may move the axis
 jog_not-read-jogging = { $drive }: { $parameter } could not be read while jogging: { $error }
     .remedy = check the cable; the axis stops by itself
+jog_see-alarms-check-envelope = see the Alarms page; check the envelope
 jog_station-signal-not-end = station { $station }: a signal of { NUM($duration_s, format: "g") } s did not end in { NUM($elapsed_s, format: ".0f") } s
     .remedy = look at the link quality: the computer skips many cycles
 jog_still-moves-after-jog = { $drive } still moves 2 s after the jog was released

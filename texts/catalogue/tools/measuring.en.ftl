@@ -2,6 +2,7 @@ measuring_cyclic-exchange-ended-during = { $drive }: the cyclic exchange ended d
     .remedy = look at the cable and at the drive's supply
 measuring_cyclic-exchange-not-run = { $url }: the cyclic exchange does not run
     .remedy = start it on the Connect page
+measuring_look-why-it-ended = see the Alarms page; without an alarm look at the emergency stop, the drive's supply and whoever else may disable it, then measure again
 measuring_not-come-rest-within = { $drive } does not come to rest within { NUM($timeout_s, format: "g") } s
     .remedy = stop what moves it, or lower the gains if it oscillates
 measuring_not-part-cyclic-data = { $drive }: { $replace } is not part of the cyclic data

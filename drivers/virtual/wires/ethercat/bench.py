@@ -27,17 +27,17 @@ def axes_of_bench(path: Path, url: str | None) -> list[AxisSpec]:
     urls = bench.urls("ethercat")
     if url is None:
         if len(urls) != 1:
-            raise NotAllowed("virtual.bench-file-ethercat-buses", value=len(urls), path=path)
+            raise NotAllowed("virtual.bench-file-ethercat-buses", value=len(urls), path=str(path))
         url = urls[0]
     found = sorted(bench.on(url), key=lambda pair: pair[1])
     if not found:
-        raise NotAllowed("virtual.bench-file-no-drive", value=url, path=path)
+        raise NotAllowed("virtual.bench-file-no-drive", value=url, path=str(path))
     stations = [station for _, station in found]
     if stations != list(range(1, len(found) + 1)):
         raise NotAllowed(
             "virtual.bench-file-ethercat-stations",
             value=stations,
-            path=path,
+            path=str(path),
             found_count=len(found),
             stations=", ".join(map(str, stations)),
         )

@@ -1,0 +1,33 @@
+motion_beyond-limit = { $quantity ->
+    [position] position
+    [speed] speed
+    [torque] torque
+   *[following-error] following error
+ } { $value } is beyond the limit of { $limit }: the axis is braked and disabled
+motion_beyond-limit-in = { $quantity ->
+    [position] position
+    [speed] speed
+    [torque] torque
+   *[following-error] following error
+ } { $value } { $unit } is beyond the limit of { $limit } { $unit }: the axis is braked and disabled
+motion_commanded = it was halted
+motion_contradiction = 606Ch says { NUM($speed, format: ".6g") }, the position says { NUM($from_position, format: ".6g") } (raw units of 606Ch; { $note }): the axis is braked and disabled
+motion_expired = the setpoints were not renewed in time: the axis is braked and disabled
+motion_following = the following error is beyond its limit
+motion_halted = { $where }: { $cause }
+motion_left-enabled = the drive left Operation enabled: { $note }
+motion_lost = the cyclic data stopped coming
+motion_measured-contradict = measured position and speed contradict each other
+motion_move-axis-permission-hand = { $drive }: { $parameter } can move the axis, and the permission at hand is not for it
+    .remedy = begin the motion anew on the Motion page
+motion_moved-already = { $drive } is moved already: { $purpose }
+    .remedy = wait for it to end, or stop it
+motion_nobody-asked-motion-not = { $drive }: nobody asked for this motion, so it is not begun
+    .remedy = begin it on the Motion page
+motion_permission-move-ended = { $drive }: { $purpose }: the permission to move has ended: { $why }
+    .remedy = begin the motion anew when it is safe
+motion_position = the position is beyond its limit
+motion_put-energy-motor-not = { $drive }: { $parameter } { $key } can put energy into the motor, so it is not written as a parameter
+motion_speed = the speed is beyond its limit
+motion_torque = the torque is beyond its limit
+motion_unfit = a setpoint does not fit its object: the axis is braked
