@@ -84,7 +84,7 @@ class FirmwareLink:
             assert address.index is not None
             return self.device.read(address.index, address.subindex)
         except SdoAbort as abort:
-            raise Rejected(f"{address}: refused", code=abort.code) from abort
+            raise Rejected(f"{address}: refused", abort_code=abort.code) from abort
 
     async def read_many(
         self, station: int, addresses: Sequence[Address]
@@ -109,7 +109,7 @@ class FirmwareLink:
             assert address.index is not None
             self.device.write(address.index, address.subindex, data)
         except SdoAbort as abort:
-            raise Rejected(f"{address}: refused", code=abort.code) from abort
+            raise Rejected(f"{address}: refused", abort_code=abort.code) from abort
 
     def _place(self, address: Address) -> Place:
         assert address.register is not None

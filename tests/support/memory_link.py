@@ -42,7 +42,7 @@ class MemoryLink:
         if place in self.read_errors:
             raise self.read_errors[place]
         if place not in self.objects:
-            raise Rejected("object does not exist", code=0x06020000)
+            raise Rejected("object does not exist", abort_code=0x06020000)
         return self.objects[place]
 
     async def read_many(

@@ -114,7 +114,7 @@ async def test_commands_are_never_unsaved(drive: Drive) -> None:
 
 
 async def test_one_failure_does_not_spoil_a_batch(drive: Drive, link: MemoryLink) -> None:
-    link.read_errors[0x2005, 0x10] = Rejected("refused", code=0x06010001)
+    link.read_errors[0x2005, 0x10] = Rejected("refused", abort_code=0x06010001)
     readings = await drive.read_many(["2005:03", "2005:10", "PA_38", "2105:00"])
     assert readings["2005:03"].raw == 400
     assert readings["2005:10"].error == "refused"

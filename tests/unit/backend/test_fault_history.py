@@ -116,7 +116,7 @@ async def test_a_selector_brings_every_record_and_is_put_back(
 
 async def test_a_selector_that_is_refused_is_put_back(profile: Profile, link: MemoryLink) -> None:
     recorder = Recorder({**link.objects, (0x200D, 0x24): b"\2\0"})
-    recorder.write_errors.append(Rejected("no", code=0x06090030))
+    recorder.write_errors.append(Rejected("no", abort_code=0x06090030))
     with pytest.raises(Rejected):
         await read_history(_axis(profile, recorder, _selected()))
     assert recorder.objects[0x200D, 0x24] == b"\2\0"

@@ -99,7 +99,7 @@ async def test_a_torque_that_is_free_in_one_direction_is_not_enabled(
 async def test_a_limit_that_cannot_be_read_for_another_reason_is_not_taken_for_none(
     plain: Plain, member: Member
 ) -> None:
-    plain.read_errors[POSITIVE] = Rejected("a general error", code=0x08000000)
+    plain.read_errors[POSITIVE] = Rejected("a general error", abort_code=0x08000000)
     with pytest.raises(Rejected):
         async with member.axis.enabled(Mode.PP, HALF):
             pass

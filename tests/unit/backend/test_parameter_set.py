@@ -74,7 +74,7 @@ async def test_a_load_that_the_link_ends_says_how_far_it_came_and_how_to_take_it
 
 async def test_a_set_names_what_it_lacks(drive: Drive, link: MemoryLink, tmp_path: Path) -> None:
     assert parameter_set.parse(await written(drive)).not_read == ()
-    link.read_errors[0x2005, 3] = Rejected("a general error", code=0x08000000)
+    link.read_errors[0x2005, 3] = Rejected("a general error", abort_code=0x08000000)
     library = SetLibrary(tmp_path)
     name = await parameters.save_set(
         drive, library, "partial", author="", notes="", motor_individual=False, overwrite=False

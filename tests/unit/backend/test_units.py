@@ -80,7 +80,7 @@ async def test_a_gear_that_cannot_be_read_for_another_reason_is_no_gear_of_1() -
     drive = plain(numerator=(3, 4), denominator=(1, 4))
     link = drive.ports[0].link
     assert isinstance(link, MemoryLink)
-    link.read_errors[0x6091, 1] = Rejected("a general error", code=0x08000000)
+    link.read_errors[0x6091, 1] = Rejected("a general error", abort_code=0x08000000)
     with pytest.raises(Rejected):
         await read_units(drive)
 

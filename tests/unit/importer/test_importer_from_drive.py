@@ -69,7 +69,7 @@ class FakeCanopen:
         assert station == 4
         assert address.index is not None
         if address.index not in self.objects:
-            raise Rejected("the object does not exist", code=0x06020000)
+            raise Rejected("the object does not exist", abort_code=0x06020000)
         return self.objects[address.index]
 
 

@@ -61,7 +61,7 @@ def test_a_jog_that_cannot_be_taken_back_is_still_moving() -> None:
 
             async def refuse(station: int, address: Address, data: bytes) -> None:
                 if address.index in (0x2003, 0x200C):
-                    raise Rejected("write-protected", code=0x06010002)
+                    raise Rejected("write-protected", abort_code=0x06010002)
                 await write(station, address, data)
 
             bench.link.write = refuse  # type: ignore[method-assign]

@@ -197,7 +197,7 @@ class DirectLink:
         try:
             return self.device.read(address.index or 0, address.subindex)
         except SdoAbort as abort:
-            raise Rejected(f"{address}", code=abort.code) from abort
+            raise Rejected(f"{address}", abort_code=abort.code) from abort
 
     async def read_many(
         self, station: int, addresses: Sequence[Address]
@@ -223,7 +223,7 @@ class DirectLink:
         try:
             self.device.write(address.index or 0, address.subindex, data)
         except SdoAbort as abort:
-            raise Rejected(f"{address}", code=abort.code) from abort
+            raise Rejected(f"{address}", abort_code=abort.code) from abort
         await asyncio.sleep(0)
 
     def quality(self, station: int | None = None) -> LinkQuality:

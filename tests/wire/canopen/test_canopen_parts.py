@@ -359,12 +359,12 @@ def test_a_fixed_mapping_is_told_as_such_and_leaves_nothing_behind() -> None:
 
     def read(_station: int, index: int, subindex: int) -> bytes:
         if (index, subindex) not in objects:
-            raise Rejected("the drive has no such object", code=0x06020000)
+            raise Rejected("the drive has no such object", abort_code=0x06020000)
         return objects[index, subindex]
 
     def write(_station: int, index: int, subindex: int, data: bytes) -> None:
         if index == 0x1A00:
-            raise Rejected("the object can only be read", code=0x06010002)
+            raise Rejected("the object can only be read", abort_code=0x06010002)
         objects[index, subindex] = data
 
     setup = DriveSetup(read, write, own_id=127)

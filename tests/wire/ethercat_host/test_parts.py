@@ -99,7 +99,7 @@ def test_blocks_are_cut_at_gaps_of_the_cycle_counter() -> None:
     [
         DriveError("a"), errors.LinkTimeout("b"), LinkLost("c", remedy="d"),
         errors.ProtocolError("e", parameter="6041:00"), errors.OutOfRange("f", limit="1…2"),
-        errors.NotAllowed("g"), errors.Busy("h"), Rejected("i", code=0x06010002),
+        errors.NotAllowed("g"), errors.Busy("h"), Rejected("i", abort_code=0x06010002),
         errors.NotInUse("j"),
     ],
 )  # fmt: skip

@@ -126,7 +126,7 @@ def test_texts_of_the_manual() -> None:
 
 
 @pytest.mark.parametrize(
-    "error", [LinkLost("x", remedy="y"), Rejected("x", code=4, remedy="y"), NotAllowed("x")]
+    "error", [LinkLost("x", remedy="y"), Rejected("x", abort_code=4, remedy="y"), NotAllowed("x")]
 )
 def test_copied_errors_keep_what_they_say(error: DriveError) -> None:
     copy = _again(error)

@@ -1,6 +1,5 @@
 link_bytes-came-bytes = { $bytes } bytes came for a { $data_type } of { $calcsize_bytes } bytes
     .remedy = the drive's firmware may be of another version: compare with its dictionary
-link_drive = the drive { $action }{ $where }: { $text }{ $number }
 link_gives-option-twice = { QUOTED($value) } gives an option twice
 link_must-whole-number = { $name }={ $value } must be a whole number from { $low } to { $high }
 link_names-no-adapter = { QUOTED($value) } names no adapter

@@ -1,0 +1,157 @@
+"""Every message has its words in both languages, and every text is somebody's."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+from fluent.syntax import ast as ftl
+from fluent.syntax import parse
+from fluent.syntax.visitor import Visitor
+
+from drivers.errors import DriveError
+from texts.message import REMEDY, Language, Text, is_code
+from texts.render import bundle, files, identifier, render
+
+ROOT = Path(__file__).parents[2]
+LANGUAGES: tuple[Language, ...] = ("en", "zh")
+#: Codes made of a room and a number: tables of the standards.
+TABLES = {
+    "al-status.x": ROOT / "drivers/ethercat/wire/al_status.py",
+    "sdo-abort.x": ROOT / "drivers/sdo_abort.py",
+    "ethercat.foe-": ROOT / "drivers/ethercat/wire/foe.py",
+}
+#: Codes that are put together from parts.
+_MADE = re.compile(r"sdo-abort\.(unknown-)?(read|write)-refused(-of)?")
+
+
+def _kinds_of(error: type[DriveError]) -> set[type[DriveError]]:
+    for module in ("backend.api.app", "backend.commands.serve", "backend.cli"):
+        import_module(module)
+    found = {error}
+    for kind in error.__subclasses__():
+        found |= _kinds_of(kind)
+    return found
+
+
+class _Variables(Visitor):
+    """Names of the variables of a pattern."""
+
+    def __init__(self) -> None:
+        self.names: set[str] = set()
+
+    def visit_VariableReference(self, node: ftl.VariableReference) -> None:  # noqa: N802
+        self.names.add(node.id.name)
+
+
+def _entries(language: Language) -> dict[str, set[str]]:
+    """By code (with ``/remedy`` behind it for a remedy) the variables of its text."""
+    found: dict[str, set[str]] = {}
+    for place in files().values():
+        source = place.with_name(f"{place.name}.{language}.ftl").read_text("utf-8")
+        for entry in parse(source).body:
+            assert not isinstance(entry, ftl.Junk), f"{place.name}.{language}: {entry.content}"
+            if not isinstance(entry, ftl.Message):
+                continue
+            code = entry.id.name.replace("_", ".")
+            assert code not in found, f"{code} is there twice"
+            for name, pattern in ((code, entry.value), *(
+                (f"{code}/{each.id.name}", each.value) for each in entry.attributes
+            )):  # fmt: skip
+                if pattern is not None:
+                    variables = _Variables()
+                    variables.visit(pattern)
+                    found[name] = variables.names
+    return found
+
+
+ENGLISH, CHINESE = _entries("en"), _entries("zh")
+
+
+def _strings() -> Iterator[str]:
+    for folder in ("backend", "drivers", "profiles"):
+        for file in (ROOT / folder).rglob("*.py"):
+            for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+                if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                    yield node.value
+
+
+def _first_arguments() -> Iterator[str]:
+    """What errors and messages are made of: `NotAllowed("…")`, `text("…")`."""
+    for folder in ("backend", "drivers", "profiles"):
+        for file in (ROOT / folder).rglob("*.py"):
+            for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+                if not isinstance(node, ast.Call) or not node.args:
+                    continue
+                name = getattr(node.func, "id", getattr(node.func, "attr", ""))
+                first = node.args[0]
+                if not isinstance(first, ast.Constant) or not isinstance(first.value, str):
+                    continue
+                if name in ("text", "Text") or name in ERRORS:
+                    yield first.value
+
+
+ERRORS = {each.__name__ for each in _kinds_of(DriveError)}
+RAISED = {words for words in _strings() if is_code(words)}
+SHOWN = {words for words in _first_arguments() if is_code(words)}
+
+
+def test_every_code_has_words() -> None:
+    assert len(SHOWN) > 500
+    assert not SHOWN - set(ENGLISH), "in no file of texts/catalogue"
+
+
+def test_every_text_is_shown_by_somebody() -> None:
+    made = {code for code in ENGLISH if _MADE.fullmatch(code) or code.startswith(tuple(TABLES))}
+    unused = {code for code in ENGLISH if REMEDY not in code} - RAISED - made
+    assert not unused, "nobody raises these"
+
+
+@pytest.mark.parametrize(("start", "file"), TABLES.items())
+def test_every_number_of_a_table_has_its_words(start: str, file: Path) -> None:
+    numbers = {
+        node.value
+        for each in ast.walk(ast.parse(file.read_text("utf-8")))
+        if isinstance(each, ast.Set)
+        for node in each.elts
+        if isinstance(node, ast.Constant) and isinstance(node.value, int)
+    }
+    digits = 8 if start.startswith("sdo") else 4
+    codes = {f"{start}{number:0{digits}x}" for number in numbers}
+    assert len(codes) > 10
+    assert codes <= set(ENGLISH)
+    listed = {code for code in ENGLISH if code.startswith(start) and REMEDY not in code}
+    assert listed - codes <= {"ethercat.foe-other"}
+
+
+def test_both_languages_say_the_same_codes_with_the_same_facts() -> None:
+    assert set(ENGLISH) == set(CHINESE)
+    differ = {code for code, facts in ENGLISH.items() if CHINESE[code] != facts}
+    assert not differ
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_code_is_rendered(language: Language) -> None:
+    for code, names in (ENGLISH if language == "en" else CHINESE).items():
+        for number in (1, 2.5):
+            facts = {name: f"‹{name}›" if name == "quantity" else number for name in names}
+            found = bundle(code.partition(".")[0], language)
+            assert found is not None
+            assert found.has_message(identifier(code.partition("/")[0]))
+            shown = render(Text(code, facts), language)
+            assert shown.strip(), code
+            assert "{" not in shown.replace('{"', ""), f"{code}: {shown}"
+            assert "\u2068" not in shown, "no isolating signs"
+
+
+def test_chinese_is_chinese() -> None:
+    bare = [
+        code for code, names in CHINESE.items()
+        if not re.search(r"[\u4e00-\u9fff]", render(Text(code, dict.fromkeys(names, "x")), "zh"))
+        and re.search(r"[a-z]{3}", render(Text(code, dict.fromkeys(names, "x")), "en"))
+    ]  # fmt: skip
+    assert not bare

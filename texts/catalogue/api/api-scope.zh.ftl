@@ -1,0 +1,13 @@
+api-scope_no-snapshot-scope = { $value } 不是示波器快照：{ $first }：{ $other_first }
+    .remedy = 请在“示波器”页面保存
+api-scope_no-viewer = 没有 viewer.{ $kind }
+api-scope_not-exported-yet = { $value } 尚未导出
+    .remedy = 请先导出
+api-scope_server-starting-ending = 服务器正在启动或结束
+    .remedy = 请重试
+api-scope_snapshot-too-large = 快照过大
+    .remedy = 请缩短显示区间，或改为录制
+api-scope_viewer-no-version = 查看器没有版本 { $version } 的 { $name }
+    .remedy = 请重新加载页面
+api-scope_viewer-sent-compressed = 查看器以压缩形式发送
+    .remedy = 请使用浏览器

@@ -1,0 +1,4 @@
+api-sets_give-either-file-against = file 与 against 只能给出其一
+    .remedy = 请选择一个比较对象
+api-sets_larger-bytes = { $file } 大于 { $max_bytes } 字节
+    .remedy = 请选择其他文件

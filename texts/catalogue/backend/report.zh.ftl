@@ -1,0 +1,10 @@
+report_change-written-drive-not = 更改已写入驱动器，但未写入报告列表：{ $cause }
+    .remedy = 请释放空间；并手动记下数值
+report_measurements-different-drives = 这些测量属于不同的驱动器
+    .remedy = 请为每台驱动器分别生成报告
+report_no-report = { QUOTED($value) } 不是报告
+    .remedy = 请从列表中选择
+report_no-report-choose-list = 没有报告 { $value }
+    .remedy = 请从列表中选择；它可能已被他人删除
+report_report-cannot-show-measures = 报告不能显示 { QUOTED($tool) } 的测量
+report_result-not-complete = { $tool } 的结果不完整：{ $cause }

@@ -1,0 +1,1 @@
+restore_cannot-removed = 无法删除 { $file }：{ $strerror }

@@ -1,0 +1,33 @@
+motion_commanded = 已停止
+motion_contradiction = 606Ch 为 { NUM($speed, format: ".6g") }，位置推得 { NUM($from_position, format: ".6g") }（606Ch 的原始单位；{ $note }）：轴已制动并断使能
+motion_expired = 设定值未及时更新：轴已制动并断使能
+motion_following = 跟随误差超出限值
+motion_halted = { $where }：{ $cause }
+motion_left-enabled = 驱动器退出了“运行使能”：{ $note }
+motion_lost = 循环数据中断
+motion_measured-contradict = 测得的位置与速度相互矛盾
+motion_move-axis-permission-hand = { $drive }：{ $parameter } 可使轴运动，而现有许可不适用
+    .remedy = 请在“运动”页面重新开始运动
+motion_moved-already = { $drive } 已在运动：{ $purpose }
+    .remedy = 请等待其结束，或将其停止
+motion_nobody-asked-motion-not = { $drive }：无人请求此运动，因此不启动
+    .remedy = 请在“运动”页面启动
+motion_permission-move-ended = { $drive }：{ $purpose }：运动许可已结束：{ $why }
+    .remedy = 请在安全时重新开始运动
+motion_position = 位置超出限值
+motion_put-energy-motor-not = { $drive }：{ $parameter } { $key } 可向电机输入能量，因此不作为参数写入
+motion_speed = 速度超出限值
+motion_torque = 转矩超出限值
+motion_unfit = 设定值不适合其对象：轴已制动
+motion_beyond-limit = { $quantity ->
+    [position] 位置
+    [speed] 速度
+    [torque] 转矩
+   *[following-error] 跟随误差
+ } { $value } 超出限值 { $limit }：轴已制动并断使能
+motion_beyond-limit-in = { $quantity ->
+    [position] 位置
+    [speed] 速度
+    [torque] 转矩
+   *[following-error] 跟随误差
+ } { $value } { $unit } 超出限值 { $limit } { $unit }：轴已制动并断使能

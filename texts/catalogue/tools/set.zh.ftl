@@ -1,0 +1,11 @@
+set_belongs-motor-file-saved = { $drive }：{ $parameter } { $key } 属于保存文件时的电机；未写入任何内容
+    .remedy = 请取消勾选此行，或明确确认电机相同
+set_file-another-drive-nothing = { $drive }：文件属于另一台驱动器：{ $other }；未写入任何内容
+    .remedy = 请比较数值，然后明确接受另一台驱动器
+set_file-drive-nothing-written = 文件属于 { $value } 驱动器，而 { $drive } 为 { $limit }；未写入任何内容
+    .remedy = 请选择同一驱动器系列的文件
+set_file-no-usable-value = { $drive }：文件中没有 { $parameter } 的可用值；未写入任何内容
+    .remedy = 请取消勾选此行
+set_no-parameter-read-nothing = { $drive }：无法读取任何参数，因此未保存
+    .remedy = 请检查连接
+set_written-in-part = { $cause }；在 { $key } 之前已写入 { $rows } 行中的 { $written } 行；原有内容在参数集“{ $backup }”中
