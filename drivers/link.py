@@ -20,6 +20,7 @@ from drivers.errors import DriveError
 from drivers.halt import LoopState
 from drivers.motion.feedback import FeedbackScale
 from profiles.schema import DataType, LinkKind, Profile
+from texts.message import Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +82,8 @@ class LinkEvent:
     code: int | None = None
 
 
-Progress = Callable[[float, str], None]
-"""Called with a fraction 0…1 and a sentence. Must not block."""
+Progress = Callable[[float, Text], None]
+"""Called with a fraction 0…1 and what is being done. Must not block."""
 
 Unsubscribe = Callable[[], None]
 

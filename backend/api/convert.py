@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from backend.api import models
 from backend.api.drive import models_axis, models_parameters
 from backend.api.drive.convert_stop import turning
-from backend.api.errors import problem_of
+from backend.api.errors import message_of, problem_of
 from backend.api.sets import models as models_sets
 from backend.api.station import models as models_bench
 from backend.drive.drive import Drive
@@ -279,10 +279,12 @@ def job(known: Job) -> models.JobInfo:
         id=known.id,
         kind=known.kind,
         drive=known.drive,
-        title=known.title,
+        title=known.title.words(),
+        title_message=message_of(known.title),
         state=known.state,
         progress=known.progress.fraction,
-        step=known.progress.step,
+        step=known.progress.step.words(),
+        step_message=message_of(known.progress.step),
         started=moment(known.started),
         ended=moment(known.ended) if known.ended else None,
         motion=known.motion,

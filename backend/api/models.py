@@ -62,10 +62,12 @@ class JobInfo(Message):
     id: str
     kind: str
     drive: str | None
-    title: str
+    title: str = Field(description="in English")
+    title_message: MessageInfo
     state: Literal["running", "done", "failed", "cancelled"]
     progress: float = Field(ge=0, le=1)
-    step: str
+    step: str = Field(description="in English")
+    step_message: MessageInfo
     started: datetime
     ended: datetime | None
     motion: bool

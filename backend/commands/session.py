@@ -23,6 +23,7 @@ from drivers.errors import DriveError, NotAllowed
 from drivers.link import Found, Link, NeedsProfile
 from drivers.urls import link_for
 from profiles.loader import ProfileError
+from texts.message import Text, language
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -102,11 +103,12 @@ def told(command: Callable[P, T]) -> Callable[P, T]:
     return body
 
 
-def show_progress(fraction: float, step: str) -> None:
+def show_progress(fraction: float, step: Text | str) -> None:
     """A line that overwrites itself, on a terminal only."""
     if sys.stderr.isatty():
         end = "\n" if fraction >= 1 else ""
-        print(f"\r{fraction:5.0%}  {step:60.60}", end=end, file=sys.stderr, flush=True)
+        shown = step if isinstance(step, str) else step.words(language())
+        print(f"\r{fraction:5.0%}  {shown:60.60}", end=end, file=sys.stderr, flush=True)
 
 
 def progress() -> Progress:

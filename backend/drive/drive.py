@@ -35,6 +35,7 @@ from drivers.errors import (
 )
 from drivers.link import Found, LinkQuality
 from profiles.schema import Parameter, Profile, Raw
+from texts.message import Text, text
 
 #: States in which the motor has power (CiA 402-2 table 28).
 _POWERED = frozenset({
@@ -239,7 +240,7 @@ class Drive:
     async def read_many(
         self,
         keys: Iterable[str],
-        progress: Callable[[float, str], None] | None = None,
+        progress: Callable[[float, Text], None] | None = None,
     ) -> dict[str, Reading]:
         """Read several parameters; one that fails comes back with ``error`` set.
 
@@ -270,7 +271,12 @@ class Drive:
                 done += len(readings)
                 if progress:
                     share = min(1.0, done / len(parameters))
-                    progress(share, f"{len(result)} of {len(parameters)} parameters")
+                    progress(
+                        share,
+                        text(
+                            "drive.parameters", result_count=len(result), parameters=len(parameters)
+                        ),
+                    )
         return result
 
     def _taken(

@@ -24,7 +24,7 @@ from backend.work.jobs import Job, JobResult, JobRunner, Progress
 from drivers.cia402 import State
 from drivers.errors import NotAllowed, OutOfRange, Rejected
 from profiles.functions import Forcing, TerminalBits
-from texts.message import text
+from texts.message import Text, text
 
 #: A session ends when its page has not renewed it for this long.
 SILENT_S = 5.0
@@ -244,7 +244,7 @@ class ForcingSessions:
         self._sessions[drive.id, name] = session
         session.job = self._jobs.start(
             "forcing",
-            f"{spec.title}: {drive.name}",
+            text("work.of-drive", title=spec.title, drive=drive.name),
             lambda progress: self._run(session, ready, progress),
             drive=drive.id,
         )
@@ -337,10 +337,12 @@ def _end_for(session: ForcingSession, why: str) -> None:
     session.reason = session.reason or why
 
 
-def _words(session: ForcingSession) -> str:
+def _words(session: ForcingSession) -> Text:
     if not session.values:
-        return "nothing is overruled yet"
-    return ", ".join(f"{n} {'on' if v else 'off'}" for n, v in sorted(session.values.items()))
+        return text("functions.nothing-overruled-yet")
+    on = [name for name, value in sorted(session.values.items()) if value]
+    off = [name for name, value in sorted(session.values.items()) if not value]
+    return text("functions.overruled", on=", ".join(on) or "–", off=", ".join(off) or "–")
 
 
 def needs_settings(drive: Drive, keys: tuple[str, ...]) -> bool:

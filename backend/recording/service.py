@@ -20,6 +20,7 @@ from backend.store.files import StorageFailed
 from backend.work.jobs import Job, JobResult, Progress
 from backend.work.journal import Entry
 from drivers.errors import Busy, NotAllowed
+from texts.message import text
 
 #: Running at once; each has a file and a thread.
 MAX_RUNNING = 8
@@ -121,10 +122,10 @@ class Recordings:
         while len(self.ended) > 20:
             del self.ended[next(iter(self.ended))]
         written = recorder.written()
-        text = f"recording {recorder.name} ended: {recorder.reason}, {written.samples} samples"
+        ended = f"recording {recorder.name} ended: {recorder.reason}, {written.samples} samples"
         if recorder.lost:
-            text += f"; {recorder.lost} samples were lost before they came to it"
-        self.bench.journal.add(text, level="warning" if recorder.lost else "info")
+            ended += f"; {recorder.lost} samples were lost before they came to it"
+        self.bench.journal.add(ended, level="warning" if recorder.lost else "info")
 
     async def _prune(self) -> None:
         gone = await asyncio.to_thread(self.library.prune, list(self.running))
@@ -148,10 +149,10 @@ class Recordings:
         if not self.running:
             self._changed.forget()
             return
-        for key, text in self._changed.among(drive, readings):
+        for key, change in self._changed.among(drive, readings):
             for recorder in list(self.running.values()):
                 if recorder.concerns(drive) and not recorder.records(drive, key):
-                    recorder.event("parameter", text, drive=drive)
+                    recorder.event("parameter", change, drive=drive)
 
     # --- stored ones ------------------------------------------------------------------
 
@@ -194,11 +195,13 @@ class Recordings:
             return old
 
         async def work(progress: Progress) -> JobResult:
-            progress(0.0, f"Writing {target.name}")
+            progress(0.0, text("recording.writing", target=target.name))
             await run_export(source, target, kind, progress)
             return {"file": target.name, "bytes": target.stat().st_size}
 
-        job = self.bench.jobs.start("export", f"Export {source.name} as {kind.upper()}", work)
+        job = self.bench.jobs.start(
+            "export", text("recording.export", source=source.name, kind=kind.upper()), work
+        )
         self._exporting[place] = job
         return job
 
@@ -228,13 +231,15 @@ async def run_export(source: Path, target: Path, kind: str, progress: Progress) 
         async for line in process.stdout:
             fraction = float(line)
             left = (time.monotonic() - began) * (1 - fraction) / max(fraction, 0.01)
-            progress(fraction, f"Writing {target.name}, about {left:.0f} s left")
+            progress(
+                fraction, text("recording.writing-about-left", target=target.name, left_s=left)
+            )
         status = await process.wait()
     finally:
         if process.returncode is None:
             process.kill()
             await process.wait()
-        text = (await words).decode(errors="replace").strip()
+        said = (await words).decode(errors="replace").strip()
     if status != 0:
-        last = text.splitlines()[-1] if text else f"exit code {status}"
+        last = said.splitlines()[-1] if said else f"exit code {status}"
         raise StorageFailed("recording.not-written", value=target.name, last=last)

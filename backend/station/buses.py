@@ -13,6 +13,7 @@ from drivers.errors import Busy, NotAllowed
 from drivers.link import Found, Link, LinkEvent
 from drivers.modbus.link import RegisterLink
 from drivers.urls import link_for
+from texts.message import Text
 
 if TYPE_CHECKING:
     from backend.station.bench import Bench
@@ -78,7 +79,7 @@ class Buses:
         self,
         url: str,
         stations: Sequence[int] | None,
-        progress: Callable[[float, str], None],
+        progress: Callable[[float, Text], None],
         *,
         stop_after_first: bool = False,
     ) -> list[Found]:

@@ -8,10 +8,11 @@ from backend.station.bench import Bench
 from drivers.errors import Busy, NotAllowed
 from drivers.modbus.search import LineFound, search_line_settings
 from drivers.urls import parse_url
+from texts.message import Text
 
 
 async def search_line(
-    bench: Bench, url: str, stations: Sequence[int], progress: Callable[[float, str], None]
+    bench: Bench, url: str, stations: Sequence[int], progress: Callable[[float, Text], None]
 ) -> LineFound | None:
     """See `drivers.modbus.search.search_line_settings`; the bus is closed first.
 

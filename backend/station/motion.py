@@ -109,7 +109,7 @@ class Motion:
             if job.task is not None:
                 job.task.cancel()
 
-        return self._bench.authority.granted(drive.id, drive.name, job.title, ended=ended)
+        return self._bench.authority.granted(drive.id, drive.name, job.title.words(), ended=ended)
 
     def unattended(self, drive_id: str, why: str) -> None:
         """Nobody may leave this axis enabled any longer: it loses its power."""

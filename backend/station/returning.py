@@ -17,6 +17,7 @@ from backend.work.jobs import Job, JobResult, Progress
 from drivers.cia402 import State
 from drivers.errors import Busy, NotAllowed
 from drivers.link import Found
+from texts.message import text
 
 if TYPE_CHECKING:
     from backend.station.bench import Bench
@@ -77,7 +78,9 @@ class Returning:
             await drive.read_many(keys, progress)
             return {"parameters": len(keys)}
 
-        self._bench.jobs.start("reread", f"Read {drive.name} anew", reread, drive=drive_id)
+        self._bench.jobs.start(
+            "reread", text("station.read-anew", drive_name=drive.name), reread, drive=drive_id
+        )
 
     async def _is_the_same(self, member: Member) -> bool:
         """Notice another drive at this place before anything is written to it."""
@@ -142,9 +145,14 @@ class Returning:
             return found
 
         return bench.jobs.start(
-            "put-back", f"Put back what a motion left in {drive.name}", work, drive=drive.id,
-            motion=True, stoppable=False, by_person=asked,
-        )  # fmt: skip
+            "put-back",
+            text("station.put-back-motion-left", drive_name=drive.name),
+            work,
+            drive=drive.id,
+            motion=True,
+            stoppable=False,
+            by_person=asked,
+        )
 
 
 def _serial(drive: Drive) -> int | None:

@@ -136,11 +136,11 @@ async def load_set(
         if row is None or row.raw is None:
             raise NotAllowed("set.file-no-usable-value", drive=drive.name, parameter=key)
         chosen.append((key, drive.check(drive.parameter(key), row.raw)))
-    progress(0.0, "storing the present values")
+    progress(0.0, text("set.storing-present-values"))
     backup = await _back_up(drive, library, [key for key, _ in chosen])
     report: list[Written] = []
     for number, (key, raw) in enumerate(chosen):
-        progress(number / max(1, len(chosen)), f"writing {key}")
+        progress(number / max(1, len(chosen)), text("set.writing", key=key))
         try:
             report.append(await _write_verified(drive, key, raw))
         except LinkLost as error:

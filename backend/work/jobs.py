@@ -13,6 +13,7 @@ from typing import Literal
 
 from backend.people.identity import Actor, acting, acting_person
 from drivers.errors import Busy, DriveError
+from texts.message import Text, prose
 
 JobState = Literal["running", "done", "failed", "cancelled"]
 JobResult = dict[str, object]
@@ -23,11 +24,11 @@ class Progress:
 
     def __init__(self, changed: Callable[[], None]) -> None:
         self.fraction = 0.0
-        self.step = ""
+        self.step: Text = prose("")
         self._changed = changed
 
-    def __call__(self, fraction: float, step: str) -> None:
-        """``fraction`` 0…1 done, ``step`` a sentence of what is being done."""
+    def __call__(self, fraction: float, step: Text) -> None:
+        """``fraction`` 0…1 done, ``step`` what is being done."""
         self.fraction = min(1.0, max(0.0, fraction))
         self.step = step
         self._changed()
@@ -44,7 +45,7 @@ class Job:
 
     id: str
     kind: str
-    title: str
+    title: Text
     drive: str | None
     motion: bool
     progress: Progress
@@ -123,7 +124,7 @@ class JobRunner:
     def start(
         self,
         kind: str,
-        title: str,
+        title: Text,
         work: Work,
         *,
         drive: str | None = None,

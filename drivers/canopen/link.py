@@ -39,6 +39,7 @@ from drivers.link import (
     Unsubscribe,
 )
 from profiles.schema import LinkKind, Profile
+from texts.message import text
 
 T = TypeVar("T")
 
@@ -127,10 +128,13 @@ class CanopenLink:
         found: list[Found] = []
         for start in range(0, len(numbers), 16):
             group = numbers[start : start + 16]
-            progress(0.8 * start / len(numbers), f"asking nodes {group[0]} to {group[-1]}")
+            progress(
+                0.8 * start / len(numbers),
+                text("canopen.asking-nodes", group=group[0], other_group=group[-1]),
+            )
             answers = await self._in_worker(partial(probe, [self._channel(n) for n in group]))
             for node, got in answers.items():
-                progress(0.8 * start / len(numbers), f"node {node} answered")
+                progress(0.8 * start / len(numbers), text("canopen.node-answered", node=node))
                 found.append(await self._identify(node, got))
         heard = {f.station for f in found}
         with self._watch_lock:
@@ -144,7 +148,7 @@ class CanopenLink:
             for record in silent
             if record.node in numbers and record.node not in heard
         ]
-        progress(1.0, f"{len(found)} nodes found")
+        progress(1.0, text("canopen.nodes-found", found_count=len(found)))
         return sorted(found, key=lambda f: f.station)
 
     async def _identify(self, node: int, answers: list[bytes]) -> Found:

@@ -45,6 +45,7 @@ from drivers.modbus.registers import (
 )
 from drivers.modbus.thread import BusThread
 from profiles.schema import LinkKind, Profile
+from texts.message import Text, text
 
 T = TypeVar("T")
 
@@ -162,7 +163,7 @@ class RegisterLink:
         while wanted and (stop_after is None or len(found) < stop_after):
             station = wanted.popleft()
             share = max(share, number / (number + 1 + len(wanted)))
-            progress(share, f"asking address {station}")
+            progress(share, text("modbus.asking-address", station=station))
             number += 1
             # Behind the last one nobody is kept waiting: late answers come in this time.
             brief = wanted and station not in again
@@ -383,15 +384,11 @@ def _singles(places: tuple[Place | None, ...], block: Block) -> list[Block]:
     return found
 
 
-def _summary(found: Sequence[Found], damaged: Sequence[int]) -> str:
-    text = f"{len(found)} found"
+def _summary(found: Sequence[Found], damaged: Sequence[int]) -> Text:
     if not damaged:
-        return text
+        return text("modbus.found", count=len(found))
     places = ", ".join(map(str, damaged))
-    return (
-        f"{text}; damaged answers at {places}: two drives with the same address, "
-        "or wrong line settings"
-    )
+    return text("modbus.found-and-damaged", count=len(found), places=places)
 
 
 def _again(error: DriveError) -> DriveError:

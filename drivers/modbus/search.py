@@ -9,6 +9,7 @@ from drivers.errors import OutOfRange
 from drivers.link import Found, Progress
 from drivers.modbus.port import Parity, is_pseudo_terminal
 from drivers.urls import BusUrl, link_for, parse_url
+from texts.message import Text, text
 
 #: In the order in which they are likely: makers' defaults first.
 USUAL_BAUDRATES: dict[str, tuple[int, ...]] = {
@@ -53,7 +54,9 @@ async def search_line_settings(
         kinds = kinds[:1]  # no bits, no parity: the others would be the same again
     settings = [(rate, parity) for rate in rates for parity in kinds]
     for number, (rate, parity) in enumerate(settings):
-        progress(number / len(settings), f"trying {rate} baud, parity {parity}")
+        progress(
+            number / len(settings), text("modbus.trying-baud-parity", rate=rate, parity=parity)
+        )
         candidate = bus.with_options(baudrate=rate, parity=parity)
         link = link_for(candidate)
         try:
@@ -64,11 +67,11 @@ async def search_line_settings(
         finally:
             await link.close()
         if found:
-            progress(1.0, f"answers at {rate} baud, parity {parity}")
+            progress(1.0, text("modbus.answers-baud-parity", rate=rate, parity=parity))
             return LineFound(str(candidate), tuple(found))
-    progress(1.0, "nothing answered at any of these settings")
+    progress(1.0, text("modbus.nothing-answered-settings"))
     return None
 
 
-def _quiet(_fraction: float, _text: str) -> None:
+def _quiet(_fraction: float, _text: Text) -> None:
     """A scan of few stations inside a search needs no progress of its own."""

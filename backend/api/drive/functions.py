@@ -39,6 +39,7 @@ from backend.station.connected_drive import Member
 from backend.tools.moves import identification
 from drivers.errors import DriveError
 from profiles.functions import FaultHistory, Functions
+from texts.message import text
 
 router = APIRouter()
 _DRIVE = "/drives/{drive_id}"
@@ -140,7 +141,7 @@ async def start_identification(
     settings = identification.IdentifySettings(envelope, request.confirmed)
     job = bench.jobs.start(
         "identify",
-        f"Identification by the drive: {member.drive.name}",
+        text("api-drive.identification-drive", member_drive=member.drive.name),
         lambda progress: identification.identify(member.axis, settings, progress),
         drive=member.drive.id,
         motion=True,

@@ -48,6 +48,7 @@ from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from profiles.schema import Parameter, Raw
+from texts.message import text
 
 router = APIRouter(prefix="/drives/{drive_id}")
 
@@ -90,7 +91,13 @@ async def _alone(
         return None
 
     drive = member.drive
-    job = bench.jobs.start("power", f"{title}: {drive.name}", run, drive=drive.id, motion=True)
+    job = bench.jobs.start(
+        "power",
+        text("work.of-drive", title=title, drive=drive.name),
+        run,
+        drive=drive.id,
+        motion=True,
+    )
     await job.wait()
     if job.state == "cancelled":
         raise NotAllowed("api-drive.stop-pressed-during", drive=drive.name, title=title)
@@ -285,7 +292,7 @@ async def run_procedure(
     bench.motion.require_idle(member)
     job = bench.jobs.start(
         "procedure",
-        f"{known.title}: {member.drive.name}",
+        text("work.of-drive", title=known.title, drive=member.drive.name),
         lambda progress: procedures.run_procedure(member.axis, known, request.confirmed, progress),
         drive=member.drive.id,
         motion=True,
@@ -301,7 +308,7 @@ async def read_all(bench: TheBench, member: TheMember, request: ReadAllRequest) 
         _require_known(member, key)
     job = bench.jobs.start(
         "read_all",
-        f"Read {member.drive.name}",
+        text("api-drive.read", member_drive=member.drive.name),
         lambda progress: parameters.read_all(member.drive, request.keys, progress),
         drive=member.drive.id,
     )
@@ -314,7 +321,7 @@ async def load_set(bench: TheBench, member: Controlled, request: LoadSetRequest)
     content = await bench.records.store.call(bench.sets.load, request.file, request.version)
     job = bench.jobs.start(
         "load_set",
-        f"Load {request.file} into {member.drive.name}",
+        text("api-drive.load", file=request.file, member_drive=member.drive.name),
         lambda progress: parameters.load_set(
             member.drive,
             content,
@@ -341,7 +348,7 @@ async def start_move(bench: TheBench, member: Controlled, request: MoveRequest) 
     settings = convert_motion.move_settings(request, unit)
     job = bench.jobs.start(
         "move",
-        f"Move {member.drive.name} ({request.mode})",
+        text("api-drive.move", member_drive=member.drive.name, mode=request.mode),
         lambda progress: move.move(member.axis, settings, progress),
         drive=member.drive.id,
         motion=True,
@@ -356,7 +363,7 @@ async def start_sequence(bench: TheBench, member: Controlled, request: SequenceR
     settings = convert_motion.sequence_settings(request, unit)
     job = bench.jobs.start(
         "sequence",
-        f"Back and forth: {member.drive.name}",
+        text("api-drive.back-forth", member_drive=member.drive.name),
         lambda progress: move.sequence(member.axis, settings, progress),
         drive=member.drive.id,
         motion=True,
@@ -374,7 +381,12 @@ async def start_generator(bench: TheBench, member: Controlled, request: Generate
     settings = convert_motion.generator_settings(request, unit)
     job = bench.jobs.start(
         "generate",
-        f"{request.shape} in {request.mode}: {member.drive.name}",
+        text(
+            "api-drive.detail",
+            shape=request.shape,
+            mode=request.mode,
+            member_drive=member.drive.name,
+        ),
         lambda progress: cyclic_motion.generate(member.axis, session, settings, progress),
         drive=member.drive.id,
         motion=True,
@@ -405,7 +417,7 @@ async def start_homing(bench: TheBench, member: Controlled, request: HomeRequest
         )
     job = bench.jobs.start(
         "home",
-        f"Home {member.drive.name} (method {request.method})",
+        text("api-drive.home-method", member_drive=member.drive.name, method=request.method),
         lambda progress: homing.home(member.axis, settings, progress),
         drive=member.drive.id,
         motion=True,

@@ -27,6 +27,7 @@ from backend.station.measuring import EXCHANGE_ENDS_S, exchange_for
 from backend.tools.moves.small_move import SmallMoveSettings, longest_allowed, small_move
 from backend.work.jobs import JobResult, Progress
 from drivers.errors import DriveError
+from texts.message import text
 
 router = APIRouter(prefix="/drives/{drive_id}")
 _UNITS = {"position": "rev", "velocity": "rpm", "acceleration": "rpm/s"}
@@ -78,15 +79,18 @@ async def start_small_move(
 
     try:
         job = bench.jobs.start(
-            "small_move", f"Small move by {request.increments} increments: {member.drive.name}",
-            work, drive=member.drive.id, motion=True,
-        )  # fmt: skip
+            "small_move",
+            text("api-drive.small-move", increments=request.increments, drive=member.drive.name),
+            work,
+            drive=member.drive.id,
+            motion=True,
+        )
     except DriveError:
         await exchange.end()
         raise
     exchange.ends_with(job)
-    text = f"{member.drive.name}: small move by {request.increments} increments"
-    bench.journal.add(text, drive=member.drive.id)
+    said = f"{member.drive.name}: small move by {request.increments} increments"
+    bench.journal.add(said, drive=member.drive.id)
     return convert.job(job)
 
 

@@ -16,6 +16,7 @@ from backend.tools.jog.hold import Hold
 from backend.tools.jog.run import jog
 from backend.work.jobs import JobResult, Progress
 from drivers.errors import DriveError
+from texts.message import text
 
 
 class Jogs:
@@ -57,7 +58,7 @@ class Jogs:
         try:
             job = bench.jobs.start(
                 "jog",
-                f"Jog {member.drive.name}",
+                text("api-live.jog", member_drive=member.drive.name),
                 lambda progress: _jog_work(bench, member, request, hold, progress),
                 drive=request.drive,
                 motion=True,

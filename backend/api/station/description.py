@@ -36,6 +36,7 @@ from profiles.language.overlay import Language, load_overlay
 from profiles.language.texts import translations
 from profiles.loader import ProfileError, user_folder
 from profiles.schema import LinkKind
+from texts.message import text
 
 router = APIRouter()
 
@@ -97,12 +98,12 @@ async def import_description(
     task = FileTask(data, file, user_folder(), profile, product_code, revision)
 
     async def work(progress: Progress) -> JobResult:
-        progress(0.0, f"reading {file}")
+        progress(0.0, text("api-station.reading", file=file))
         made = ImportedDescription.model_validate(await import_in_process(task))
         bench.journal.add(f"imported {file} as {made.profile}: {made.summary}")
         return made.model_dump(mode="json")
 
-    return convert.job(bench.jobs.start("import", f"Import {file}", work))
+    return convert.job(bench.jobs.start("import", text("api-station.import", file=file), work))
 
 
 @router.post("/descriptions/from-drive", status_code=202)
@@ -112,7 +113,7 @@ async def read_dictionary(bench: TheBench, request: ReadDictionaryRequest) -> Jo
     place = f"station {request.station} of {request.url}"
 
     async def work(progress: Progress) -> JobResult:
-        progress(0.0, f"looking for {place}")
+        progress(0.0, text("api-station.looking", place=place))
         seen = await bench.buses.scan(request.url, [request.station], lambda _fraction, _step: None)
         found = next((f for f in seen if f.station == request.station), None)
         if found is None:
@@ -124,12 +125,14 @@ async def read_dictionary(bench: TheBench, request: ReadDictionaryRequest) -> Jo
             raise BadDescription(
                 f"{place}: {error}", remedy="import the maker's file, or use the generic profile"
             ) from error
-        progress(0.95, "making the profile")
+        progress(0.95, text("api-station.making-profile"))
         made = ImportedDescription.model_validate(await import_in_process(task))
         bench.journal.add(f"read {place} as {made.profile}: {made.summary}")
         return made.model_dump(mode="json")
 
-    return convert.job(bench.jobs.start("import", f"Read the dictionary of {place}", work))
+    return convert.job(
+        bench.jobs.start("import", text("api-station.read-dictionary", place=place), work)
+    )
 
 
 @router.get("/profiles/matches")
@@ -187,7 +190,9 @@ async def search_line_settings(bench: TheBench, request: LineSearchRequest) -> J
         drives = [convert.found_drive(bench, found.url, kind, each) for each in found.drives]
         return LineSearchResult(url=found.url, found=drives).model_dump(mode="json")
 
-    return convert.job(bench.jobs.start("search-line", f"Line settings of {request.url}", work))
+    return convert.job(
+        bench.jobs.start("search-line", text("api-station.line-settings", url=request.url), work)
+    )
 
 
 @router.get("/drives/{drive_id}/missing-ports")

@@ -33,7 +33,7 @@ from drivers.ethercat.link import EthercatLink
 from drivers.ethercat.process import firmware, permissions
 from drivers.ethercat.process.survey import ExchangeFigures, Survey, SurveyedStation
 from drivers.ethercat.wire.al_status import AlState
-from texts.message import language
+from texts.message import Text, language, text
 
 router = APIRouter()
 
@@ -163,18 +163,18 @@ async def load_firmware(
     await _require_loadable(member, link, station)
 
     async def work(progress: Progress) -> JobResult:
-        def load(tell: Callable[[float, str], None]) -> Coroutine[None, None, str]:
+        def load(tell: Callable[[float, Text], None]) -> Coroutine[None, None, str]:
             return link.load_firmware(station, file, data, tell, password=password, where=state)
 
         where = await _to_the_end(load, progress)
         bench.journal.add(f"{member.drive.name}: {file} loaded", drive=member.drive.id)
         return {"bytes": len(data), "file": file, "state": where}
 
-    title = f"Load firmware {file} into {member.drive.name}"
+    title = text("api-station.load-firmware", file=file, drive=member.drive.name)
     job = bench.jobs.start(
         "firmware", title, work, drive=member.drive.id, motion=True, stoppable=False
     )
-    bench.journal.add(title, level="warning", drive=member.drive.id)
+    bench.journal.add(title.words(), level="warning", drive=member.drive.id)
     return convert.job(job)
 
 
@@ -201,13 +201,13 @@ async def _require_loadable(member: Member, link: EthercatLink, station: int) ->
 
 
 async def _to_the_end(
-    load: Callable[[Callable[[float, str], None]], Coroutine[None, None, str]], progress: Progress
+    load: Callable[[Callable[[float, Text], None]], Coroutine[None, None, str]], progress: Progress
 ) -> str:
     """Load, and do not let a cancellation leave the drive with half a file."""
-    words = ""
+    kept = False
 
-    def tell(share: float, text: str) -> None:
-        progress(share, words + text)
+    def tell(share: float, step: Text) -> None:
+        progress(share, text("api-station.not-cancelled", step=step) if kept else step)
 
     loading = asyncio.ensure_future(load(tell))
     while not loading.done():
@@ -216,8 +216,9 @@ async def _to_the_end(
         except asyncio.CancelledError:
             if loading.cancelled():
                 raise
-            words = "not cancelled, the drive would be left without firmware: "
-            progress(progress.fraction, words + "wait for the end")
+            kept = True
+            waiting = text("api-station.not-cancelled", step=text("api-station.wait-for-end"))
+            progress(progress.fraction, waiting)
     return loading.result()
 
 

@@ -37,6 +37,7 @@ from backend.work.jobs import Job, JobResult, Progress
 from drivers.link import Found
 from profiles import load_all
 from profiles.loader import broken_profiles, is_own
+from texts.message import text
 
 router = APIRouter()
 
@@ -136,7 +137,7 @@ async def scan(bench: TheBench, request: ScanRequest, connection: Connection = N
         drives = [convert.found_drive(bench, request.url, kind, found) for found in seen]
         return {"found": [drive.model_dump(mode="json") for drive in drives]}
 
-    return convert.job(bench.jobs.start("scan", f"Scan {request.url}", work))
+    return convert.job(bench.jobs.start("scan", text("api-station.scan", url=request.url), work))
 
 
 @router.get("/drives")

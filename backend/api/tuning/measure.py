@@ -45,6 +45,7 @@ from backend.tools.sweep import run as sweep
 from backend.tools.sweep.preview import preview
 from backend.work.jobs import JobResult, Progress
 from drivers.errors import DriveError
+from texts.message import text
 
 router = APIRouter()
 for part in (routes_design, routes_measurements, routes_report, routes_response_import):
@@ -82,14 +83,18 @@ async def _start(
     try:
         profile_speed.require_consent(session, member.drive, request.consent)
         job = bench.jobs.start(
-            kind, f"{title}: {member.drive.name}", work, drive=member.drive.id, motion=True
+            kind,
+            text("work.of-drive", title=text(title), drive=member.drive.name),
+            work,
+            drive=member.drive.id,
+            motion=True,
         )
     except DriveError:
         # Another motion may have begun while the exchange was started.
         await exchange.end()
         raise
     exchange.ends_with(job)
-    bench.journal.add(f"{member.drive.name}: {title}", drive=member.drive.id)
+    bench.journal.add(f"{member.drive.name}: {text(title)}", drive=member.drive.id)
     return convert.job(job)
 
 
@@ -152,7 +157,7 @@ async def start_sweep(bench: TheBench, member: Controlled, request: SweepRequest
             await sweep.sweep(member.axis, session, settings, progress, keep)
         )
 
-    return await _start(bench, member, request, "sweep", "Frequency response", tool)
+    return await _start(bench, member, request, "sweep", "api-tuning.frequency-response", tool)
 
 
 @router.post("/drives/{drive_id}/jobs/inertia", status_code=202)
@@ -169,7 +174,7 @@ async def start_inertia(bench: TheBench, member: Controlled, request: InertiaReq
             await inertia.inertia(member.axis, session, settings, progress, keep)
         )
 
-    return await _start(bench, member, request, "inertia", "Inertia and friction", tool)
+    return await _start(bench, member, request, "inertia", "api-tuning.inertia-and-friction", tool)
 
 
 @router.post("/drives/{drive_id}/jobs/step", status_code=202)
@@ -185,7 +190,7 @@ async def start_step(bench: TheBench, member: Controlled, request: StepRequest) 
             await step_response.step_response(member.axis, session, settings, progress, keep)
         )
 
-    return await _start(bench, member, request, "step", "Step response", tool)
+    return await _start(bench, member, request, "step", "api-tuning.step-response", tool)
 
 
 @router.post("/drives/{drive_id}/jobs/autotune", status_code=202)
@@ -211,4 +216,4 @@ async def start_autotune(bench: TheBench, member: Controlled, request: AutotuneR
             )
         return autotune.as_json(found) | {"after": after}
 
-    return await _start(bench, member, request, "autotune", "Tune", tool)
+    return await _start(bench, member, request, "autotune", "api-tuning.tune", tool)

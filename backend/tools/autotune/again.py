@@ -29,6 +29,7 @@ from backend.tools.autotune.present import Trials, judged
 from backend.tools.autotune.verdict import fixed_of
 from backend.tools.autotune.verify import LOOKS, MOST_PAIRS, Verified, sharp_margins
 from backend.tools.measuring.temporary import write_settings
+from texts.message import text
 
 #: A prediction stands within these: share of the -3 dB point, dB and degrees. The aims are 10 %,
 #: 3 dB and 6° (tuning.md, section 5).
@@ -190,7 +191,7 @@ async def again(
         # Where the second one fails, a more careful design must still be possible.
         if trials.time_left.verifications() < LOOKS:
             return first, replace(told, outcome="time")
-        trials.progress(0.6, "4 of 6: designing for the axis as its loop shows it")
+        trials.progress(0.6, text("autotune.designing-axis-loop-shows"))
         lines = loop_lines(first.verified.seen)
         controller = _controller(trials, candidate, lines.frequency_hz)
         try:

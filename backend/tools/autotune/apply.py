@@ -18,6 +18,7 @@ from backend.tools.measuring.interrupted import ends_all
 from backend.tools.measuring.temporary import put_back_in_time, write_settings
 from backend.work.jobs import Progress
 from drivers.errors import DriveError
+from texts.message import Text, joined, text
 
 #: A candidate with this share of its gain; None where that keeps no margins.
 Softer = Callable[[Candidate, float], Awaitable[Candidate | None]]
@@ -63,7 +64,7 @@ async def first_kept(
             if not waiting:
                 break
         candidate = waiting.pop(0)
-        progress(0.65, "5 of 6: applying")
+        progress(0.65, text("autotune.applying"))
         raw = await plan(axis, candidate, check.inertia_kgm2, check.motor_inertia_kgm2)
         earlier = {key: await axis.drive.raw(key) for key in raw}
         # Noted for the next server: killed here, this one would leave what nobody has verified.
@@ -107,9 +108,9 @@ def _in_turn(waiting: Sequence[Candidate], hummed: Candidate, less: Candidate) -
 def stages(progress: Progress) -> tuple[Progress, Progress, Progress]:
     """The three parts of a verification, as parts of the whole."""
     return (
-        part(progress, 0.7, 0.72, "6 of 6: verifying that it stands still"),
-        part(progress, 0.72, 0.92, "6 of 6: measuring the tuned loop"),
-        part(progress, 0.92, 0.99, "6 of 6: step"),
+        part(progress, 0.7, 0.72, text("autotune.verifying-standstill")),
+        part(progress, 0.72, 0.92, text("autotune.measuring-tuned-loop")),
+        part(progress, 0.92, 0.99, text("autotune.step")),
     )
 
 
@@ -128,12 +129,13 @@ async def nothing_stays(axis: Axis, before: dict[str, int]) -> AsyncIterator[Non
         raise
 
 
-def part(progress: Progress, low: float, high: float, step: str) -> Progress:
+def part(progress: Progress, low: float, high: float, step: Text) -> Progress:
     """A step's own progress, shown as a part of the whole."""
 
     def told() -> None:
-        words = f"{step}: {own.step}" if own.step else step
-        progress(low + (high - low) * own.fraction, words)
+        inner = own.step.words()
+        whole = joined((step, own.step), ": ") if inner else step
+        progress(low + (high - low) * own.fraction, whole)
 
     own = Progress(told)
     return own

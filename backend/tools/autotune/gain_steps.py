@@ -22,6 +22,7 @@ from backend.tools.measuring.temporary import temporary
 from backend.tools.step.run import LEAD_S, StepResult, StepSettings, step_response
 from backend.work.jobs import Progress
 from drivers.errors import DriveError
+from texts.message import text
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 #: Gains are raised in steps of this many dB, and the last one to what is asked for.
@@ -80,7 +81,7 @@ async def gain_steps(
         real_db = float(20.0 * np.log10(held / value))
         if done and real_db < done[-1].gain_db + 0.1:
             break
-        progress(len(done) / count, f"{real_db:.1f} dB more gain")
+        progress(len(done) / count, text("autotune.db-more-gain", real_db=real_db))
         async with temporary(axis, {key: raw}):
             try:
                 step = await step_response(axis, session, settings, Progress(lambda: None), keep)

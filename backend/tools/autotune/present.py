@@ -33,6 +33,7 @@ from backend.tools.notch.effect import unknown
 from backend.tools.notch.meaning import meaning_of
 from backend.work.jobs import Progress
 from drivers.errors import DriveError, NotAllowed
+from texts.message import text
 
 _TURN = 2.0 * np.pi
 #: Said where nothing was changed.
@@ -204,7 +205,7 @@ class Trials:
         """Verified like a design; nothing is written."""
         candidate = self.had.candidate
         assert candidate is not None
-        self.progress(0.65, "5 of 6: what it had is faster than the designs that are left")
+        self.progress(0.65, text("autotune.faster-designs-left"))
         try:
             with self.time_left.verifying():
                 verified = await verify(

@@ -46,6 +46,7 @@ from backend.tools.sweep import run as sweep_tool
 from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import EnvelopeExceeded, NotAllowed
+from texts.message import text
 
 #: A response with more of its samples at a torque limit is none.
 _SATURATED = 0.25
@@ -128,7 +129,7 @@ async def autotune(
         DriveError: as the single tools.
     """
     time_left = TimeLeft.of(settings.budget_s)
-    progress(0.0, "1 of 6: pre-checks")
+    progress(0.0, text("autotune.pre-checks"))
     facts = await _pre_checks(axis, settings)
     async with stopping_hard(axis, settings.envelope.speed_rpm):
         found = await _tuned(axis, session, settings, facts, progress, keep, time_left)
@@ -153,7 +154,7 @@ async def _tuned(
             axis, session, settings, facts, gains, progress, keep, time_left, home
         )
     facts = sweep_evaluation.completed(facts, found.mechanics)
-    progress(0.6, "4 of 6: notches and gains")
+    progress(0.6, text("autotune.notches-gains"))
     found = _with(found, await _design(axis, session, settings, facts, found))
     if not settings.apply:
         return found
@@ -181,7 +182,7 @@ async def _measured(
                 rated_torque_nm=settings.rated_torque_nm,
                 motor_inertia_kgm2=settings.motor_inertia_kgm2,
             ),
-            part(progress, 0.05, 0.3, "2 of 6: inertia and friction"), keep, moving,
+            part(progress, 0.05, 0.3, text("autotune.inertia-and-friction")), keep, moving,
         )  # fmt: skip
         if moving.left_out:
             time_left.give_up(_ONE_MOVE)
@@ -190,7 +191,7 @@ async def _measured(
         playing = time_left.measuring(learning_s(axis, how, facts, outcome))
         mechanics = await sweep_tool.sweep(
             axis, session, _sweep_settings(settings, outcome),
-            part(progress, 0.3, 0.5, "3 of 6: frequency response"), keep, playing,
+            part(progress, 0.3, 0.5, text("autotune.frequency-response")), keep, playing,
         )  # fmt: skip
         time_left.lossy = playing.lossy
         if playing.left_out:
@@ -199,7 +200,7 @@ async def _measured(
         plain = await learn_notches(
             axis, session, how,
             sweep_evaluation.completed(facts, mechanics), outcome, mechanics,
-            part(progress, 0.5, 0.6, "3 of 6: what the drive's notches do"), time_left,
+            part(progress, 0.5, 0.6, text("autotune.what-notches-do")), time_left,
         )  # fmt: skip
     return AutotuneResult(
         outcome, mechanics, "medium", (), None, None, None, {}, (), (plain,) if plain else (), False

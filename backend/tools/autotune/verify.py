@@ -41,6 +41,7 @@ from backend.tools.step import run as step_tool
 from backend.tools.sweep import evaluation as sweep_evaluation
 from backend.tools.sweep import run as sweep_tool
 from backend.work.jobs import Progress
+from texts.message import prose
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 
@@ -128,7 +129,7 @@ async def verify(
         NotAllowed: it does not stand still, or the envelope or a fault ended it.
     """
     standing, measuring, stepping = told
-    standing(0.0, "")
+    standing(0.0, prose(""))
     await holding_torque(axis, session, check.facts)
     if check.home_raw is not None:
         await quiet(axis)

@@ -38,6 +38,7 @@ from backend.tools.moves.go_back import go_back
 from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
+from texts.message import text
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 
@@ -75,7 +76,7 @@ async def inertia(
             limit=f"{ends[0]:g}…{ends[1]:g} rev",
             axis_drive=axis.drive.name,
         )
-    progress(0.0, "a first short move")
+    progress(0.0, text("inertia.first-short-move"))
     look = await first_look(axis, session, settings, facts, home, ends)
     if settings.scheme == "limited":
         ends = await find_ends(axis, session, settings, facts, look.rough, progress)
@@ -87,11 +88,11 @@ async def inertia(
 
     if begin != home:
         await back_to(begin)
-    told = share(progress, 0.35, 0.65, "moving forth and back")
+    told = share(progress, 0.35, 0.65, text("inertia.moving-forth-and-back"))
     recording = await identification_moves(
         axis, session, settings, facts, look, travel, Shape(), told
     )
-    progress(0.65, "going back and evaluating")
+    progress(0.65, text("inertia.going-back-evaluating"))
 
     def evaluated() -> tuple[InertiaResult, float | None]:
         found = evaluate(recording, settings, facts)
@@ -103,9 +104,7 @@ async def inertia(
         # A load that swings in another way than couplings let it is moved again so that it does
         # not.
         gentle = Shape.against(swing_hz)
-        told = share(
-            progress, 0.66, 0.9, f"once more, gently: the load swings at {swing_hz:.0f} Hz"
-        )
+        told = share(progress, 0.66, 0.9, text("inertia.once-more-gently", swing_hz=swing_hz))
         rough = look.rough
         heavier = max(result.inertia_kgm2.value, rough.inertia_kgm2)
         better = replace(look, rough=RoughFit(heavier, rough.coulomb_nm, rough.gravity_nm))

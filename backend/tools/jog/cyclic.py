@@ -192,7 +192,7 @@ async def jog_cyclic(
     units, drive = await axis.require_certain_scales(), axis.drive
     cycle_s = _cycle(session)
     require_scale(axis, units, settings)
-    progress(0.0, "enabling")
+    progress(0.0, text("jog.enabling"))
     enabled = axis.enabled_cyclic(session, Mode.CSP, _STATE_TIMEOUT_S)
     async with keeping_mode(axis, session), enabled:
         start = await axis.position_raw()
@@ -205,7 +205,7 @@ async def jog_cyclic(
         # Enabling takes longer than a button may be held: released meanwhile, nothing moves.
         if reason := await _alive(axis, session, hold):
             return {"reason": reason, "moved_rev": 0.0}
-        progress(0.0, "moving")
+        progress(0.0, text("jog.moving"))
         begin = start
         while True:
             left_rev = settings.travel_rev - abs(units.position(begin - start))
@@ -317,7 +317,7 @@ async def play_through(
             )
         await session.cyclic.renew(station)
         _raise_if_ended(axis, session)
-        progress(min(elapsed / duration_s, 1.0), "playing")
+        progress(min(elapsed / duration_s, 1.0), text("jog.playing"))
         left_s = duration_s - elapsed
         await asyncio.sleep(min(_RENEW_S, left_s) if left_s > 0 else _RENEW_S)
     _raise_if_ended(axis, session)

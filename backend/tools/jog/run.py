@@ -21,6 +21,7 @@ from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
+from texts.message import text
 
 #: Period of target renewals to the drive (20 Hz or faster).
 PERIOD_S = 0.04
@@ -64,7 +65,7 @@ async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress)
         ramps[key] = ramp_raw(units, drive, key, settings.acceleration_rpm_s)
     for key, raw in ramps.items():
         drive.check(drive.parameter(key), raw)
-    progress(0.0, "enabling")
+    progress(0.0, text("jog.enabling"))
     async with axis.restoring(*ramps):
         for key, raw in ramps.items():
             await drive.write(key, raw)
@@ -73,7 +74,7 @@ async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress)
         async with axis.enabled(Mode.PP, envelope):
             start = await axis.position_raw()
             # Enabling takes longer than the renewal time-out; the page has renewed meanwhile.
-            progress(0.0, "moving")
+            progress(0.0, text("jog.moving"))
             reason = await _follow(axis, settings, hold, start)
             stop_time = 1.0 + 2.0 * settings.speed_rpm / settings.acceleration_rpm_s
             await axis.halt_and_wait(stop_time)

@@ -33,6 +33,7 @@ from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed
 from drivers.motion.feedback import FeedbackScale
+from texts.message import Text
 
 _RENEW_S = 0.03
 _STATE_TIMEOUT_S = 5.0
@@ -402,7 +403,7 @@ def bridged(table: FloatArray, valid: BoolArray) -> FloatArray:
     return np.column_stack([np.interp(rows, good, column[good]) for column in table.T])
 
 
-def share(progress: Progress, low: float, high: float, step: str) -> Callable[[float], None]:
+def share(progress: Progress, low: float, high: float, step: Text) -> Callable[[float], None]:
     """A part of a job's progress bar."""
     return lambda fraction: progress(low + (high - low) * fraction, step)
 

@@ -18,6 +18,7 @@ from backend.tools.measuring.recording import cycle_s
 from backend.tools.measuring.temporary import temporary
 from backend.work.jobs import Progress
 from drivers.errors import NotAllowed, OutOfRange
+from texts.message import text
 
 _TURN = 2 * np.pi
 #: So long at rest is an end; the axis' own start is not judged.
@@ -51,7 +52,7 @@ async def find_ends(
     found = []
     async with temporary(axis, limits):
         for number, direction in enumerate((-1.0, 1.0)):
-            progress(0.1 + 0.15 * number, "looking for an end at limited torque")
+            progress(0.1 + 0.15 * number, text("moves.looking-end-limited-torque"))
             found.append(await _creep(axis, session, settings, facts, direction))
     return found[0], found[1]
 

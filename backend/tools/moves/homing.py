@@ -14,6 +14,7 @@ from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
+from texts.message import text
 
 _POLL_S = 0.02
 _START_HOMING = 0x10
@@ -63,7 +64,7 @@ async def home(axis: Axis, settings: HomingSettings, progress: Progress) -> JobR
         writes[drive.require("home_offset")] = units.position_raw(settings.offset_rev)
     for key, raw in writes.items():
         drive.check(drive.parameter(key), raw)
-    progress(0.0, "preparing")
+    progress(0.0, text("moves.preparing"))
     for key, raw in writes.items():
         await drive.write(key, raw)
     async with axis.enabled(Mode.HM, settings.envelope):
@@ -128,5 +129,5 @@ async def _attained(axis: Axis, settings: HomingSettings, progress: Progress) ->
             raise LinkTimeout(
                 "moves.not-find-home-within", drive=drive.name, time_s=settings.envelope.time_s
             )
-        progress(min(0.95, elapsed / settings.envelope.time_s), "searching home")
+        progress(min(0.95, elapsed / settings.envelope.time_s), text("moves.searching-home"))
         await asyncio.sleep(_POLL_S)

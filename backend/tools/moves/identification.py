@@ -12,6 +12,7 @@ from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, Rejected
 from profiles.functions import DriveIdentification
+from texts.message import prose
 
 _POLL_S = 0.02
 #: The drive must show within this time that it has begun.
@@ -118,5 +119,5 @@ async def _until_done(
             raise LinkTimeout(
                 "moves.identification-took-longer", drive=drive.name, time_s=limit.time_s
             )
-        progress(min(0.95, elapsed / limit.time_s), name)
+        progress(min(0.95, elapsed / limit.time_s), prose(name))
         await asyncio.sleep(_POLL_S)

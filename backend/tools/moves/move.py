@@ -15,6 +15,7 @@ from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
+from texts.message import text
 
 _POLL_S = 0.02
 _ACKNOWLEDGE_S = 0.1
@@ -126,7 +127,10 @@ async def sequence(axis: Axis, settings: SequenceSettings, progress: Progress) -
             watch = _watch(axis, units, await axis.position_raw(), settings.envelope)
             for number in range(settings.count):
                 for place in (settings.first, settings.second):
-                    progress(number / settings.count, f"cycle {number + 1} of {settings.count}")
+                    progress(
+                        number / settings.count,
+                        text("moves.cycle", number=number + 1, count=settings.count),
+                    )
                     began = time.monotonic()
                     target = units.position_raw(place)
                     await _to(axis, target, watch, None)
@@ -230,7 +234,7 @@ async def _to(axis: Axis, target: int, watch: _Watch, progress: Progress | None)
         status = await _still_inside(axis, watch)
         position = await axis.position_raw()
         if progress and target != start:
-            progress(min(1.0, abs((position - start) / (target - start))), "moving")
+            progress(min(1.0, abs((position - start) / (target - start))), text("moves.moving"))
         if status & reached_bit and abs(position - target) <= units.position_raw(0.02) + 2:
             return
         if time.monotonic() > deadline:
@@ -287,7 +291,7 @@ async def _hold(axis: Axis, settings: MoveSettings, start: int, progress: Progre
     await drive.command(drive.require(role), raw, axis.grant())
     began, watch = time.monotonic(), _watch(axis, units, start, envelope)
     while (elapsed := time.monotonic() - began) < envelope.time_s:
-        progress(elapsed / envelope.time_s, "running")
+        progress(elapsed / envelope.time_s, text("moves.running"))
         await _still_inside(axis, watch)
         await asyncio.sleep(_POLL_S)
     await drive.relax(drive.require(role), 0)

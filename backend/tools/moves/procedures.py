@@ -23,7 +23,7 @@ from profiles.schema import (
     WaitStep,
     WriteStep,
 )
-from texts.message import text
+from texts.message import prose, text
 
 _POLL_S = 0.1
 
@@ -89,7 +89,7 @@ async def _carry_out(
     drive = axis.drive
     async with AsyncExitStack() as left_alone:
         for number, step in enumerate(procedure.steps):
-            progress(number / len(procedure.steps), words[number])
+            progress(number / len(procedure.steps), prose(words[number]))
             try:
                 if rest_s := _rest_from(procedure.steps, number):
                     await left_alone.enter_async_context(drive.rest.alone(rest_s))

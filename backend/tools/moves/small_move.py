@@ -23,6 +23,7 @@ from backend.work.jobs import JobResult, Progress
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
+from texts.message import text
 
 #: Increments of the first move at most, and by how much the next may be longer.
 FIRST_INCREMENTS, LONGER = 1_000, 10
@@ -62,7 +63,7 @@ async def small_move(
     cycle = cycle_s(session)
     path = _path(settings.increments, cycle)
     limits = await torque_limits(drive)
-    progress(0.0, "enabling")
+    progress(0.0, text("moves.enabling"))
     async with axis.restoring(*limits), keeping_mode(axis, session):
         await axis.limit_torque(limits, settings.torque_percent)
         async with enabled(axis, session, Mode.CSP, by_increments=True) as start:

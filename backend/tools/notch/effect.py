@@ -47,6 +47,7 @@ from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, exceeded
 from drivers.halt import HaltCause
+from texts.message import text
 
 _TURN = 2 * np.pi
 #: Where the notch is tried: share of the sample rate, and limits in Hz.
@@ -151,7 +152,9 @@ async def tried_with(
     async with stopping_hard(axis, envelope.speed_rpm):
         begun_s = time.monotonic()
         async with temporary(axis, off):
-            lowest = await player.plain(share(progress, 0.0, part, "trying without a notch"))
+            lowest = await player.plain(
+                share(progress, 0.0, part, text("notch.trying-without-notch"))
+            )
         centre = round(min(max(_PLACE / cycle_s(session), _LOWEST_HZ, lowest), _HIGHEST_HZ))
         if not clock.allow(least_of(slot) * (time.monotonic() - begun_s) / BEFORE):
             raise samples_lost(axis, 0)
@@ -161,7 +164,9 @@ async def tried_with(
             if enough and not clock.allow(longest_s):
                 break
             begun_s, low = time.monotonic(), number * part
-            told = share(progress, low, low + part, f"trying notch {number} of {count}")
+            told = share(
+                progress, low, low + part, text("notch.trying-notch", number=number, count=count)
+            )
             away_rev = units.position(await axis.position_raw() - home)
             if abs(away_rev) > near_rev:
                 await go_back(axis, session, home, envelope, facts)

@@ -30,6 +30,7 @@ from backend.tools.moves.go_back import go_back
 from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import OutOfRange
+from texts.message import text
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 _TURN = 2 * np.pi
@@ -107,7 +108,7 @@ async def step_response(
         recording = await play(
             axis, session, Play(mode, raw.astype(np.int64)),
             await bus_limits(axis, settings.envelope, start), facts.rated_torque_nm,
-            share(progress, 0.1, 0.85, "stepping"),
+            share(progress, 0.1, 0.85, text("step.stepping")),
         )  # fmt: skip
     await go_back(axis, session, home, settings.envelope, facts)
     if keep is not None:

@@ -32,6 +32,7 @@ from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange, exceeded
 from drivers.halt import HaltCause
+from texts.message import text
 
 _TURN = 2 * np.pi
 MODE_OF = {"none": Mode.CST, "speed": Mode.CSV, "position": Mode.CSP}
@@ -51,7 +52,7 @@ async def scaled_by_speed(
     sequences: tuple[excite.Sequence, ...], home: int, progress: Progress,
 ) -> tuple[excite.Sequence, ...]:  # fmt: skip
     """The excitation made so large that its torque has the wanted share."""
-    trial = Progress(lambda: progress(0.09, "feeling how much torque the speed loop makes"))
+    trial = Progress(lambda: progress(0.09, text("sweep.feeling-how-much-torque")))
     ((sent, recording),) = await play_fitting(
         axis, session, settings, setup, sequences[:1], home, trial
     )
@@ -105,7 +106,7 @@ async def _play_all(
 
     for number, sequence in enumerate(sequences, before):
         low, high = (0.1 + 0.85 * part / count for part in (number, number + 1))
-        step = f"measuring, realisation {number + 1} of {count}"
+        step = text("sweep.measuring-realisation", number=number + 1, count=count)
         begun_s = time.monotonic()
         tries = [await one(sequence, share(progress, low, high, step))]
         takes_s = time.monotonic() - begun_s
@@ -114,7 +115,7 @@ async def _play_all(
                 break
             spare -= 1
             repeats.repeated += 1
-            again = share(progress, low, high, f"{step}: once more, since samples were lost")
+            again = share(progress, low, high, text("sweep.once-more-samples-lost", step=step))
             tries.append(await one(sequence, again))
         repeats.played += 1
         records.append(max(tries, key=lambda each: _kept(*each)))

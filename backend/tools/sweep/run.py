@@ -39,6 +39,7 @@ from backend.work.jobs import Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed, exceeded
 from drivers.halt import HaltCause
+from texts.message import text
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 
@@ -75,12 +76,12 @@ async def sweep(
         probed: Probed | None = None
         if loop in ("auto", "none"):
             require_signals(axis, session, Mode.CST, False)
-            progress(0.0, "looking for a load that pulls the axis")
+            progress(0.0, text("sweep.looking-load-pulls-axis"))
             held = await holding_torque(axis, session, facts)
             if abs(held) > PULLED * facts.rated_torque_nm:
                 loop = held_by_loop(axis, settings.loop, held)
             else:
-                progress(0.02, "feeling the axis with a small torque")
+                progress(0.02, text("sweep.feeling-axis-small-torque"))
                 probed = await probe_axis(
                     axis, session, settings.envelope, facts, home, settings.inertia_kgm2
                 )
@@ -100,7 +101,7 @@ async def sweep(
                 raise
             await go_back(axis, session, home, settings.envelope, facts)
             setup, records = await how.measured("speed", progress)
-    progress(0.95, "going back and evaluating")
+    progress(0.95, text("sweep.going-back-evaluating"))
 
     def evaluated() -> SweepResult:
         return evaluate(
@@ -139,10 +140,10 @@ class _Sweep:
         setup = await setup_of(axis, session, settings, self.facts, loop, self.probed)
         beside = settings.kind == "mechanics" and setup.loop != "none" and not setup.by_speed
         require_signals(axis, session, MODE_OF[setup.loop], beside)
-        progress(0.08, "designing the excitation")
+        progress(0.08, text("sweep.designing-excitation"))
         sequences = await asyncio.to_thread(sequences_of, setup, settings)
         if setup.by_speed:
-            progress(0.09, "feeling how much torque the speed loop makes")
+            progress(0.09, text("sweep.feeling-how-much-torque"))
             sequences = await scaled_by_speed(
                 axis, session, settings, setup, sequences, home, progress
             )

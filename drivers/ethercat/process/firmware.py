@@ -20,7 +20,7 @@ from drivers.ethercat.wire.steps import Pause, Steps, Write
 from texts.message import Text, joined, text
 
 Where = Literal["auto", "BOOT", "PREOP"]
-Tell = Callable[[float, str], None]
+Tell = Callable[[float, Text], None]
 
 _NO_BOOT = 0x0013
 _BACK_S = 60.0
@@ -60,7 +60,7 @@ def load(
             return "BOOT"
     yield from change_state(station, AlState.PREOP, clock)
     yield from _send(station.box, name, data, password=password, tell=tell)
-    tell(1.0, "the file is in the drive")
+    tell(1.0, text("ethercat.file-drive"))
     yield from identify(station, clock)
     return "PREOP"
 
@@ -74,7 +74,7 @@ def _enter_boot(
     where: Where,
 ) -> Steps[bool]:
     """False where the drive has no BOOT after all, and is in PREOP again."""
-    tell(0.0, "going to BOOT")
+    tell(0.0, text("ethercat.going-boot"))
     yield from change_state(station, AlState.INIT, clock)
     for number, (address, size, control) in enumerate(
         ((boot.out_address, boot.out_size, 0x26), (boot.in_address, boot.in_size, 0x22))
@@ -112,7 +112,7 @@ def _in_boot(
         after = yield from _after_failure(station, managers, clock)
         error.text = joined((error.text, after))
         raise
-    tell(1.0, "the file is in the drive: it starts with it, do not switch off")
+    tell(1.0, text("ethercat.file-drive-starts-not"))
     yield from _back(station, managers, clock)
     yield from identify(station, clock)
 
@@ -155,7 +155,9 @@ def _send(box: Mailbox, name: str, data: bytes, *, password: int, tell: Tell) ->
     def progress(now: int) -> None:
         nonlocal sent
         sent = now
-        tell(now / max(len(data), 1), f"{now} of {len(data)} bytes: do not switch off")
+        tell(
+            now / max(len(data), 1), text("ethercat.bytes-not-switch-off", now=now, bytes=len(data))
+        )
 
     try:
         yield from foe.write_file(box, name, data, password=password, on_progress=progress)

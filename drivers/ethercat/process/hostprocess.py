@@ -18,6 +18,7 @@ from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.process import protocol
 from drivers.ethercat.process.protocol import Message
 from drivers.link import Progress
+from texts.message import Text
 
 _WATCH_S = 0.1
 _RESTART_PAUSE_S = (0.2, 1.0, 3.0, 10.0)
@@ -213,7 +214,7 @@ class HostProcess:
         future, progress = self._waiting.get(number, (None, None))
         if "progress" in message:
             if progress is not None:
-                progress(message["progress"], message["text"])
+                progress(message["progress"], Text.from_wire(message["text"]))
         elif future is None or future.done():
             return
         elif "error" in message:

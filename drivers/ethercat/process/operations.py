@@ -26,7 +26,7 @@ from drivers.ethercat.wire.frames import ROOM_BYTES
 from drivers.ethercat.wire.information import ObjectInfo
 from drivers.ethercat.wire.lanes import Done, Lanes, Urgency
 from drivers.halt import HaltCause, Halted
-from texts.message import text
+from texts.message import Text, text
 
 _CONTROL_WORD = 0x6040
 _MAX_STEPS_PER_CYCLE = 16
@@ -128,8 +128,9 @@ class Operations:
                     self.roster.stations[number - 1].notes.append(error.message)
                 left.discard(number)
                 share = 1 - len(left) / len(chosen)
-                text = f"{len(chosen) - len(left)} of {len(chosen)} stations identified"
-                self._progress(message, share, text)
+                known = len(chosen) - len(left)
+                step = text("ethercat.stations-identified", known=known, count=len(chosen))
+                self._progress(message, share, step)
                 if not left:
                     done([self._found(s) for s in chosen], None)
 
@@ -152,8 +153,8 @@ class Operations:
             "parent": parent, "parent_port": port, "dc": station.distributed_clock,
         }  # fmt: skip
 
-    def _progress(self, message: Message, share: float, text: str) -> None:
-        self._send({"id": message["id"], "progress": share, "text": text})
+    def _progress(self, message: Message, share: float, step: Text) -> None:
+        self._send({"id": message["id"], "progress": share, "text": step.to_wire()})
 
     # Parameters ----------------------------------------------------------------------------
 
@@ -199,7 +200,11 @@ class Operations:
         self._require_parameters(station)
 
         def progress(number: int, total: int) -> None:
-            self._progress(message, number / max(total, 1), f"object {number} of {total}")
+            self._progress(
+                message,
+                number / max(total, 1),
+                text("ethercat.object-of", number=number, total=total),
+            )
 
         def finished(found: list[Any] | None, error: DriveError | None) -> None:
             if found is None:
@@ -308,7 +313,7 @@ class Operations:
             where=message["where"],
             managers=self.roster.managers(station.number),
             clock=time.monotonic,
-            tell=lambda share, text: self._progress(message, share, text),
+            tell=lambda share, step: self._progress(message, share, step),
         )
         self._loading.add(station.number)
         self.lanes.submit(station.number, "mailbox", steps, ended)

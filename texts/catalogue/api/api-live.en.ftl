@@ -2,6 +2,7 @@ api-live_administrator-takes-control-somebody = only an administrator takes cont
     .remedy = ask for control
 api-live_enabling-button-person-site = the enabling button is for a person on site
 api-live_grant-another-axis = the grant is for another axis
+api-live_jog = Jog { $member_drive }
 api-live_may-look = { $person } may only look
 api-live_not-message-interface = not a message of this interface: { $first }
     .remedy = reload the page: it is of another version than the server

@@ -2,6 +2,7 @@ api-live_administrator-takes-control-somebody = 只有管理员可以从他人�
     .remedy = 请请求控制权
 api-live_enabling-button-person-site = 使能按钮仅供现场人员使用
 api-live_grant-another-axis = 该授权属于另一轴
+api-live_jog = 点动 { $member_drive }
 api-live_may-look = { $person } 只能查看
 api-live_not-message-interface = 不是本接口的消息：{ $first }
     .remedy = 请重新加载页面：其版本与服务器不同

@@ -5,3 +5,7 @@ api-tuning_now-change-left-changed = { $drive }: { $parameter } is { $value } no
     .remedy = look at the list of changes; take it back all the same, or write the value that you want
 api-tuning_too-large = { $name } is too large
     .remedy = import one measurement at a time, as this program exported it
+api-tuning_frequency-response = Frequency response
+api-tuning_inertia-and-friction = Inertia and friction
+api-tuning_step-response = Step response
+api-tuning_tune = Tune

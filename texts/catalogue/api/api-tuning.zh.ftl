@@ -5,3 +5,7 @@ api-tuning_now-change-left-changed = { $drive }：{ $parameter } 现为 { $value
     .remedy = 请查看更改列表；仍然撤销，或写入所需的值
 api-tuning_too-large = { $name } 过大
     .remedy = 请按本程序导出的形式逐个导入测量
+api-tuning_frequency-response = 频率响应
+api-tuning_inertia-and-friction = 惯量与摩擦
+api-tuning_step-response = 阶跃响应
+api-tuning_tune = 整定

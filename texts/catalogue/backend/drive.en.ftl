@@ -25,6 +25,7 @@ drive_nothing-written = { $identity_warning }: nothing is written to it
 drive_of-parameter = { $drive }: { $parameter } { $name }: { $cause }
 drive_outside = { $label }: { $shown } is outside { $limit }
     .remedy = choose a value from { $limit }
+drive_parameters = { $result_count } of { $parameters } parameters
 drive_read = { $label } is read-only
     .remedy = it only shows what the drive measures or has worked out; change the setting that it follows from
 drive_set-motor-not-enabled = { $drive }: { $parameter } { $key } can be set only while the motor is not enabled

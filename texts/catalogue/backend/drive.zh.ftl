@@ -25,6 +25,7 @@ drive_nothing-written = { $identity_warning }：不向其写入任何内容
 drive_of-parameter = { $drive }：{ $parameter } { $name }：{ $cause }
 drive_outside = { $label }：{ $shown } 超出 { $limit }
     .remedy = 请在 { $limit } 内选择数值
+drive_parameters = { $parameters } 个参数中的 { $result_count } 个
 drive_read = { $label } 为只读
     .remedy = 它只显示驱动器测量或计算的结果；请更改其来源设置
 drive_set-motor-not-enabled = { $drive }：{ $parameter } { $key } 只能在电机未使能时设置

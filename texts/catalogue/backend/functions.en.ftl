@@ -37,3 +37,5 @@ functions_try-perhaps-process-data-running = perhaps process data of the running
 functions_use-already = { $drive }: { $spec_title } is in use already
     .remedy = end it first
 functions_value-not-restored = { $key } (was { $raw }): { $cause }
+functions_nothing-overruled-yet = nothing is overruled yet
+functions_overruled = on: { $on }; off: { $off }

@@ -37,3 +37,5 @@ functions_try-perhaps-process-data-running = 可能运行中交换的过程数�
 functions_use-already = { $drive }：{ $spec_title } 已在使用
     .remedy = 请先结束它
 functions_value-not-restored = { $key }（原为 { $raw }）：{ $cause }
+functions_nothing-overruled-yet = 尚未强制任何端子
+functions_overruled = 接通：{ $on }；断开：{ $off }

@@ -1,3 +1,15 @@
+motion_beyond-limit = { $quantity ->
+    [position] 位置
+    [speed] 速度
+    [torque] 转矩
+   *[following-error] 跟随误差
+ } { $value } 超出限值 { $limit }：轴已制动并断使能
+motion_beyond-limit-in = { $quantity ->
+    [position] 位置
+    [speed] 速度
+    [torque] 转矩
+   *[following-error] 跟随误差
+ } { $value } { $unit } 超出限值 { $limit } { $unit }：轴已制动并断使能
 motion_commanded = 已停止
 motion_contradiction = 606Ch 为 { NUM($speed, format: ".6g") }，位置推得 { NUM($from_position, format: ".6g") }（606Ch 的原始单位；{ $note }）：轴已制动并断使能
 motion_expired = 设定值未及时更新：轴已制动并断使能
@@ -19,15 +31,3 @@ motion_put-energy-motor-not = { $drive }：{ $parameter } { $key } 可向电机�
 motion_speed = 速度超出限值
 motion_torque = 转矩超出限值
 motion_unfit = 设定值不适合其对象：轴已制动
-motion_beyond-limit = { $quantity ->
-    [position] 位置
-    [speed] 速度
-    [torque] 转矩
-   *[following-error] 跟随误差
- } { $value } 超出限值 { $limit }：轴已制动并断使能
-motion_beyond-limit-in = { $quantity ->
-    [position] 位置
-    [speed] 速度
-    [torque] 转矩
-   *[following-error] 跟随误差
- } { $value } { $unit } 超出限值 { $limit } { $unit }：轴已制动并断使能

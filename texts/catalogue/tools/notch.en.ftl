@@ -17,3 +17,5 @@ notch_speed-loop-stiff-notch = { $drive }: its speed loop is so stiff that a not
     .remedy = lower the speed gain, and tune again
 notch_whether-loop-stays-stable = { $drive }: whether its loop stays stable with a notch is not known, since no mechanical model explains its response
     .remedy = measure the frequency response again, with more excitation
+notch_trying-without-notch = trying without a notch
+notch_trying-notch = trying notch { $number } of { $count }

@@ -17,3 +17,5 @@ notch_speed-loop-stiff-notch = { $drive }：其速度环增益过高，测量陷
     .remedy = 请降低速度增益后重新整定
 notch_whether-loop-stays-stable = { $drive }：没有机械模型能解释其响应，因此不知加上陷波器后回路是否稳定
     .remedy = 请以更大的激励重新测量频率响应
+notch_trying-without-notch = 不带陷波器测试
+notch_trying-notch = 测试第 { $number } 个陷波器，共 { $count } 个

@@ -8,4 +8,6 @@ set_file-no-usable-value = { $drive }: the file has no usable value for { $param
     .remedy = untick this row
 set_no-parameter-read-nothing = { $drive }: no parameter could be read, so nothing was saved
     .remedy = check the connection
+set_storing-present-values = storing the present values
+set_writing = writing { $key }
 set_written-in-part = { $cause }; { $written } of { $rows } rows were written before { $key }; what was there before is in the set “{ $backup }”

@@ -8,4 +8,6 @@ set_file-no-usable-value = { $drive }：文件中没有 { $parameter } 的可用
     .remedy = 请取消勾选此行
 set_no-parameter-read-nothing = { $drive }：无法读取任何参数，因此未保存
     .remedy = 请检查连接
+set_storing-present-values = 正在保存当前值
+set_writing = 正在写入 { $key }
 set_written-in-part = { $cause }；在 { $key } 之前已写入 { $rows } 行中的 { $written } 行；原有内容在参数集“{ $backup }”中

@@ -4897,10 +4897,18 @@ export interface components {
              * @enum {string}
              */
             state: "running" | "done" | "failed" | "cancelled";
-            /** Step */
+            /**
+             * Step
+             * @description in English
+             */
             step: string;
-            /** Title */
+            step_message: components["schemas"]["MessageInfo"];
+            /**
+             * Title
+             * @description in English
+             */
             title: string;
+            title_message: components["schemas"]["MessageInfo"];
         };
         /**
          * JogEnded
@@ -5525,6 +5533,21 @@ export interface components {
          */
         MechanicsUpdate: {
             mechanics: components["schemas"]["Mechanics"] | null;
+        };
+        /**
+         * MessageInfo
+         * @description A message without words: a code of the catalogue and its facts.
+         *
+         *     Empty codes carry words that others made in ``params.words``; the code ``+`` strings the other
+         *     params together with ``params.joint``.
+         */
+        MessageInfo: {
+            /** Code */
+            code: string;
+            /** Params */
+            params?: {
+                [key: string]: string | number | components["schemas"]["MessageInfo"] | null;
+            };
         };
         /**
          * MissingPort
@@ -6313,10 +6336,18 @@ export interface components {
          */
         Problem: {
             /**
-             * Code
+             * Abort Code
              * @description SDO abort or Modbus exception code
              */
-            code?: number | null;
+            abort_code?: number | null;
+            /** @description the remedy as code and facts */
+            advice?: components["schemas"]["MessageInfo"] | null;
+            /**
+             * Code
+             * @description what happened, as a stable code
+             * @example canopen.not-open
+             */
+            code?: string | null;
             /** Detail */
             detail: string;
             /** Drive */
@@ -6325,6 +6356,13 @@ export interface components {
             limit?: string | null;
             /** Parameter */
             parameter?: string | null;
+            /**
+             * Params
+             * @description facts of the code, by name; the unit ends the name
+             */
+            params?: {
+                [key: string]: string | number | components["schemas"]["MessageInfo"] | null;
+            };
             /** Remedy */
             remedy?: string | null;
             /** Status */
@@ -8539,6 +8577,7 @@ export type MeasurementContent = components['schemas']['MeasurementContent'];
 export type MeasurementInfo = components['schemas']['MeasurementInfo'];
 export type Mechanics = components['schemas']['Mechanics'];
 export type MechanicsUpdate = components['schemas']['MechanicsUpdate'];
+export type MessageInfo = components['schemas']['MessageInfo'];
 export type MissingPort = components['schemas']['MissingPort'];
 export type MotionClass = components['schemas']['MotionClass'];
 export type MotionClassRequest = components['schemas']['MotionClassRequest'];

@@ -1,7 +1,6 @@
 import { ActionIcon, Drawer, NativeSelect } from '@mantine/core'
 import { type ReactNode, useEffect, useRef, useState } from 'react'
-import { known, useT } from '../i18n'
-import { said } from '../i18n/said'
+import { known, useSay, useT } from '../i18n'
 import * as live from '../live/live'
 import { contents, useAxisState, useDrive, useDrives, useLink, useStore } from '../live/store'
 import { clock } from '../widgets/format'
@@ -318,6 +317,7 @@ const REFUSED_MS = 12000
 /** A request over the websocket that the server turned down, with what to try. */
 function Refused() {
   const t = useT()
+  const say = useSay()
   const refused = useStore('refused', () => contents.refused)
   const [seen, setSeen] = useState(0)
   useEffect(() => {
@@ -330,11 +330,11 @@ function Refused() {
     <div className="note fault" role="alert">
       <p>
         <strong>{known(t, 'problemTitle', refused.problem.title)}</strong>{' '}
-        {said(t, refused.problem.detail)}
+        {say.detail(refused.problem)}
       </p>
       {refused.problem.remedy && (
         <p>
-          {t('problem.try')} {said(t, refused.problem.remedy)}
+          {t('problem.try')} {say.remedy(refused.problem)}
         </p>
       )}
       <button type="button" className="plain" onClick={() => setSeen(refused.at)}>

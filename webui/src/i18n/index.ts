@@ -1,5 +1,8 @@
 import { useSyncExternalStore } from 'react'
+import type { JobInfo, Problem } from '../api/schema'
 import { catalogue, type Key } from './catalogue'
+import { load, words, type Message } from './message'
+import { said } from './said'
 
 export type Language = 'en' | 'zh'
 export type { Key }
@@ -7,11 +10,26 @@ export type { Key }
 const STORED = 'servodeck.language'
 const listeners = new Set<() => void>()
 let language: Language = initial()
+/** How often texts have come: a component that shows messages is drawn again then. */
+let generation = 0
 
 function initial(): Language {
   const stored = globalThis.localStorage?.getItem(STORED)
   if (stored === 'en' || stored === 'zh') return stored
   return globalThis.navigator?.language.startsWith('zh') ? 'zh' : 'en'
+}
+
+fetchTexts()
+
+/** Messages are shown in the server's words until their own are here. */
+function fetchTexts(): void {
+  load(language).then(
+    () => {
+      generation += 1
+      for (const listener of listeners) listener()
+    },
+    () => undefined, // offline: the server's words stay
+  )
 }
 
 // Screen readers and hyphenation go by this; index.html cannot know the stored language.
@@ -25,6 +43,7 @@ export function setLanguage(next: Language): void {
   language = next
   globalThis.localStorage?.setItem(STORED, next)
   mark(next)
+  fetchTexts()
   for (const listener of listeners) listener()
 }
 
@@ -70,4 +89,47 @@ export function useT(): T {
 export function known(t: T, prefix: string, text: string): string {
   const key = `${prefix}.${text}`
   return key in catalogue ? t(key as Key) : text
+}
+
+function useTexts(): Language {
+  useSyncExternalStore(
+    (listener) => {
+      listeners.add(listener)
+      return () => listeners.delete(listener)
+    },
+    () => generation,
+  )
+  return useLanguage()
+}
+
+/** What the server says by code and facts, in the language of the page. */
+export interface Say {
+  message: (message: Message, otherwise?: string) => string
+  detail: (problem: Problem) => string
+  remedy: (problem: Problem) => string
+  title: (job: JobInfo) => string
+  step: (job: JobInfo) => string
+}
+
+/** Sentences from codes; the component is drawn again when language or texts change. */
+export function useSay(): Say {
+  const to = useTexts()
+  return sayIn(to)
+}
+
+export function sayIn(to: Language): Say {
+  const t: T = (key, variables) => translate(to, key, variables)
+  return {
+    message: (message, otherwise) => words(to, message, otherwise),
+    detail: (problem) =>
+      problem.code
+        ? words(to, { code: problem.code, params: problem.params ?? {} }, problem.detail)
+        : said(t, problem.detail),
+    remedy: (problem) =>
+      problem.advice?.code
+        ? words(to, problem.advice, problem.remedy ?? '')
+        : said(t, problem.remedy ?? ''),
+    title: (job) => words(to, job.title_message, job.title),
+    step: (job) => words(to, job.step_message, job.step),
+  }
 }

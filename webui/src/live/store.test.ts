@@ -17,6 +17,8 @@ const job = (state: JobInfo['state']): JobInfo => ({
   kind: 'read_all',
   drive: 'x',
   title: 'Read X',
+  title_message: { code: '', params: { words: 'Read X' } },
+  step_message: { code: '', params: { words: '' } },
   state,
   progress: state === 'running' ? 0 : 1,
   step: '',

@@ -2,8 +2,7 @@ import { Button } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask } from '../api/client'
 import type { JobInfo } from '../api/schema'
-import { useT } from '../i18n'
-import { said } from '../i18n/said'
+import { useSay, useT } from '../i18n'
 import { setJob, useJob } from '../live/store'
 import { clock, duration } from './format'
 import { ProblemNote } from './ProblemNote'
@@ -15,6 +14,7 @@ const DONE_MS = 6000
 /** Progress of a job: step, elapsed and remaining time, cancel; then how it ended. */
 export function JobNote({ id, onClose }: { id: string | null; onClose?: () => void }) {
   const t = useT()
+  const say = useSay()
   const job = useJob(id)
   const done = job?.state === 'done'
   useEffect(() => {
@@ -30,17 +30,17 @@ export function JobNote({ id, onClose }: { id: string | null; onClose?: () => vo
     return job.problem ? (
       <ProblemNote
         problem={job.problem}
-        about={`${said(t, job.title)} · ${clock(job.ended)}`}
+        about={`${say.title(job)} · ${clock(job.ended)}`}
         {...(onClose ? { onClose } : {})}
       />
     ) : (
-      <p className="note fault">{t('job.failed', { title: said(t, job.title) })}</p>
+      <p className="note fault">{t('job.failed', { title: say.title(job) })}</p>
     )
   }
   if (job.state !== 'running') {
     return (
       <p className={`note ${job.state === 'done' ? 'good' : 'warn'}`} role="status">
-        {t(job.state === 'done' ? 'job.done' : 'job.cancelled', { title: said(t, job.title) })}{' '}
+        {t(job.state === 'done' ? 'job.done' : 'job.cancelled', { title: say.title(job) })}{' '}
         <span className="num">{duration(seconds(job, now))}</span>
         {onClose && (
           <button type="button" className="plain" onClick={onClose}>
@@ -54,8 +54,8 @@ export function JobNote({ id, onClose }: { id: string | null; onClose?: () => vo
   return (
     <div className="job" role="status">
       <div className="job-line">
-        <strong>{said(t, job.title)}</strong>
-        <span className="grow">{said(t, job.step)}</span>
+        <strong>{say.title(job)}</strong>
+        <span className="grow">{say.step(job)}</span>
         <span className="num">{t('job.elapsed', { time: duration(elapsed) })}</span>
         {job.progress > 0.02 && elapsed > 1 && (
           <span className="num">
@@ -82,7 +82,7 @@ export function JobNote({ id, onClose }: { id: string | null; onClose?: () => vo
       <progress
         max={1}
         value={job.progress > 0 ? job.progress : undefined}
-        aria-label={said(t, job.title)}
+        aria-label={say.title(job)}
       />
       <ProblemNote problem={cancel.problem} onClose={cancel.clear} />
     </div>

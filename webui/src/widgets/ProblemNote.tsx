@@ -1,7 +1,6 @@
 import { UNREACHABLE } from '../api/client'
 import type { Problem } from '../api/schema'
-import { known, useT } from '../i18n'
-import { said } from '../i18n/said'
+import { known, useSay, useT } from '../i18n'
 import { FORGOTTEN } from '../live/store'
 
 /** What happened, to which drive and parameter, the limit, and what to try. */
@@ -16,6 +15,7 @@ export function ProblemNote({
   onClose?: () => void
 }) {
   const t = useT()
+  const say = useSay()
   if (!problem) return null
   const unreachable = problem.type === UNREACHABLE
   const forgotten = problem.type === FORGOTTEN
@@ -28,7 +28,7 @@ export function ProblemNote({
             ? t('problem.unreachable')
             : known(t, 'problemTitle', problem.title) || t('problem.title')}
         </strong>{' '}
-        {forgotten ? t('problem.forgotten') : said(t, problem.detail)}
+        {forgotten ? t('problem.forgotten') : say.detail(problem)}
       </p>
       {problem.limit && (
         <p>
@@ -42,7 +42,7 @@ export function ProblemNote({
             ? t('problem.unreachableTry')
             : forgotten
               ? t('problem.forgottenTry')
-              : said(t, problem.remedy ?? '')}
+              : say.remedy(problem)}
         </p>
       )}
       {onClose && (

@@ -1,15 +1,16 @@
 import type { AxisState } from '../api/schema'
-import { type T, useT } from '../i18n'
+import { type T, useSay, useT } from '../i18n'
 import { said } from '../i18n/said'
 import { useAxisState, useJob, useLink } from '../live/store'
 
 /** What keeps every motion of an axis from being started now, in words; null: nothing. */
 export function useObstacle(drive: string): string | null {
   const t = useT()
+  const say = useSay()
   const { open } = useLink()
   const state = useAxisState(drive)
   const job = useJob(state?.moving_job ?? null)
-  return obstacleOf(t, open, state, job?.title ?? '…')
+  return obstacleOf(t, open, state, job ? say.title(job) : '…')
 }
 
 export function obstacleOf(
@@ -20,6 +21,6 @@ export function obstacleOf(
 ): string | null {
   if (!open) return t('start.noConnection')
   if (!state?.fresh) return [t('start.noAnswer'), said(t, state?.problem ?? '')].join(' ').trim()
-  if (state.moving_job !== null) return t('jog.taken', { title: said(t, title) })
+  if (state.moving_job !== null) return t('jog.taken', { title })
   return null
 }

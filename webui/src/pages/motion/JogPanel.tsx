@@ -1,7 +1,6 @@
 import { type KeyboardEvent, type PointerEvent, useEffect, useRef, useState } from 'react'
 import type { AxisState } from '../../api/schema'
-import { known, useT } from '../../i18n'
-import { said } from '../../i18n/said'
+import { known, useSay, useT } from '../../i18n'
 import { useJob } from '../../live/store'
 import { quantity } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
@@ -27,6 +26,7 @@ export function JogPanel({
   unit: TravelUnit
 }) {
   const t = useT()
+  const say = useSay()
   const { units } = unit
   const numbers = useMotionNumbers(drive, unit, 'jog', 5)
   const [speed, acceleration] = [numbers.speed.value, numbers.acceleration.value]
@@ -128,7 +128,7 @@ export function JogPanel({
       {taken && (
         // A jog that was let go needs a moment to brake and tidy up, on a slow bus a long one.
         <p className={ending ? 'dim' : 'warn-text'} role="status">
-          {ending ? t('jog.ending') : t('jog.taken', { title: said(t, job?.title ?? '…') })}
+          {ending ? t('jog.ending') : t('jog.taken', { title: job ? say.title(job) : '…' })}
         </p>
       )}
       {!settings && <p className="warn-text">{t('jog.invalid')}</p>}

@@ -1,7 +1,7 @@
 import { Button, Checkbox, Modal } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
-import { useT } from '../../i18n'
+import { useSay, useT } from '../../i18n'
 import { said } from '../../i18n/said'
 import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
@@ -18,6 +18,7 @@ const NEW: NotchShape = { center_hz: 400, width_hz: 150, depth_db: -20 }
 /** Notches slot by slot: what is wanted, and what the drive will really do after rounding. */
 export function NotchEditor({ drive, notches }: { drive: string; notches: Notches }) {
   const t = useT()
+  const say = useSay()
   const [confirming, setConfirming] = useState(false)
   const write = useAction()
   const { now, wanted, preview, refused, edited } = notches
@@ -25,10 +26,10 @@ export function NotchEditor({ drive, notches }: { drive: string; notches: Notche
     // A family without notches is no fault of anything.
     return notches.problem ? (
       <Panel title={t('notch.title')}>
-        <p className="dim">{said(t, notches.problem.detail)}</p>
+        <p className="dim">{say.detail(notches.problem)}</p>
         {notches.problem.remedy && (
           <p className="dim">
-            {t('problem.try')} {said(t, notches.problem.remedy)}
+            {t('problem.try')} {say.remedy(notches.problem)}
           </p>
         )}
       </Panel>

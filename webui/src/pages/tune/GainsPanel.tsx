@@ -3,8 +3,7 @@ import { useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { GainWrite } from '../../api/schema'
 import { href } from '../../app/router'
-import { useT } from '../../i18n'
-import { said } from '../../i18n/said'
+import { useSay, useT } from '../../i18n'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
@@ -27,6 +26,7 @@ export function GainsPanel({
   inertia: number | null
 }) {
   const t = useT()
+  const say = useSay()
   const { gains } = of
   const [typed, setTyped] = useState<PartialGains | null>(null)
   const [level, setLevel] = useState<number | null>(null)
@@ -47,10 +47,10 @@ export function GainsPanel({
   if (!gains) {
     return of.problem ? (
       <Panel title={t('gains.title')}>
-        <p className="dim">{said(t, of.problem.detail)}</p>
+        <p className="dim">{say.detail(of.problem)}</p>
         {of.problem.remedy && (
           <p className="dim">
-            {t('problem.try')} {said(t, of.problem.remedy)}
+            {t('problem.try')} {say.remedy(of.problem)}
           </p>
         )}
       </Panel>
