@@ -15,6 +15,8 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from texts.message import Language, language_of, speak
+
 COMMANDS = {
     "serve": ("start:serve", "Start the server and the web page."),
     "demo": ("start:demo", "Start the server on a bench of virtual drives: no hardware, no root."),
@@ -142,9 +144,20 @@ def _speak_any_letter() -> None:
             stream.reconfigure(encoding=None if stream.isatty() else "utf-8", errors="replace")
 
 
+def _take_language(arguments: list[str]) -> Language:
+    """The language of errors and progress: ``--language`` before the command, else the locale's."""
+    if len(arguments) > 2 and arguments[1] == "--language" and arguments[2] in ("en", "zh"):
+        chosen = arguments[2]
+        del arguments[1:3]
+        return language_of(chosen)
+    names = (os.environ.get(name) for name in ("LC_ALL", "LC_MESSAGES", "LANG"))
+    return language_of(next((name for name in names if name), None))
+
+
 def main() -> None:
     """Entry point. A defect of the program itself ends it with exit code 70, in one sentence."""
     _speak_any_letter()
+    speak(_take_language(sys.argv))
     try:
         app()
     except Exception as error:

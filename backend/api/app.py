@@ -39,6 +39,7 @@ from backend.api.security.origin import Addresses
 from backend.api.security.socket import OpenSockets
 from backend.api.sets import lists as routes_lists
 from backend.api.sets import routes as routes_sets
+from backend.api.spoken import Spoken
 from backend.api.station import description as routes_description
 from backend.api.station import ethercat as routes_ethercat
 from backend.api.station import routes as routes_bench
@@ -178,6 +179,7 @@ def make_app(
         sockets=sockets,
         strict_transport=strict_transport,
     )
+    app.add_middleware(Spoken)
     return app
 
 

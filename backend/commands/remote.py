@@ -21,6 +21,7 @@ from backend.api.station.models import Bus, DriveSummary, FoundDrive
 from backend.commands.session import show_progress
 from drivers.errors import DriveError, LinkLost, NotAllowed, ProtocolError
 from drivers.urls import parse_url
+from texts.message import language
 
 T = TypeVar("T")
 
@@ -145,7 +146,7 @@ class Remote:
 async def remote(server: str) -> AsyncIterator[Remote]:
     """A server for the length of one command; ``SERVODECK_TOKEN`` is shown to it."""
     address = server.rstrip("/")
-    headers = authorisation()
+    headers = {**authorisation(), "Accept-Language": language()}
     async with httpx.AsyncClient(
         base_url=f"{address}/api/v1", timeout=_TIMEOUT_S, headers=headers
     ) as http:

@@ -35,7 +35,9 @@ def reported(code: int = 1) -> Iterator[None]:
     try:
         yield
     except DriveError as error:
-        raise _told(error.message, error.advice, code) from error
+        spoken, advice = language(), error.advice_text
+        remedy = None if advice is None else advice.words(spoken)
+        raise _told(error.text.words(spoken), remedy, code) from error
     except ProfileError as error:
         raise _told(str(error), "see `servodeck profile check`", code) from error
     except OSError as error:

@@ -36,6 +36,7 @@ export const api = createClient<paths>({ baseUrl: API_ROOT, fetch: (request) => 
 api.use({
   onRequest({ request }) {
     if (connection !== null) request.headers.set('X-Servodeck-Connection', connection)
+    request.headers.set('Accept-Language', document.documentElement.lang || 'en')
     if (csrf !== null) request.headers.set('X-Servodeck-CSRF', csrf)
     return request
   },
