@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from drivers.errors import ProtocolError
 from drivers.ethercat.wire.coe import MAX_BYTES, OVERTAKEN_READS, settle
 from drivers.ethercat.wire.mailbox import COE, Mail, Mailbox, Overtaken
+from drivers.ethercat.wire.registers import GONE_S
 from drivers.ethercat.wire.steps import Steps
 from drivers.sdo_abort import rejected
 
@@ -106,7 +107,8 @@ def _info_once(box: Mailbox, opcode: int, data: bytes, answer_code: int) -> Step
         return service == _INFO and mail.payload[2] & 0x7F in (answer_code, 0x07)
 
     request = struct.pack("<HBBH", _INFO << 12, opcode, 0, 0) + data
-    answer = yield from box.request(COE, request, matches)
+    # Hundreds of requests in a row: a computer that stands still meanwhile is no reason to give up.
+    answer = yield from box.request(COE, request, matches, gone_s=GONE_S)
     parts: list[bytes] = []
     while True:
         if answer[2] & 0x7F == 0x07:
