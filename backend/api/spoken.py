@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from backend.api.security.protocol import header
 from texts.message import language_of, speaking
 
 
@@ -19,5 +18,6 @@ class Spoken:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        with speaking(language_of(header(scope["headers"], b"accept-language"))):
+        tags = (value for name, value in scope["headers"] if name == b"accept-language")
+        with speaking(language_of(next(tags, b"").decode("latin-1"))):
             await self._app(scope, receive, send)

@@ -20,7 +20,7 @@ from backend.restore.store import Pending
 from backend.station.matching import match_profiles, profile_for
 from backend.work.jobs import Progress
 from drivers.errors import DriveError, NotAllowed
-from drivers.link import Found, Link, NeedsProfile
+from drivers.link import Found, Link
 from drivers.urls import link_for
 from profiles.loader import ProfileError
 from texts.message import Text, language
@@ -160,8 +160,7 @@ async def drive_and_pending(
                 "command.nothing-answers-station-check-power", station=station, url=url
             )
         facts, spec = profile_for(link.kind, profile or _recognise(link, found))
-        if isinstance(link, NeedsProfile):
-            link.configure_station(station, facts)
+        link.attach(station, facts)
         drive = Drive(
             f"{facts.drive}-{station}",
             f"{facts.drive} station {station}",

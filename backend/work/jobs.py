@@ -13,7 +13,7 @@ from typing import Literal
 
 from backend.people.identity import Actor, acting, acting_person
 from drivers.errors import Busy, DriveError
-from texts.message import Text, prose
+from texts.message import Text, as_text, prose
 
 JobState = Literal["running", "done", "failed", "cancelled"]
 JobResult = dict[str, object]
@@ -27,10 +27,10 @@ class Progress:
         self.step: Text = prose("")
         self._changed = changed
 
-    def __call__(self, fraction: float, step: Text) -> None:
+    def __call__(self, fraction: float, step: Text | str) -> None:
         """``fraction`` 0…1 done, ``step`` what is being done."""
         self.fraction = min(1.0, max(0.0, fraction))
-        self.step = step
+        self.step = as_text(step)
         self._changed()
 
 
@@ -124,7 +124,7 @@ class JobRunner:
     def start(
         self,
         kind: str,
-        title: Text,
+        title: Text | str,
         work: Work,
         *,
         drive: str | None = None,
@@ -151,7 +151,7 @@ class JobRunner:
         job = Job(
             id=f"{kind}-{self._run_mark}-{next(self._numbers)}",
             kind=kind,
-            title=title,
+            title=as_text(title),
             drive=drive,
             motion=motion,
             progress=Progress(lambda: self._tell(job)),

@@ -6,8 +6,6 @@ station_cyclic-exchange-just-being = { $url }: the cyclic exchange is just being
     .remedy = wait for it
 station_cyclic-exchange-runs-already = { $url }: the cyclic exchange runs already
     .remedy = end it first
-station_drive-cannot-list-objects = a drive on { $kind } cannot list its own objects
-    .remedy = import the maker's EDS or ESI file, or use the generic profile
 station_drive-station-cannot-list = the drive at station { $station } cannot list its own objects: CANopen has no such service, and it carries no EDS (1021h: { $cause })
 station_drive-station-carries-eds = the drive at station { $station } carries its EDS in the maker's own format (1022h = { $packed })
 station_drive-station-not-hold = the drive at station { $station } of { $url } does not hold the settings of { $drive }: { $parameter } { $key } is { $value } there and { $here } here ({ $different_count } of { $shared_count } differ)

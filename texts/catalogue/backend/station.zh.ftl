@@ -6,8 +6,6 @@ station_cyclic-exchange-just-being = { $url }：正在更改循环交换
     .remedy = 请等待
 station_cyclic-exchange-runs-already = { $url }：周期通信已在运行
     .remedy = 请先结束它
-station_drive-cannot-list-objects = { $kind } 上的驱动器不能列出自身的对象
-    .remedy = 请导入厂家的 EDS 或 ESI 文件，或使用通用配置文件
 station_drive-station-cannot-list = 站 { $station } 的驱动器不能列出自身的对象：CANopen 没有此服务，且它未存储 EDS（1021h：{ $cause }）
 station_drive-station-carries-eds = 站 { $station } 的驱动器以厂家自有格式存储 EDS（1022h = { $packed }）
 station_drive-station-not-hold = { $url } 站 { $station } 的驱动器与 { $drive } 的设置不符：{ $parameter } { $key } 在驱动器中为 { $value }，此处为 { $here }（{ $shared_count } 项中有 { $different_count } 项不同）

@@ -1,7 +1,8 @@
 link_bytes-came-bytes = { $bytes } bytes came for a { $data_type } of { $calcsize_bytes } bytes
     .remedy = the drive's firmware may be of another version: compare with its dictionary
+link_drive-cannot-list-objects = a drive on { $kind } cannot list its own objects
+    .remedy = import the maker's EDS or ESI file, or use the generic profile
 link_gives-option-twice = { QUOTED($value) } gives an option twice
-link_must-whole-number = { $name }={ $value } must be a whole number from { $low } to { $high }
 link_names-no-adapter = { QUOTED($value) } names no adapter
 link_no-bus-url-must = { QUOTED($value) } is no bus URL: it must start with { $schemes }
 link_no-channel-kind-adapter = { QUOTED($value) } is no channel of this kind of CAN adapter
@@ -22,9 +23,7 @@ link_no-serial-port-plug-adapter = there is no serial port { $value }
 link_not-fit = { $value } does not fit { $data_type } ({ $low } to { $high })
 link_not-number = { QUOTED($value) } is not a { $data_type } number
 link_not-whole-number-needs = { $value } is not a whole number, { $data_type } needs one
-link_parity-must-none-even = parity={ $value } must be N (none), E (even) or O (odd)
 link_terminal-servodeck-itself-runs = { $value } is the terminal that servodeck itself runs in
     .remedy = give the device of the adapter, as /dev/ttyUSB0
-link_urls-no-option = { $scheme } URLs have no option { QUOTED($value) }
 link_wire-running-demo = { $bus } is a wire that only a running demo has
     .remedy = start 'servodeck demo', or give the path of a real or virtual port

@@ -1,7 +1,8 @@
 link_bytes-came-bytes = 收到 { $bytes } 字节，{ $data_type } 应为 { $calcsize_bytes } 字节
     .remedy = 驱动器固件可能为其他版本：请与其对象字典比较
+link_drive-cannot-list-objects = { $kind } 上的驱动器不能列出自身的对象
+    .remedy = 请导入厂家的 EDS 或 ESI 文件，或使用通用配置文件
 link_gives-option-twice = { QUOTED($value) } 重复给出选项
-link_must-whole-number = { $name }={ $value } 须为 { $low } 至 { $high } 的整数
 link_names-no-adapter = { QUOTED($value) } 未指定适配器
 link_no-bus-url-must = { QUOTED($value) } 不是总线 URL：须以 { $schemes } 开头
 link_no-channel-kind-adapter = { QUOTED($value) } 不是此类 CAN 适配器的通道
@@ -22,9 +23,7 @@ link_no-serial-port-plug-adapter = 没有串口 { $value }
 link_not-fit = { $value } 超出 { $data_type } 的范围（{ $low } 至 { $high }）
 link_not-number = { QUOTED($value) } 不是 { $data_type } 数
 link_not-whole-number-needs = { $value } 不是整数，{ $data_type } 需要整数
-link_parity-must-none-even = parity={ $value } 须为 N（无）、E（偶）或 O（奇）
 link_terminal-servodeck-itself-runs = { $value } 是 servodeck 自身运行的终端
     .remedy = 请给出适配器的设备，如 /dev/ttyUSB0
-link_urls-no-option = { $scheme } URL 没有选项 { QUOTED($value) }
 link_wire-running-demo = { $bus } 是只有运行中的演示才有的线路
     .remedy = 请启动 'servodeck demo'，或给出真实或虚拟端口的路径
