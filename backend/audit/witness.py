@@ -124,7 +124,7 @@ class Witness:
         """A job began or ended; progress between is not kept."""
         if job.kind in _UNREMARKABLE:
             return
-        detail: dict[str, Value] = {"title": job.title.words()}
+        detail: dict[str, Value] = {"title": job.title}
         if job.drive is not None:
             detail["drive"] = job.drive
         if job.state == "running":

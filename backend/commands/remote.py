@@ -21,7 +21,7 @@ from backend.api.station.models import Bus, DriveSummary, FoundDrive
 from backend.commands.session import show_progress
 from drivers.errors import DriveError, LinkLost, NotAllowed, ProtocolError
 from drivers.urls import parse_url
-from texts.message import language
+from texts.message import Text, language
 
 T = TypeVar("T")
 
@@ -80,7 +80,7 @@ class Remote:
             while job.state == "running":
                 await asyncio.sleep(_LOOK_S)
                 job = await self.ask("GET", f"/jobs/{job.id}", JobInfo)
-                show_progress(job.progress, job.step)
+                show_progress(job.progress, Text.from_wire(job.step_message.model_dump()))
         except asyncio.CancelledError:
             await asyncio.shield(self.raw("DELETE", f"/jobs/{job.id}"))
             raise

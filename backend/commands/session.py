@@ -115,7 +115,7 @@ def show_progress(fraction: float, step: Text | str) -> None:
 
 def progress() -> Progress:
     """A job's progress, shown as `show_progress` does."""
-    shown = Progress(lambda: show_progress(shown.fraction, shown.step))
+    shown = Progress(lambda: show_progress(shown.fraction, shown.step_text))
     return shown
 
 

@@ -57,7 +57,7 @@ class Motion:
             Busy: a job does.
         """
         if (job := self._bench.jobs.moving(member.drive.id)) is not None:
-            raise Busy("station.moved", drive=member.drive.name, job_title=job.title)
+            raise Busy("station.moved", drive=member.drive.name, job_title=job.title_text)
 
     @contextlib.contextmanager
     def parting(self, member: Member) -> Iterator[None]:
@@ -109,7 +109,7 @@ class Motion:
             if job.task is not None:
                 job.task.cancel()
 
-        return self._bench.authority.granted(drive.id, drive.name, job.title.words(), ended=ended)
+        return self._bench.authority.granted(drive.id, drive.name, job.title, ended=ended)
 
     def unattended(self, drive_id: str, why: str) -> None:
         """Nobody may leave this axis enabled any longer: it loses its power."""

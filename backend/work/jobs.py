@@ -24,13 +24,18 @@ class Progress:
 
     def __init__(self, changed: Callable[[], None]) -> None:
         self.fraction = 0.0
-        self.step: Text = prose("")
+        self.step_text: Text = prose("")
         self._changed = changed
+
+    @property
+    def step(self) -> str:
+        """What is being done, in English."""
+        return self.step_text.words()
 
     def __call__(self, fraction: float, step: Text | str) -> None:
         """``fraction`` 0…1 done, ``step`` what is being done."""
         self.fraction = min(1.0, max(0.0, fraction))
-        self.step = as_text(step)
+        self.step_text = as_text(step)
         self._changed()
 
 
@@ -45,7 +50,7 @@ class Job:
 
     id: str
     kind: str
-    title: Text
+    title_text: Text
     drive: str | None
     motion: bool
     progress: Progress
@@ -58,6 +63,11 @@ class Job:
     person: str = ""
     actor: Actor | None = None
     task: asyncio.Task[None] | None = None
+
+    @property
+    def title(self) -> str:
+        """What it is, in English."""
+        return self.title_text.words()
 
     async def wait(self) -> None:
         """Until the job has ended, however it ended."""
@@ -143,7 +153,7 @@ class JobRunner:
                 run as may.
         """
         if motion and drive is not None and (other := self.moving(drive)) is not None:
-            raise Busy("work.axis-already-moved", drive=drive, other_title=other.title)
+            raise Busy("work.axis-already-moved", drive=drive, other_title=other.title_text)
         if not motion and by_person:
             self._require_room(kind, drive)
         if motion and by_person and drive is not None:
@@ -151,7 +161,7 @@ class JobRunner:
         job = Job(
             id=f"{kind}-{self._run_mark}-{next(self._numbers)}",
             kind=kind,
-            title=as_text(title),
+            title_text=as_text(title),
             drive=drive,
             motion=motion,
             progress=Progress(lambda: self._tell(job)),

@@ -26,7 +26,7 @@ import types
 from pathlib import Path
 from typing import Any
 
-OURS = ("backend", "drivers", "profiles")
+OURS = ("backend", "drivers", "profiles", "texts")
 ABSENT = {"fcntl", "grp", "pty", "pwd", "resource", "termios", "tty"}
 LACKING = {
     "os": {

@@ -133,8 +133,8 @@ def part(progress: Progress, low: float, high: float, step: Text) -> Progress:
     """A step's own progress, shown as a part of the whole."""
 
     def told() -> None:
-        inner = own.step.words()
-        whole = joined((step, own.step), ": ") if inner else step
+        inner = own.step
+        whole = joined((step, own.step_text), ": ") if inner else step
         progress(low + (high - low) * own.fraction, whole)
 
     own = Progress(told)
