@@ -279,7 +279,8 @@ class Person:
         answer = await self.ask("PUT", f"/drives/{drive}/parameters/{spec.setting}", "write",
                                 json={"raw": raw})  # fmt: skip
         if answer is not None and answer.is_success:
-            self.tally.wrote(spec.name, spec.setting, raw)
+            # What was read back: somebody else's write may have come between.
+            self.tally.wrote(spec.name, spec.setting, answer.json()["raw"])
             if not spec.low <= raw <= spec.high:
                 self.judge.violated(f"{raw} was taken for {spec.setting}")
 
@@ -449,6 +450,7 @@ class Person:
     async def remove_and_add(self, axis: int) -> None:
         """Take an axis off the bench while others work with it, and put it back."""
         spec = self.station.specs[axis]
+        self.judge.troubled = max(self.judge.troubled, time.monotonic())
         answer = await self.ask("DELETE", f"/drives/{self.drives[axis]}", "remove")
         if answer is not None and answer.is_success:
             self.judge.end_claims(axis=axis, before=time.monotonic())

@@ -45,7 +45,7 @@ class AxisSpec:
 
 #: 6060h, 60FFh and the control word move every family (CiA 402-2 clause 8.4); DS_C has no 6060h.
 _STANDARD = (("6060:00", 3), ("60FF:00", 100_000), ("6040:00", 0x06), ("6040:00", 0x0F))
-_MMS7 = (*_STANDARD, ("2031:01", 1))
+_MMS7 = (*_STANDARD, ("2031:02", 1), ("2108:01", 1))
 _DS_C = _STANDARD[1:]
 #: The families of an EtherCAT segment; a seed takes three of them.
 _SEGMENT = (
