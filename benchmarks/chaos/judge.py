@@ -198,9 +198,10 @@ class Judge:
             name = self.station.specs[axis].name
             self.violated(f"axis {name} moves without a grant: {ago}", f"grant {axis}")
 
-    def stop_answered(self, verdicts: list[dict[str, Any]]) -> None:
+    def stop_answered(self, verdicts: list[dict[str, Any]], sent: float) -> None:
         """STOP's answer equals the shaft: the verdicts other than ``stopped``, as they arrive.
 
+        ``sent`` is the monotonic time at which STOP was pressed.
         (An axis that is said to stand has no time to brake any more, see `end_claims`.)
         """
         now = time.monotonic()
@@ -208,13 +209,13 @@ class Judge:
             for axis in [n for n, ids in self.ids.items() if verdict["drive"] in ids]:
                 if axis in self.unclear or now < self.blind or verdict["superseded"]:
                     continue
-                self._judge_verdict(axis, verdict, now)
+                self._judge_verdict(axis, verdict, now, sent)
 
-    def _judge_verdict(self, axis: int, verdict: dict[str, Any], now: float) -> None:
+    def _judge_verdict(self, axis: int, verdict: dict[str, Any], now: float, sent: float) -> None:
         name, said = self.station.specs[axis].name, verdict["verdict"]
         late = self._lateness()
         if said == "unreachable":
-            if now > self.troubled + _REASON_S + late:
+            if sent > self.troubled + _REASON_S + late:
                 self.violated(f"STOP: {name} is unreachable, and nothing is wrong: {verdict}")
             return
         recent = [t.position for t in tuple(self._history[axis])
@@ -239,6 +240,15 @@ class Judge:
                     f"{claim.what}, whose limit is {claim.travel_rev:.2f} rev",
                     f"envelope {id(claim)}",
                 )
+
+    @staticmethod
+    def starved_s() -> float:
+        """For how long, since the machine began, something waited for a processor [s]."""
+        try:
+            with Path("/proc/pressure/cpu").open() as file:
+                return float(file.readline().rpartition("total=")[2]) / 1e6
+        except (OSError, ValueError):
+            return 0.0
 
     def _lateness(self) -> float:
         """More time for a machine that has none to give: PSI of the last seconds."""

@@ -21,6 +21,8 @@ from benchmarks.chaos.station import PASSWORD, TrialStation
 JOG_BRAKE_S, JOB_BRAKE_S, SILENT_S = 1.0, 1.5, 2.0
 #: On a machine that has no time for it a write is noted this late.
 _NOTED_S = 5.0
+#: In the place of an axis that is off the bench.
+_GONE = "gone"
 JOG = {"speed": 300.0, "acceleration": 3000.0, "torque_limit": 200.0}
 
 
@@ -93,9 +95,8 @@ class Person:
         for axis, spec in enumerate(specs):
             if spec.name in known:
                 self.judge.ids[axis].add(known[spec.name])
-        # With one off the bench the places of the others would not be their axes.
-        complete = all(spec.name in known for spec in specs)
-        self.drives = [known[spec.name] for spec in specs] if complete else []
+        # With one off the bench the others keep their places.
+        self.drives = [known.get(spec.name, _GONE) for spec in specs]
 
     async def log_in(self, http: httpx.AsyncClient) -> bool:
         """The cookie; False where it is not given at present."""
@@ -186,7 +187,7 @@ class Person:
 
     async def act(self) -> None:
         """One random thing."""
-        if self.socket is None or not self.drives:
+        if self.socket is None or not self.drives or _GONE in self.drives:
             with contextlib.suppress(httpx.HTTPError, WebSocketException, OSError, TimeoutError):
                 await self.arrive()
             return
@@ -205,6 +206,8 @@ class Person:
 
     async def jog(self, axis: int) -> None:
         """Hold the button, well, badly, or let the line die while holding it."""
+        if not self.drives:
+            return  # a guest who was not let in
         drive, travel = self.drives[axis], self.random.choice([0.5, 3.0, 8.0])
         claim = self.judge.claim(axis, "jog", self.name, JOG_BRAKE_S, travel)
         await self.send(type="jog_start", drive=drive, direction=self.random.choice([-1, 1]),
@@ -305,7 +308,7 @@ class Person:
             if drive in result["stopped"]:
                 # STOP's answer is by the measured speed: it stands now.
                 self.judge.end_claims(axis=number, before=sent, stands=True)
-        self.judge.stop_answered(result["axes"])
+        self.judge.stop_answered(result["axes"], sent)
 
     async def lease(self, axis: int) -> None:
         drive = self.drives[axis]
