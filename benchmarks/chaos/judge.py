@@ -283,7 +283,9 @@ class Judge:
                 if self.station.down_since is None and time.monotonic() > self.pause_polling:
                     self.violated("the server does not answer although it should run", "dead")
                 continue
-            took = time.monotonic() - began - (self.station.waited_s() - waited)
+            # A process that was killed meanwhile takes its share of the sum with it.
+            waited = max(0.0, self.station.waited_s() - waited)
+            took = time.monotonic() - began - waited
             if time.monotonic() < self.pause_polling or self.station.down_since is not None:
                 continue
             self.answered("GET", "/drives", answer.status_code, answer.text)
