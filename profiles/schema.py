@@ -360,7 +360,10 @@ class Signal(Frozen):
 
 UnitOrigin = Literal["manual", "makers_file", "standard"]
 #: Objects of CiA 402-2 that state units and the encoder's resolution, in any drive that has them.
-SCALE_KEYS = ("60A8:00", "60A9:00", "60AA:00", "608F:01", "608F:02")
+SCALE_KEYS = (
+    "60A8:00", "60A9:00", "60AA:00", "608F:01", "608F:02", "6090:01", "6090:02", "6096:01",
+    "6096:02", "6097:01", "6097:02",
+)  # fmt: skip
 
 
 class UnitSpec(Frozen):

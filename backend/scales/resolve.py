@@ -21,6 +21,11 @@ from profiles.si_unit import SiUnit, decode_si_unit
 #: Objects of the standard that state units and resolution; read where the profile has them.
 SI_POSITION, SI_VELOCITY, SI_ACCELERATION = "60A8:00", "60A9:00", "60AA:00"
 _RESOLUTION, _RESOLUTION_REVS = "608F:01", "608F:02"
+#: The encoder that speeds are counted with, and factors of the maker's units (CiA 402-2 clause 10).
+_SPEED_RESOLUTION, _SPEED_RESOLUTION_REVS = "6090:01", "6090:02"
+_FACTORS = {
+    Quantity.VELOCITY: ("6096:01", "6096:02"), Quantity.ACCELERATION: ("6097:01", "6097:02"),
+}  # fmt: skip
 _ORIGINS = {"manual": Origin.MANUAL, "makers_file": Origin.MAKERS_FILE, "standard": Origin.UNKNOWN}
 #: Beyond this difference two statements of one resolution are two.
 _SAME = 1e-3
@@ -47,6 +52,7 @@ def stating_keys(drive: Drive) -> tuple[str, ...]:
     spec, known = drive.profile.units, drive.profile.by_key
     keys = [spec.gear_numerator, spec.gear_denominator, spec.feed, spec.feed_revolutions]
     keys += [_RESOLUTION, _RESOLUTION_REVS, SI_POSITION, SI_VELOCITY, SI_ACCELERATION]
+    keys += [_SPEED_RESOLUTION, _SPEED_RESOLUTION_REVS, *sum(_FACTORS.values(), ())]
     return tuple(
         dict.fromkeys(
             key
@@ -171,6 +177,8 @@ def _rate(
     if said is not None and taught is not None:
         origin = Origin.MEASURED if fast and said.velocity_origin == "measured" else Origin.USER
         return Scale(quantity, taught, unit.name if unit else "", origin)
+    if (other := _other_factor(told, quantity)) is not None:
+        return _doubtful(quantity, Doubt.FACTOR, unit.name if unit else text, other)
     if code is not None:
         source = f"{_shown(key)} = {code:08X}h"
         if unit is None:
@@ -180,6 +188,25 @@ def _rate(
     if origin is Origin.UNKNOWN:
         return _doubtful(quantity, Doubt.NOT_STATED)
     return by_text(quantity, text, per_rev, origin, spec)
+
+
+def _other_factor(told: Told, quantity: Quantity) -> str | None:
+    """The object that says that raw values are not simply the stated unit; None without one.
+
+    6090h beside another 608Fh, or a factor of 6096h or 6097h that is not 1: whether a drive
+    calculates with them, and before or behind its stated unit, is the maker's choice.
+    """
+    first, second = _FACTORS[quantity]
+    numerator, divisor = told.get(first), told.get(second) or 1
+    if numerator is not None and abs(numerator / divisor - 1.0) > _SAME:
+        return _shown(first)
+    speed, counts = told.get(_SPEED_RESOLUTION), _resolution(told)
+    if speed is None or counts is None or quantity is not Quantity.VELOCITY:
+        return None
+    by_speed = speed / (told.get(_SPEED_RESOLUTION_REVS) or 1)
+    if abs(by_speed - counts) <= _SAME * counts:
+        return None
+    return _joined([_shown(_SPEED_RESOLUTION), _shown(_RESOLUTION)])
 
 
 def _by_rate_unit(

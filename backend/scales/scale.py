@@ -52,6 +52,8 @@ class Doubt(StrEnum):
     """The unit counts turns, and 6091h holds a gear: of which shaft is not said."""
     NEEDS_RESOLUTION = "needs_resolution"
     """The unit counts increments, of which it is not known how many make a revolution."""
+    FACTOR = "factor"
+    """6090h is another encoder than 608Fh, or 6096h or 6097h holds a factor."""
 
 
 _WHY: Mapping[Doubt, str] = {
@@ -64,6 +66,8 @@ _WHY: Mapping[Doubt, str] = {
     Doubt.UNREADABLE: "the unit that the drive or its description states is not known here",
     Doubt.BEHIND_GEAR: "it counts turns, and 6091h holds a gear: of which shaft is not said",
     Doubt.NEEDS_RESOLUTION: "it counts increments, and increments per revolution are unknown",
+    Doubt.FACTOR: "6090h is another resolution than 608Fh, or 6096h or 6097h holds a factor: what "
+    "the drive makes of it is not said",
 }
 
 

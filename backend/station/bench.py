@@ -251,6 +251,8 @@ class Bench:
         self.motion.require_idle(member)
         self.exchanges.require_idle_but(member)
         with self.motion.parting(member):
+            # What STOP still has to do is done, and whoever pressed it gets the verdict.
+            await self.motion.standstill([drive_id])
             await self.motion.end_watches(drive_id)
             await self.motion.let_go_of(member)
             for url, session in list(self.sessions.items()):

@@ -194,10 +194,17 @@ class Motion:
     async def standstill(self, drive_ids: Sequence[str]) -> list[AxisStop]:
         """What the last STOP of these drives has reached; waits for verdicts that are due.
 
-        Drives that were never stopped are left out. May take some seconds.
+        Drives that were never stopped are left out. One that is taken off the bench meanwhile
+        was not seen to stand, and is told so. May take some seconds.
         """
-        watches = [self._watches[each] for each in drive_ids if each in self._watches]
-        return list(await asyncio.gather(*(asyncio.shield(watch) for watch in watches)))
+        watches = {each: self._watches[each] for each in drive_ids if each in self._watches}
+        if watches:
+            # Not gathered: a watch that is ended with its drive must not end the others' answer.
+            await asyncio.wait(watches.values())
+        return [
+            _unseen(drive_id) if watch.cancelled() else watch.result()
+            for drive_id, watch in watches.items()
+        ]
 
     def stopping(self, drive_id: str) -> bool:
         """Whether a STOP of this axis is being watched."""
@@ -236,3 +243,9 @@ class Motion:
     async def let_go_of_all(self) -> None:
         """Take the power off every axis of the bench, all at once; never raises."""
         await asyncio.gather(*(self.let_go_of(member) for member in self._bench.members.values()))
+
+
+def _unseen(drive_id: str) -> AxisStop:
+    """Of an axis whose watch was ended before it had a verdict."""
+    why = "it was taken off the bench before it was seen to stand"
+    return AxisStop(drive_id, Verdict.UNREACHABLE, 0.0, problem=why)

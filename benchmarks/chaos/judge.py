@@ -16,6 +16,12 @@ from benchmarks.chaos.station import PASSWORD, TrialStation, Truth
 
 #: An axis that moves more than this within `_WINDOW_S` is moving.
 _MOVES_REV, _WINDOW_S = 0.02, 0.12
+#: After the end of a grant: the ramp of the gentlest motion of the trial, and a watchdog before it.
+GRANT_BRAKE_S = 2.5
+#: "unreachable" needs a reason that is not older than this: a mute drive, a cable, a busy bus.
+_REASON_S = 5.0
+#: A verdict that says it moves is of a shaft that moved within this time before the answer.
+_SAID_S = 1.0
 #: Greatest answer time of GET /drives, and its p99 where the machine had time.
 SLOWEST_S, P99_S = 2.0, 0.05
 _BAD_LOG = re.compile(
@@ -76,6 +82,10 @@ class Judge:
         self.blind = 0.0
         self._lagging = 0.0
         self._log_at = 0
+        #: Ids that the server has given to each axis, as a page saw them.
+        self.ids: dict[int, set[str]] = defaultdict(set)
+        #: When the last trouble was made or healed.
+        self.troubled = 0.0
 
     def start(self) -> None:
         self._thread.start()
@@ -164,6 +174,7 @@ class Judge:
             return
         late = self._lateness()
         now = truth.wall_s - _WINDOW_S
+        self._judge_grant(axis, now, late)
         if any(c.ends is None or now < c.ends + c.brake_s + late for c in claims):
             return
         last = max((c for c in claims), key=lambda c: c.ends or 0.0, default=None)
@@ -177,6 +188,42 @@ class Judge:
                 turns = each.position / self.counts[axis]
                 self._say(f"    {each.wall_s - now:+.3f} s: {turns:.3f} rev"
                           f"{', enabled' if each.enabled else ''}")  # fmt: skip
+
+    def _judge_grant(self, axis: int, now: float, late: float) -> None:
+        """No axis turns without a grant of the motion authority, but for its ramp."""
+        live = [self.station.grants.last_live(drive) for drive in tuple(self.ids[axis])]
+        last = max(live, default=-1.0)
+        if now > last + GRANT_BRAKE_S + late:
+            ago = "there was none" if last < 0 else f"the last one ended {now - last:.2f} s ago"
+            name = self.station.specs[axis].name
+            self.violated(f"axis {name} moves without a grant: {ago}", f"grant {axis}")
+
+    def stop_answered(self, verdicts: list[dict[str, Any]], sent: float) -> None:
+        """STOP's answer equals the shaft: the verdicts other than ``stopped``, as they arrive.
+
+        ``sent`` is the monotonic time at which STOP was pressed.
+        (An axis that is said to stand has no time to brake any more, see `end_claims`.)
+        """
+        now = time.monotonic()
+        for verdict in verdicts:
+            for axis in [n for n, ids in self.ids.items() if verdict["drive"] in ids]:
+                if axis in self.unclear or now < self.blind or verdict["superseded"]:
+                    continue
+                self._judge_verdict(axis, verdict, now, sent)
+
+    def _judge_verdict(self, axis: int, verdict: dict[str, Any], now: float, sent: float) -> None:
+        name, said = self.station.specs[axis].name, verdict["verdict"]
+        late = self._lateness()
+        if said == "unreachable":
+            if sent > self.troubled + _REASON_S + late:
+                self.violated(f"STOP: {name} is unreachable, and nothing is wrong: {verdict}")
+            return
+        recent = [t.position for t in tuple(self._history[axis])
+                  if now - t.wall_s < _SAID_S + late]  # fmt: skip
+        if said == "stopped" or len(recent) < 5:
+            return
+        if max(recent) - min(recent) < _MOVES_REV * self.counts[axis]:
+            self.violated(f"STOP: {name} is said to move, and it stands: {verdict}")
 
     def _judge_envelope(self, axis: int, truth: Truth, claims: list[Claim]) -> None:
         for claim in claims:
@@ -193,6 +240,15 @@ class Judge:
                     f"{claim.what}, whose limit is {claim.travel_rev:.2f} rev",
                     f"envelope {id(claim)}",
                 )
+
+    @staticmethod
+    def starved_s() -> float:
+        """For how long, since the machine began, something waited for a processor [s]."""
+        try:
+            with Path("/proc/pressure/cpu").open() as file:
+                return float(file.readline().rpartition("total=")[2]) / 1e6
+        except (OSError, ValueError):
+            return 0.0
 
     def _lateness(self) -> float:
         """More time for a machine that has none to give: PSI of the last seconds."""
@@ -227,7 +283,9 @@ class Judge:
                 if self.station.down_since is None and time.monotonic() > self.pause_polling:
                     self.violated("the server does not answer although it should run", "dead")
                 continue
-            took = time.monotonic() - began - (self.station.waited_s() - waited)
+            # A process that was killed meanwhile takes its share of the sum with it.
+            waited = max(0.0, self.station.waited_s() - waited)
+            took = time.monotonic() - began - waited
             if time.monotonic() < self.pause_polling or self.station.down_since is not None:
                 continue
             self.answered("GET", "/drives", answer.status_code, answer.text)

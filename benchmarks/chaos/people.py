@@ -21,6 +21,8 @@ from benchmarks.chaos.station import PASSWORD, TrialStation
 JOG_BRAKE_S, JOB_BRAKE_S, SILENT_S = 1.0, 1.5, 2.0
 #: On a machine that has no time for it a write is noted this late.
 _NOTED_S = 5.0
+#: In the place of an axis that is off the bench.
+_GONE = "gone"
 JOG = {"speed": 300.0, "acceleration": 3000.0, "torque_limit": 200.0}
 
 
@@ -63,6 +65,7 @@ class Person:
         self.drives: list[str] = []
         self.jogs: dict[int, Claim] = {}
         self._tasks: list[asyncio.Task[None]] = []
+        self._stop_sent = 0.0
 
     # --- the page ---------------------------------------------------------------------
 
@@ -88,7 +91,12 @@ class Person:
         ]  # fmt: skip
         listed = await self.http.get("/drives")
         known = {row["name"]: row["id"] for row in listed.json()}
-        self.drives = [known[spec.name] for spec in self.station.specs if spec.name in known]
+        specs = self.station.specs
+        for axis, spec in enumerate(specs):
+            if spec.name in known:
+                self.judge.ids[axis].add(known[spec.name])
+        # With one off the bench the others keep their places.
+        self.drives = [known.get(spec.name, _GONE) for spec in specs]
 
     async def log_in(self, http: httpx.AsyncClient) -> bool:
         """The cookie; False where it is not given at present."""
@@ -143,6 +151,8 @@ class Person:
         if problem and problem["status"] == 500 and problem["type"] == "urn:servodeck:internal":
             self.judge.violated(f"{message['type']}: internal error: {problem['detail']}",
                                 problem["detail"][:60])  # fmt: skip
+        if message["type"] == "stop_result":
+            self._stop_answered(message["result"], self._stop_sent)
         if message["type"] == "job" and message["job"]["state"] != "running":
             with self.judge._lock:
                 for claim in self.judge.claims:
@@ -177,7 +187,7 @@ class Person:
 
     async def act(self) -> None:
         """One random thing."""
-        if self.socket is None or not self.drives:
+        if self.socket is None or not self.drives or _GONE in self.drives:
             with contextlib.suppress(httpx.HTTPError, WebSocketException, OSError, TimeoutError):
                 await self.arrive()
             return
@@ -188,7 +198,7 @@ class Person:
             (2, self.read_all), (1, self.record), (2, self.cyclic), (1, self.measure),
             (1, self.reset), (1, self.generate), (1, self.load_set), (1, self.nonsense),
             (1, self.cancel), (1, self.reload), (1, self.look), (1, self.remove_and_add),
-            (1, self.invite),
+            (1, self.invite), (2, self.energise),
         ]  # fmt: skip
         action = self.random.choices([a for _, a in actions], [w for w, _ in actions])[0]
         self.say(f"{self.name}: {action.__name__} {self.station.specs[axis].name}")
@@ -196,6 +206,8 @@ class Person:
 
     async def jog(self, axis: int) -> None:
         """Hold the button, well, badly, or let the line die while holding it."""
+        if not self.drives:
+            return  # a guest who was not let in
         drive, travel = self.drives[axis], self.random.choice([0.5, 3.0, 8.0])
         claim = self.judge.claim(axis, "jog", self.name, JOG_BRAKE_S, travel)
         await self.send(type="jog_start", drive=drive, direction=self.random.choice([-1, 1]),
@@ -270,7 +282,8 @@ class Person:
         answer = await self.ask("PUT", f"/drives/{drive}/parameters/{spec.setting}", "write",
                                 json={"raw": raw})  # fmt: skip
         if answer is not None and answer.is_success:
-            self.tally.wrote(spec.name, spec.setting, raw)
+            # What was read back: somebody else's write may have come between.
+            self.tally.wrote(spec.name, spec.setting, answer.json()["raw"])
             if not spec.low <= raw <= spec.high:
                 self.judge.violated(f"{raw} was taken for {spec.setting}")
 
@@ -278,6 +291,7 @@ class Person:
         sent = time.monotonic()
         which = self.drives[axis] if self.random.random() < 0.5 else None
         if self.random.random() < 0.5:
+            self._stop_sent = sent
             await self.send(type="stop", drive=which)
             if self.mute or self.socket is None:
                 return
@@ -287,10 +301,14 @@ class Person:
         answer = await self.ask("POST", "/stop", "stop", json={"drive": which})
         if answer is None or not answer.is_success:
             return
+        self._stop_answered(answer.json(), sent)
+
+    def _stop_answered(self, result: dict[str, Any], sent: float) -> None:
         for number, drive in enumerate(self.drives):
-            if drive in answer.json()["stopped"]:
+            if drive in result["stopped"]:
                 # STOP's answer is by the measured speed: it stands now.
                 self.judge.end_claims(axis=number, before=sent, stands=True)
+        self.judge.stop_answered(result["axes"], sent)
 
     async def lease(self, axis: int) -> None:
         drive = self.drives[axis]
@@ -358,8 +376,25 @@ class Person:
         await self.ask(
             "POST", f"/drives/{self.drives[axis]}/jobs/move", "nonsense", json={"mode": 1}
         )
-        await self.ask("PUT", f"/drives/{self.drives[axis]}/parameters/6040:00", "control word",
-                       json={"raw": 15})  # fmt: skip
+
+    async def energise(self, axis: int) -> None:
+        """What enables or moves an axis, as parameters: refused, in whatever order."""
+        spec, drive = self.station.specs[axis], self.drives[axis]
+        values = {key: {"raw": raw} for key, raw in spec.energising}
+        if self.random.random() < 0.5:
+            for key, value in values.items():
+                answer = await self.ask("PUT", f"/drives/{drive}/parameters/{key}", "energise",
+                                        json=value)  # fmt: skip
+                if answer is not None and answer.is_success:
+                    self.judge.violated(f"{spec.name}: {key} was written as a parameter")
+            return
+        answer = await self.ask("PUT", f"/drives/{drive}/parameters", "energise all",
+                                json={"values": values})  # fmt: skip
+        written = [] if answer is None or not answer.is_success else [
+            row["key"] for row in answer.json() if row["ok"]
+        ]  # fmt: skip
+        if written:
+            self.judge.violated(f"{spec.name}: {written} were written as parameters")
 
     async def cancel(self, _axis: int) -> None:
         answer = await self.ask("GET", "/jobs", "jobs")
@@ -418,6 +453,7 @@ class Person:
     async def remove_and_add(self, axis: int) -> None:
         """Take an axis off the bench while others work with it, and put it back."""
         spec = self.station.specs[axis]
+        self.judge.troubled = max(self.judge.troubled, time.monotonic())
         answer = await self.ask("DELETE", f"/drives/{self.drives[axis]}", "remove")
         if answer is not None and answer.is_success:
             self.judge.end_claims(axis=axis, before=time.monotonic())

@@ -4,6 +4,7 @@
 
     python -m benchmarks.chaos.server --state DIR --wires JSON
 
+(with ``--grants FD`` each begin and end of a grant is written there, see `benchmarks.chaos.grants`)
 prints ``{"port": N}``, then takes one JSON command per line: ``tell`` (tasks and threads),
 ``jump`` (the wall clock, by seconds), and ends in order when its standard input closes.
 """
@@ -13,6 +14,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
+import os
 import sys
 import threading
 import time
@@ -77,7 +79,16 @@ async def _tasks() -> list[str]:
     return sorted(task.get_name() for task in asyncio.all_tasks())
 
 
-async def _serve(state: Path, wires: dict[str, dict[str, Any]]) -> None:
+def _report_grants(bench: Bench, pipe: int) -> None:
+    def changed(drive: str) -> None:
+        live = bench.authority.grant_of(drive) is not None
+        line = {"at": time.monotonic(), "drive": drive, "live": live}
+        os.write(pipe, json.dumps(line).encode() + b"\n")
+
+    bench.authority.listen(changed)
+
+
+async def _serve(state: Path, wires: dict[str, dict[str, Any]], grants: int) -> None:
     cheap = Passwords(PasswordHasher(time_cost=1, memory_cost=8, parallelism=1))
     people = People(state, accounts_needed=True, passwords=cheap)
     await people.open()
@@ -85,6 +96,7 @@ async def _serve(state: Path, wires: dict[str, dict[str, Any]]) -> None:
         if not any(account.name == name for account in people.accounts.directory.all()):
             await people.accounts.add(name, PASSWORD, role)
     bench = Bench(state, {name: _wire(name, facts) for name, facts in wires.items()})
+    _report_grants(bench, grants)
     listening = _listen("127.0.0.1", 0)
     server = uvicorn.Server(_config(bench, people, Serving(accounts=True), None))
     serving = asyncio.create_task(server.serve(sockets=[listening]))
@@ -101,9 +113,10 @@ def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("--state", type=Path, required=True)
     parser.add_argument("--wires", required=True)
+    parser.add_argument("--grants", type=int, required=True, help="file descriptor")
     options = parser.parse_args()
     try:
-        asyncio.run(_serve(options.state, json.loads(options.wires)))
+        asyncio.run(_serve(options.state, json.loads(options.wires), options.grants))
     except DriveError as error:
         print(error.message, file=sys.stderr)
         return 1

@@ -19,6 +19,7 @@ from typing import Any
 import httpx
 
 from backend.station.demo import DemoBench
+from benchmarks.chaos.grants import GrantLog
 from drivers import cia402
 from drivers.errors import DriveError
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
@@ -29,26 +30,52 @@ PASSWORD = "eleven blue horses"
 
 @dataclass(frozen=True)
 class AxisSpec:
-    """A drive of the trial. ``setting`` is a parameter that people change, with legal bounds."""
+    """A drive of the trial. ``setting`` is a parameter that people change, with legal bounds.
+
+    ``energising`` are objects that move or enable this family, with raw values that do it.
+    """
 
     name: str
     family: str
     setting: str
     low: int
     high: int
+    energising: tuple[tuple[str, int], ...] = ()
 
 
-SPECS: dict[str, tuple[AxisSpec, ...]] = {
+#: 6060h, 60FFh and the control word move every family (CiA 402-2 clause 8.4); DS_C has no 6060h.
+_STANDARD = (("6060:00", 3), ("60FF:00", 100_000), ("6040:00", 0x06), ("6040:00", 0x0F))
+_MMS7 = (*_STANDARD, ("2031:02", 1), ("2108:01", 1))
+_DS_C = _STANDARD[1:]
+#: The families of an EtherCAT segment; a seed takes three of them.
+_SEGMENT = (
+    AxisSpec("A", "mms7", "2005:03", 500, 3000, _MMS7),
+    AxisSpec("B", "m6l", "2008:01", 150, 400, (*_STANDARD, ("2003:02", 17), ("2003:0F", 3),
+                                              ("200C:01", 4))),
+    AxisSpec("C", "r6l", "2006:01", 200, 500, (*_STANDARD, ("200C:0B", 1), ("200C:0C", 1))),
+    AxisSpec("D", "ep3e", "2005:00", 20, 60, (*_STANDARD, ("60FE:01", 0), ("60FE:02", 1))),
+)  # fmt: skip
+_LINES: dict[str, tuple[AxisSpec, ...]] = {
     "mlink": (
-        AxisSpec("A", "mms7", "2005:03", 500, 3000), AxisSpec("B", "mms7", "2005:03", 500, 3000),
+        AxisSpec("A", "mms7", "2005:03", 500, 3000, _MMS7),
+        AxisSpec("B", "mms7", "2005:03", 500, 3000, _MMS7),
     ),
-    "canopen": (AxisSpec("A", "ds_c", "2502:00", 1, 50),),
-    "modbus": (AxisSpec("A", "ds_c", "2502:00", 1, 50), AxisSpec("B", "ds_c", "2502:00", 1, 50)),
-    "ethercat": (
-        AxisSpec("A", "mms7", "2005:03", 500, 3000), AxisSpec("B", "r6l", "2006:01", 200, 500),
-        AxisSpec("C", "ep3e", "2005:00", 20, 60),
+    "canopen": (AxisSpec("A", "ds_c", "2502:00", 1, 50, _DS_C),),
+    "modbus": (
+        AxisSpec("A", "ds_c", "2502:00", 1, 50, _DS_C),
+        AxisSpec("B", "ds_c", "2502:00", 1, 50, _DS_C),
     ),
-}  # fmt: skip
+}
+BUSES = (*_LINES, "ethercat")
+
+
+def specs_of(bus: str, seed: int) -> tuple[AxisSpec, ...]:
+    """The drives of a trial: on EtherCAT three of the four families, by the seed."""
+    if bus != "ethercat":
+        return _LINES[bus]
+    # Seed 1 leaves the EP3E out, 2 the MMS7, 3 the M6-L, 4 the R6L.
+    left_out = (seed + 2) % len(_SEGMENT)
+    return tuple(spec for place, spec in enumerate(_SEGMENT) if place != left_out)
 
 
 @dataclass(frozen=True)
@@ -64,8 +91,8 @@ class Truth:
 class TrialStation:
     """Server and drives of one bus, and the ways to hurt them."""
 
-    def __init__(self, folder: Path, bus: str) -> None:
-        self.bus, self.url, self.specs = bus, f"{bus}://virtual0", SPECS[bus]
+    def __init__(self, folder: Path, bus: str, specs: tuple[AxisSpec, ...]) -> None:
+        self.bus, self.url, self.specs = bus, f"{bus}://virtual0", specs
         self.folder = folder
         folder.mkdir(parents=True, exist_ok=True)
         bench = folder / "bench.toml"
@@ -83,6 +110,7 @@ class TrialStation:
         self.port = 0
         self.down_since: float | None = None
         self._asking, self._telling = threading.Lock(), threading.Lock()
+        self.grants = GrantLog()
         self._own_status = {s.name: s.family == "ds_c" for s in self.specs}
 
     @property
@@ -106,11 +134,15 @@ class TrialStation:
     def start_server(self) -> None:
         """Raises RuntimeError when it does not start."""
         log = self.log.open("a")
+        writes = self.grants.anew()
         self.process = subprocess.Popen(
             [sys.executable, "-m", "benchmarks.chaos.server", "--state",
-             str(self.folder / "state"), "--wires", json.dumps(self._wires())],
+             str(self.folder / "state"), "--wires", json.dumps(self._wires()),
+             "--grants", str(writes)],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True,
+            pass_fds=(writes,),
         )  # fmt: skip
+        os.close(writes)
         log.close()
         assert self.process.stdout is not None
         line = self.process.stdout.readline()
@@ -206,6 +238,7 @@ class TrialStation:
             with contextlib.suppress(OSError):
                 self.process.send_signal(signal.SIGCONT)
             self.end_server()
+        self.grants.close()
         self.drives.stop()
 
     # --- trouble and truth ------------------------------------------------------------

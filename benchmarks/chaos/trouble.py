@@ -49,7 +49,12 @@ class Troubles:
         trouble = self.random.choice(self.kinds())
         name = getattr(trouble, "__name__", "?")
         self._say(f"trouble: {name} for {seconds:.2f} s")
-        await trouble(seconds)
+        # Until it is over the reason does not grow old.
+        self.judge.troubled = float("inf")
+        try:
+            await trouble(seconds)
+        finally:
+            self.judge.troubled = time.monotonic()
         self._say(f"trouble: {name} is over")
 
     def _axis(self) -> int:

@@ -1,18 +1,22 @@
 """STOP out of every kind of motion on every family, as a table.
 
-    python -m benchmarks.stopping [--family m6l …] [--markdown]
+    python -m benchmarks.stopping [--vertical] [--family m6l …] [--markdown]
 
+With ``--vertical`` a load that gravity pulls, with a holding brake (`vertical`).
 Exits with 1 where a shaft goes on, or where STOP's answer is not what the shaft does.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 from benchmarks.stopping.cells import Outcome, cells, run_cell
 from benchmarks.stopping.motions import FAMILIES
+from benchmarks.stopping.vertical import Sinking, run_vertical, vertical_cells
 
+_Cell = TypeVar("_Cell", Outcome, Sinking)
 _NAMES = {"mms7": "MMS7", "m6l": "M6-L", "r6l": "R6L", "ep3e": "EP3E", "ds_c": "DS_C"}
 
 
@@ -21,7 +25,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--family", nargs="+", default=list(FAMILIES), choices=FAMILIES)
     parser.add_argument("--markdown", action="store_true", help="as docs/safety.md has it")
+    parser.add_argument("--vertical", action="store_true", help="under gravity, with a brake")
     wanted = parser.parse_args()
+    if wanted.vertical:
+        return _vertical(tuple(wanted.family), markdown=wanted.markdown)
     found = []
     for cell in cells(tuple(wanted.family)):
         try:
@@ -39,6 +46,29 @@ def main() -> int:
     return 1 if bad else 0
 
 
+def _vertical(families: tuple[str, ...], *, markdown: bool) -> int:
+    found = []
+    for cell in vertical_cells(families):
+        found.append(one := run_vertical(*cell))
+        if not markdown:
+            mark = "" if one.held else "  <-- finding"
+            print(f"{_NAMES[one.family]:5} {one.motion:19} {one.trouble:18} {_sinking(one)}{mark}",
+                  flush=True)  # fmt: skip
+    if markdown:
+        print(_markdown(found, families, _sinking))
+    bad = [each for each in found if not each.held]
+    print(f"\n{len(found)} cells, {len(bad)} findings")
+    return 1 if bad else 0
+
+
+def _sinking(o: Sinking) -> str:
+    if o.stood_s is None:
+        return f"**{o.verdict}, falls**"
+    lead = "stays on" if o.lead_s is None else f"{o.lead_s * 1e3:.0f} ms"
+    sank = f"sinks {o.sank_deg:.2f}°"
+    return f"{o.stood_s:.2f} s, {sank if o.held else f'**{sank}**'}, {lead}"
+
+
 def _line(o: Outcome) -> str:
     stood = "turns on" if o.stood_s is None else f"{o.stood_s:.2f} s"
     mark = "" if o.held else "  <-- finding"
@@ -50,7 +80,13 @@ def _line(o: Outcome) -> str:
 
 def table(found: Sequence[Outcome]) -> str:
     """Markdown: a row for each motion and trouble, a column for each family."""
-    families = [f for f in FAMILIES if any(o.family == f for o in found)]
+    return _markdown(found, FAMILIES, _cell)
+
+
+def _markdown(
+    found: Sequence[_Cell], families: Sequence[str], words: Callable[[_Cell], str]
+) -> str:
+    families = [f for f in families if any(o.family == f for o in found)]
     rows = list(dict.fromkeys((o.motion, o.trouble) for o in found))
     by_cell = {(o.family, o.motion, o.trouble): o for o in found}
     lines = [
@@ -58,14 +94,13 @@ def table(found: Sequence[Outcome]) -> str:
         "| --- | --- |" + " --- |" * len(families),
     ]
     for motion, trouble in rows:
-        texts = [_cell(by_cell.get((family, motion, trouble))) for family in families]
+        cells = [by_cell.get((family, motion, trouble)) for family in families]
+        texts = ["–" if cell is None else words(cell) for cell in cells]
         lines.append(f"| {motion} | {trouble} | " + " | ".join(texts) + " |")
     return "\n".join(lines)
 
 
-def _cell(o: Outcome | None) -> str:
-    if o is None:
-        return "–"
+def _cell(o: Outcome) -> str:
     if o.stood_s is None:
         return f"**{o.verdict}**"
     return f"{o.stood_s:.2f} s, {o.degrees:.0f}°" + (

@@ -23,7 +23,7 @@ _PV, _PT, _HM, _CSV, _CST = 3, 4, 6, 9, 10
 ENVELOPE = Envelope(1000.0, 2 * SPEED_RPM, 100.0, 60.0)
 
 
-async def _enable(rig: Rig, mode: int) -> None:
+async def enable(rig: Rig, mode: int) -> None:
     """As any other tool does it: past the server."""
     rig.poke("6060:00", mode)
     for word in (6, 7, 15):
@@ -31,14 +31,14 @@ async def _enable(rig: Rig, mode: int) -> None:
         await asyncio.sleep(_WORD_S)
 
 
-async def _ramps(rig: Rig) -> None:
+async def set_ramps(rig: Rig) -> None:
     units = await rig.member.axis.units()
     for key in ("6083:00", "6084:00", "6085:00"):
         if key in rig.device.profile.by_key:
             rig.poke(key, units.acceleration_raw(_RAMP_RPM_S))
 
 
-def _mode(rig: Rig, *modes: int) -> int:
+def mode_of(rig: Rig, *modes: int) -> int:
     """The first that the family has: an EP3E has cyclic modes alone."""
     return next(mode for mode in modes if mode in rig.device.profile.supported_modes)
 
@@ -46,9 +46,9 @@ def _mode(rig: Rig, *modes: int) -> int:
 async def profile_velocity(rig: Rig) -> None:
     """60FFh, by another tool."""
     units = await rig.member.axis.units()
-    await _ramps(rig)
+    await set_ramps(rig)
     rig.poke("60FF:00", 0)
-    await _enable(rig, _mode(rig, _PV, _CSV))
+    await enable(rig, mode_of(rig, _PV, _CSV))
     rig.poke("60FF:00", units.velocity_raw(SPEED_RPM))
     await rig.until_rpm(0.9 * SPEED_RPM)
 
@@ -56,9 +56,9 @@ async def profile_velocity(rig: Rig) -> None:
 async def torque(rig: Rig) -> None:
     """6071h, until the axis is fast."""
     units = await rig.member.axis.units()
-    await _ramps(rig)
+    await set_ramps(rig)
     rig.poke("6071:00", 0)
-    await _enable(rig, _mode(rig, _PT, _CST))
+    await enable(rig, mode_of(rig, _PT, _CST))
     rig.poke("6071:00", units.torque_raw(_TORQUE_PERCENT))
     await rig.until_rpm(0.9 * SPEED_RPM, 6.0)
     # About what friction takes, for as long as the monitor needs to see the mode.
@@ -69,13 +69,13 @@ async def torque(rig: Rig) -> None:
 async def homing(rig: Rig) -> None:
     """Method 17 or 18 searches a limit switch that does not come."""
     units = await rig.member.axis.units()
-    await _ramps(rig)
+    await set_ramps(rig)
     by_key = rig.device.profile.by_key
     rig.poke("6098:00", 18)
     rig.poke("6099:01", units.velocity_raw_of(by_key["6099:01"], SPEED_RPM))
     if "609A:00" in by_key:
         rig.poke("609A:00", units.acceleration_raw(_RAMP_RPM_S))
-    await _enable(rig, _HM)
+    await enable(rig, _HM)
     rig.poke("6040:00", 0x1F)
     await rig.until_rpm(0.9 * SPEED_RPM)
 
@@ -150,7 +150,7 @@ async def own_homing(rig: Rig) -> None:
 async def identification(rig: Rig) -> None:
     """MMS7 bit 11 of the control word, R6L P12.11, M6-L P09.00."""
     if rig.family == "mms7":
-        await _enable(rig, _PV)
+        await enable(rig, _PV)
         rig.poke("6040:00", 0x80F)
     else:
         rig.poke("200C:0C" if rig.family == "r6l" else "2009:01", 1)

@@ -124,3 +124,23 @@ class StartsWithNetwork(Protocol):
 
     def network_started(self) -> None:
         """The EtherCAT state machine went from Init to Pre-Operational."""
+
+
+@runtime_checkable
+class HasShaft(Protocol):
+    """A device with a motor, whose shaft can be looked at past every object and unit."""
+
+    @property
+    def shaft_rev(self) -> float:
+        """Angle of the motor's shaft in revolutions, as physics has it."""
+
+
+def shaft_rev(device: Device) -> float:
+    """Angle of this device's shaft.
+
+    Raises:
+        ValueError: it has none.
+    """
+    if not isinstance(device, HasShaft):
+        raise ValueError("this device has no shaft")  # noqa: TRY004 - of a command by name
+    return device.shaft_rev

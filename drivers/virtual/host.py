@@ -25,7 +25,7 @@ from typing import Protocol
 from drivers.errors import DriveError
 from drivers.urls import parse_url
 from drivers.virtual.bench import AxisSpec, BenchSpec, load_bench
-from drivers.virtual.device import Device, SdoAbort
+from drivers.virtual.device import Device, SdoAbort, shaft_rev
 from drivers.virtual.firmware.factory import make_device, number_device
 from drivers.virtual.shared import SharedDevice
 from drivers.virtual.wires.can_wire import CanWire
@@ -163,6 +163,7 @@ class Wires:
             "power_cycle": self._power_cycle,
             "inject": self._inject,
             "read": self._read,
+            "shaft": self._shaft,
         }
         action = actions.get(str(command.get("do")))
         if action is None:
@@ -226,6 +227,13 @@ class Wires:
             device = self._axis(command)
             device.advance(time.monotonic_ns())
             return device.read(index, subindex).hex()
+
+    def _shaft(self, command: dict[str, object]) -> float:
+        """The shaft's angle in revolutions, past every wire and unit."""
+        with self._lock:
+            device = self._axis(command)
+            device.advance(time.monotonic_ns())
+            return shaft_rev(device)
 
 
 def main(argv: list[str] | None = None) -> int:

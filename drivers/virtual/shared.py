@@ -5,7 +5,13 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 
-from drivers.virtual.device import Device, EntryInfo, ProcessImage, StartsWithNetwork
+from drivers.virtual.device import (
+    Device,
+    EntryInfo,
+    ProcessImage,
+    StartsWithNetwork,
+    shaft_rev,
+)
 from profiles.schema import Profile
 
 
@@ -26,6 +32,12 @@ class SharedDevice:
     def powered(self, on: bool) -> None:
         with self._lock:
             self._device.powered = on
+
+    @property
+    def shaft_rev(self) -> float:
+        """See `drivers.virtual.device.HasShaft`."""
+        with self._lock:
+            return shaft_rev(self._device)
 
     def advance(self, t_ns: int) -> None:
         """See `Device`."""

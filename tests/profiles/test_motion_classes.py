@@ -41,6 +41,12 @@ DOORS = [
     ("r6l", "200C:15"),  # 002:11987 tuning of the current loop
     ("r6l", "2002:21"),  # 002:9222 function of an output, brake among them
     ("ep3e", "60FE:01"),  # 001: brake by bit 0
+    ("ep3e", "60FE:02"),  # 001:990 its mask lets the bus rule the brake
+    ("m6l", "60FE:01"),  # 000:3110 forced outputs, brake among them
+    ("m6l", "60FE:02"),
+    ("mms7", "2031:02"),  # 004:6547 simulated inputs
+    ("mms7", "2108:01"),  # 004:2604 brake
+    ("r6l", "2008:14"),  # 002:11519 virtual outputs, brake among them
     ("mms7", "200B:07"),  # 004:6221 returns to Operation enabled by itself
     ("mms7", "2031:03"),  # 004:6564 forced outputs
     ("ds_c", "2400:02"),  # 003:513 signal release
@@ -55,6 +61,8 @@ SETPOINTS = ("6040:00", "6060:00", "607A:00", "60FF:00", "6071:00", "60B0:00", "
 AT_ENABLE = (
     "605A:00", "605B:00", "605C:00", "605D:00", "605E:00", "607D:01", "607D:02", "6065:00",
     "6072:00", "60E0:00", "60E1:00", "607F:00", "607E:00", "6081:00", "6085:00", "6091:01",
+    "608F:01", "6090:01", "6090:02", "6091:02", "6092:01", "6096:01", "6097:01", "60A8:00",
+    "60A9:00", "60AA:00", "606A:00", "607C:00", "6065:00", "6098:00",
 )  # fmt: skip
 
 
@@ -115,6 +123,18 @@ def test_no_unit_limit_or_command_is_safe_in_motion(drive: str) -> None:
         ("1A00:01", "at_enable"),
         ("1011:01", "at_enable"),
         ("60B8:00", "none"),
+        # Scales of speed and acceleration, also those that CiA 402 has given up since version 2
+        ("6089:00", "at_enable"),
+        ("608B:00", "at_enable"),
+        ("608E:00", "at_enable"),
+        ("6090:02", "at_enable"),
+        ("6094:01", "at_enable"),
+        ("6097:01", "at_enable"),
+        ("60AB:00", "at_enable"),
+        ("60E8:01", "at_enable"),  # gear of a further encoder (CiA 402-2)
+        ("60FE:01", "energises"),  # the brake is bit 0
+        ("60FE:02", "energises"),  # its mask
+        ("68FE:01", "energises"),
         ("6510:01", None),  # drive data: the contents are the maker's own
         ("2000:00", None),
         ("A000:00", None),

@@ -1,5 +1,6 @@
 """No way of writing parameters moves an axis: every writable object of every family, on every bus,
-as everybody who may write parameters.
+as everybody who may write parameters; also of a CiA 402 drive that nothing else is known of, and
+of drives by a maker's EDS and ESI file. (On real wires: `test_no_parameter_moves_on_wires`.)
 
 The drives are the virtual ones, with their inputs wired: what the status word says is not asked,
 but where the shaft stands. A refusal must say why, and where the thing can be done instead.
@@ -27,6 +28,7 @@ from drivers.errors import DriveError
 from profiles.schema import LinkKind, Parameter, Profile, Raw
 from tests.support.firmware_link import STATION, FirmwareLink
 from tests.support.guarded import Caller, GuardedServer
+from tests.support.imported import EDS_DRIVE, ESI_DRIVE, import_both
 
 PLACES: tuple[tuple[str, LinkKind], ...] = (
     ("mms7", "ethercat"),
@@ -36,6 +38,10 @@ PLACES: tuple[tuple[str, LinkKind], ...] = (
     ("ep3e", "ethercat"),
     ("ds_c", "canopen"),
     ("ds_c", "modbus"),
+    ("generic402", "ethercat"),
+    ("generic402", "canopen"),
+    (EDS_DRIVE, "canopen"),
+    (ESI_DRIVE, "ethercat"),
 )
 #: A shaft that moved by more than this was moved. Physics at rest is still to far less.
 STILL_RAD = 1e-3
@@ -121,9 +127,11 @@ def scene(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Scene]:
     family, kind = request.param
-    found = Scene(tmp_path_factory.mktemp("station"), family, kind)
-    yield found
-    found.server.stop()
+    with pytest.MonkeyPatch.context() as patch:
+        import_both(tmp_path_factory.mktemp("profiles"), patch)
+        found = Scene(tmp_path_factory.mktemp("station"), family, kind)
+        yield found
+        found.server.stop()
 
 
 def values_of(parameter: Parameter) -> list[Raw]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
@@ -311,6 +312,11 @@ class VirtualServo:
         taken = list(waiting)
         waiting.clear()
         return taken
+
+    @property
+    def shaft_rev(self) -> float:
+        """See `drivers.virtual.device.HasShaft`."""
+        return self.axis.angle_rad / (2.0 * math.pi)
 
     def inject(self, what: str, value: float = 1.0) -> None:
         """Trouble by name.

@@ -74,6 +74,34 @@ def test_turns_behind_a_gear_are_not_certain() -> None:
 
 
 @pytest.mark.parametrize(
+    "raws",
+    [
+        {"6090:01": 6_553, "6090:02": 1},
+        {"6090:01": 65_536, "6090:02": 10},
+        {"6096:01": 10, "6096:02": 1},
+        {"6096:01": 1, "6096:02": 60},
+    ],
+)
+def test_a_speed_that_is_counted_otherwise_is_not_certain(raws: dict[str, int]) -> None:
+    """6090h beside a 608Fh of 65536 increments, or a velocity factor (CiA 402-2 clause 10)."""
+    assert velocity(INC_S, **raws) == (None, Doubt.FACTOR)
+    assert velocity(RPM, **raws) == (None, Doubt.FACTOR)
+
+
+def test_factors_that_change_nothing_are_none() -> None:
+    alike = {"6090:01": 131_072, "6090:02": 2, "6096:01": 7, "6096:02": 7}
+    assert velocity(INC_S, **alike) == (pytest.approx(65_536 / 60), None)
+    assert velocity(INC_S, **{"6090:01": 0, "6096:01": 0}) == (pytest.approx(65_536 / 60), None)
+
+
+def test_a_factor_of_the_acceleration_leaves_the_speed_certain() -> None:
+    told = {"608F:01": 65_536, "60A9:00": INC_S, "60AA:00": INC_S2, "6097:01": 1, "6097:02": 10}
+    scales = scales_of(GENERIC, Told(told), None)
+    assert scales.velocity.certain
+    assert scales.acceleration.doubt is Doubt.FACTOR
+
+
+@pytest.mark.parametrize(
     ("raws", "per_rev"),
     [
         ({"608F:01": 131_072, "608F:02": 1}, 131_072),

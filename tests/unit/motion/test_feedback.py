@@ -187,6 +187,20 @@ def test_skipped_cycles_are_no_contradiction_and_hide_none(stale: bool) -> None:
     assert wrong.cause is HaltCause.CONTRADICTION
 
 
+@pytest.mark.parametrize("last", range(500, 510))
+def test_a_stall_whose_first_sample_is_stale_is_no_speed_beyond_its_limit(last: int) -> None:
+    """20 cycles are missed; the drive then gives the position of its last frame, and a cycle later
+    the one that it has: 20 cycles of travel with 1 ms between their times, at 300 of 330 rpm."""
+    turns, guard = ramp_to(300.0), SpeedGuard(SCALE, 330.0 * RPM)
+    for cycle in [c for c in range(1000) if not last < c < last + 20]:
+        seen = cycle * CYCLE_S
+        if cycle == last + 20:
+            guard.gap()
+            seen = (last + 1) * CYCLE_S
+        halt = guard.look(round(COUNTS * turns(seen)), round(speed(turns, seen)), cycle * CYCLE_S)
+        assert halt is None, (cycle, halt)
+
+
 def test_a_speed_beyond_its_limit_right_after_a_gap_ends_the_motion() -> None:
     guard = SpeedGuard(SCALE, 100.0 * RPM)
     guard.gap()

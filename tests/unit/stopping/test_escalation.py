@@ -126,6 +126,36 @@ def test_a_new_motion_ends_the_watch_of_the_old_stop() -> None:
     run_simulated(main)
 
 
+def test_a_drive_that_leaves_the_bench_is_stopped_first_and_has_its_verdict() -> None:
+    """Chaos found it: STOP was answered by an internal error when its axis was removed."""
+
+    async def main() -> None:
+        async with rig("mms7") as bench:
+            await profile_velocity(bench)
+            asked = asyncio.create_task(stop(bench))
+            await asyncio.sleep(0.02)
+            removed = await bench.http.delete(f"/drives/{bench.member.drive.id}")
+            assert removed.is_success, removed.text
+            assert (await asked)["verdict"] == "stopped"
+            assert bench.shaft_rpm < 3.0
+
+    run_simulated(main)
+
+
+def test_a_watch_that_is_ended_says_that_nobody_saw_the_axis_stand() -> None:
+    async def main() -> None:
+        async with rig("mms7") as bench:
+            await profile_velocity(bench)
+            asked = asyncio.create_task(stop(bench))
+            await asyncio.sleep(0.02)
+            await bench.bench.motion.end_watches()
+            axis = await asked
+            assert axis["verdict"] == "unreachable"
+            assert "taken off the bench" in str(axis["problem"])
+
+    run_simulated(main)
+
+
 def test_a_standing_axis_is_told_at_once() -> None:
     async def main() -> None:
         async with rig("mms7") as bench:

@@ -10,6 +10,7 @@ import pytest
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
 from drivers.halt import HaltCause, Halted
+from drivers.motion.feedback import FeedbackScale
 from drivers.motion.playback import STOP_S, AxisLoop
 from drivers.motion.setpoint_plan import Limits, Motion, Phase
 
@@ -320,6 +321,27 @@ def test_cycles_without_trusted_inputs_go_on_but_conclude_nothing() -> None:
     bench.axis.blind()
     assert bench.axis.outputs[1] == 502
     assert bench.axis.state is State.OPERATION_ENABLED
+
+
+@pytest.mark.parametrize("last", range(60, 70))
+def test_cycles_that_were_skipped_are_no_speed_beyond_its_limit(last: int) -> None:
+    """The first inputs after 19 skipped cycles are those of the last frame, as from a drive that
+    latches at the frame: 20 cycles of travel follow with 1 ms between. It goes at 5000 of 5500
+    increments per second all the time."""
+    bench = Bench().enabled()
+    bench.play(
+        [500 + 5 * n for n in range(300)],
+        limits=Limits(speed_max=5500.0, feedback=FeedbackScale(1.0, 500.0)),
+    )
+    bench.speed = 5000
+    for cycle in [c for c in range(150) if not last < c < last + 20]:
+        late = cycle == last + 20
+        if late:
+            bench.axis.skip(19)
+        bench.position = 500 + 5 * (last + 1 if late else cycle)
+        bench.step()
+    assert bench.axis.halted is None
+    assert bench.axis.phase is Phase.PLAYING
 
 
 def test_an_axis_that_braked_without_trusted_inputs_is_told_to_quick_stop() -> None:

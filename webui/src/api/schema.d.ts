@@ -3653,7 +3653,7 @@ export interface components {
          * @description Why a scale is not certain.
          * @enum {string}
          */
-        Doubt: "no_resolution" | "feed_of_one" | "unit_and_feed" | "linear" | "not_stated" | "unreadable" | "behind_gear" | "needs_resolution";
+        Doubt: "no_resolution" | "feed_of_one" | "unit_and_feed" | "linear" | "not_stated" | "unreadable" | "behind_gear" | "needs_resolution" | "factor";
         /**
          * DriveIdentification
          * @description Identification that a bit of the control word starts, while an object counts its states.

@@ -12,7 +12,7 @@ import json
 from collections.abc import Callable
 from typing import IO, Any
 
-from drivers.virtual.device import SdoAbort
+from drivers.virtual.device import SdoAbort, shaft_rev
 from drivers.virtual.wires.ethercat import registers as reg
 from drivers.virtual.wires.ethercat.coe import Oddities
 from drivers.virtual.wires.ethercat.foe import FileTrouble
@@ -63,6 +63,7 @@ class Control:
             "firmware": self._firmware,
             "inject": self._inject,
             "read": self._read,
+            "shaft": self._shaft,
             "write": self._write,
             "register": self._register,
             "stop": self._stop,
@@ -268,6 +269,11 @@ class Control:
         """The drive's own value, past the wire: the truth that tests compare with."""
         self._segment.settle()
         return self._slave(slave).dictionary.read(index, subindex).hex()
+
+    def _shaft(self, slave: int) -> float:
+        """The shaft's angle in revolutions, past every wire and unit."""
+        self._segment.settle()
+        return shaft_rev(self._slave(slave).device)
 
     def _write(self, slave: int, index: int, subindex: int, data: str) -> None:
         self._segment.settle()

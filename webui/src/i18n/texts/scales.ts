@@ -46,6 +46,10 @@ export const scales = {
     'It counts increments, and increments per revolution are unknown.',
     '以增量计，而每转增量数未知。',
   ],
+  'scales.doubt.factor': [
+    '6090h is another resolution than 608Fh, or 6096h or 6097h holds a factor: what the drive makes of it is not said.',
+    '6090h 与 608Fh 的分辨率不同，或 6096h、6097h 中设有系数：驱动器如何使用它未予说明。',
+  ],
   'scales.teach': ['Teach by a small move', '通过微小移动示教'],
   'scales.teachHelp': [
     'The axis moves by so many increments within 2 s, with little torque. Mark the shaft and look how far it turns. Begin small: each move may be ten times as long as the one before.',
