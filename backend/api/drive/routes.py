@@ -240,7 +240,8 @@ async def write_motion_setting(
         reading = await assign(member.axis, parameter.key, raw, reason)
     bench.journal.add(
         f"{drive.name}: {parameter.key} {parameter.name}: "
-        f"{old.value if old else 'not read'} → {reading.value}" + (f" ({reason})" if reason else ""),
+        f"{old.value if old else 'not read'} → {reading.value}"
+        + (f" ({reason})" if reason else ""),
         level="warning",
         drive=drive.id,
     )

@@ -1,0 +1,45 @@
+"""The Scales card: a drive whose unit nobody states is taught by a small move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.api.test_scales_taught import BENCH, CAN, scales
+from tests.browser.driving import open_axis
+from tests.support.station import Station
+
+
+@pytest.fixture(scope="module")
+def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
+    """10 000 increments to the revolution, 606Ch in 0.1 rpm; neither is stated by the drive."""
+    folder = Path(tmp_path_factory.mktemp("scales"))
+    (folder / "bench.toml").write_text(BENCH, "utf-8")
+    running = Station(folder, folder / "bench.toml")
+    running.start()
+    yield running
+    running.stop()
+
+
+def test_a_small_move_teaches_the_scales(laptop: Page, station: Station) -> None:
+    page, drive = laptop, station.add(5, CAN, "generic402", "N")
+    open_axis(page, drive, "overview")
+    card = page.locator("section.panel").filter(has=page.get_by_role("heading", name="Scales"))
+    expect(card).to_contain_text("The axis is not moved by unit.")
+    expect(card).to_contain_text("Increments per revolution are unknown.")
+    for increments in ("1000", "5000"):
+        card.get_by_label("Increments", exact=True).fill(increments)
+        card.get_by_role("button", name="Move by increments").click()
+        # How far it went is what the person confirms.
+        expect(card.get_by_text(f"After {increments[:1]}")).to_be_visible(timeout=60_000)
+    card.get_by_label("The shaft turned by").fill("0.5")
+    card.get_by_role("button", name="That is what it turned").click()
+    expect(card).to_contain_text("Position and speed are certain.")
+    taught = {each["quantity"]: each for each in scales(station, drive)["scales"]}
+    # 5000 increments were half a turn; 1 rpm is 10 of 0.1 rpm.
+    assert taught["position"]["raw_per_unit"] == pytest.approx(10_000, rel=0.01)
+    assert taught["velocity"]["raw_per_unit"] == pytest.approx(10)
+    station.remove(drive)
