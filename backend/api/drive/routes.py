@@ -25,9 +25,9 @@ from backend.api.drive.models_motion import (
     SequenceRequest,
 )
 from backend.api.drive.models_parameters import (
+    MotionSettingWrite,
     ParameterRow,
     ParameterValue,
-    MotionSettingWrite,
     ParameterWrite,
     ParameterWrites,
     ReadAllRequest,

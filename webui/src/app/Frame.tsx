@@ -24,6 +24,7 @@ import { LeaseControl, LeaseNotices } from './LeaseControl'
 import { PointerLayer } from './PointerLayer'
 import { Preferences } from './Preferences'
 import { StopButton } from './StopButton'
+import { currentReport } from './stop'
 import { StopElsewhere } from './StopElsewhere'
 import { SupportBar } from './SupportBar'
 import { TurningNote } from './TurningNote'
@@ -332,7 +333,9 @@ function Refused() {
     const timer = setTimeout(() => setSeen(refused.at), REFUSED_MS)
     return () => clearTimeout(timer)
   }, [refused])
-  if (!refused || refused.at <= seen) return null
+  // What STOP did not reach stands in its own report, with the other axes.
+  const reported = useStore('stop', currentReport)?.answer != null
+  if (!refused || refused.at <= seen || (refused.request === 'stop' && reported)) return null
   return (
     <div className="note fault" role="alert">
       <p>
