@@ -57,6 +57,9 @@ class Witness:
         new = record.after
         if record.after is None or record.after != record.wanted:
             detail["wanted"] = record.wanted
+        # What a person gave for a setting that can start a motion.
+        if isinstance(reason := settings_now().get("reason"), str) and reason:
+            detail["reason"] = reason
         outcome = record.problem
         if not outcome and record.after != record.wanted:
             outcome = "the drive keeps another value"

@@ -29,8 +29,10 @@ _AT_REST_S = 0.3
 _DISABLED = frozenset({State.SWITCH_ON_DISABLED, State.READY, State.NOT_READY, State.FAULT})
 
 
-async def assign(axis: Axis, key: str, raw: Raw) -> Reading:
+async def assign(axis: Axis, key: str, raw: Raw, reason: str = "") -> Reading:
     """Write one such setting, read it back, and make sure that nothing turns.
+
+    ``reason`` is the person's, for the purpose of the grant.
 
     Raises:
         NotGranted: it is a command, not a setting; the error says where it belongs.
@@ -40,9 +42,8 @@ async def assign(axis: Axis, key: str, raw: Raw) -> Reading:
     drive = axis.drive
     parameter = drive.parameter(key)
     _require_setting(axis, parameter)
-    with axis.granted(
-        f"set {parameter.key} {parameter.name}", keys=frozenset({parameter.key})
-    ) as grant:
+    purpose = f"set {parameter.key} {parameter.name}" + (f": {reason}" if reason else "")
+    with axis.granted(purpose, keys=frozenset({parameter.key})) as grant:
         await _require_rest(axis, parameter)
         await _require_inputs_off(axis, parameter, raw)
         before = (await drive.read(parameter.key)).raw

@@ -156,8 +156,7 @@ def test_only_rows_in_sight_are_drawn(phone: Page, laptop: Page, bench: Bench) -
 def test_language(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "overview")
-    page.get_by_role("button", name="Appearance and language").click()
-    page.get_by_role("menuitem", name="中文").click()
+    page.get_by_role("button", name="中文").click()
     pages = page.get_by_role("navigation", name="页面")
     expect(pages.get_by_role("link", name="参数")).to_be_visible()
     expect(page.get_by_label("驱动器状态")).to_contain_text("禁止接通")

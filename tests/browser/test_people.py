@@ -104,7 +104,7 @@ def test_nothing_is_shown_before_the_log_in(opened: Open, bench: Bench) -> None:
     button(page, "Log in").click()
     expect(page.get_by_text("name or password is wrong")).to_be_visible()
     log_in(page, Role.OPERATOR)
-    button(page, "Appearance and language").click()
+    button(page, "Appearance").click()
     page.get_by_role("menuitem", name="Log out").click()
     expect(page.get_by_role("heading", name="Log in")).to_be_visible()
     page.reload()

@@ -205,8 +205,8 @@ REQUESTS = [
         "kind": "write", "target": "2005:03", "old": 41, "new": 42}, ON_X,
         options={"json": {"values": {"2005:03": {"raw": 42}}}}),
     Ask("PUT", f"{X}/motion-settings/{{key}}", BY_OLAF | {
-        "kind": "write", "target": "200B:07", "new": 1}, ON_X | {"key": "200B:07"},
-        options={"json": {"raw": 1}}),
+        "kind": "write", "target": "200B:07", "new": 1, "detail.reason": "test"},
+        ON_X | {"key": "200B:07"}, options={"json": {"raw": 1, "reason": "test"}}),
     Ask("POST", f"{X}/transition", BY_OLAF | {
         "kind": "motion", "action": "started", "detail.goal": "Ready to switch on"}, ON_X,
         options={"json": {"goal": "Ready to switch on"}}),

@@ -90,6 +90,14 @@ class ParameterWrite(Message):
         return given
 
 
+class MotionSettingWrite(ParameterWrite):
+    """A new value of a setting that can start a motion, and why it is set."""
+
+    reason: str = Field(
+        default="", max_length=300, description="why it is set; stands in log and audit"
+    )
+
+
 class ParameterWrites(Message):
     """Several new values, written in turn; a failure does not stop the rest."""
 

@@ -25,6 +25,7 @@ from backend.api.drive.models_motion import (
     SequenceRequest,
 )
 from backend.api.drive.models_parameters import (
+    MotionSettingWrite,
     ParameterRow,
     ParameterValue,
     ParameterWrite,
@@ -214,12 +215,13 @@ async def _write(bench: TheBench, member: Member, key: str, request: ParameterWr
 
 @router.put("/motion-settings/{key}")
 async def write_motion_setting(
-    bench: TheBench, member: Controlled, key: str, request: ParameterWrite
+    bench: TheBench, member: Controlled, key: str, request: MotionSettingWrite
 ) -> ParameterValue:
     """Write a setting that can start a motion at once; only while the motor has no power.
 
     Functions of terminals, control sources and the mapping of process data. The shaft is watched:
-    where it begins to turn, the setting is put back and the axis is stopped.
+    where it begins to turn, the setting is put back and the axis is stopped. The grant is for this
+    one write and ends with it; ``reason`` stands in log and audit.
     """
     _require_known(member, key)
     drive = member.drive
@@ -227,11 +229,13 @@ async def write_motion_setting(
     raw = _raw_of(drive, parameter, request)
     old = drive.readings.get(parameter.key)
     bench.motion.require_stays(member)
+    reason = request.reason.strip()
     with bench.motion.keeping_still(member):
-        reading = await assign(member.axis, parameter.key, raw)
+        reading = await assign(member.axis, parameter.key, raw, reason)
     bench.journal.add(
         f"{drive.name}: {parameter.key} {parameter.name}: "
-        f"{old.value if old else 'not read'} → {reading.value}",
+        f"{old.value if old else 'not read'} → {reading.value}"
+        + (f" ({reason})" if reason else ""),
         level="warning",
         drive=drive.id,
     )

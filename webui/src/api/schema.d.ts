@@ -1049,7 +1049,8 @@ export interface paths {
          * @description Write a setting that can start a motion at once; only while the motor has no power.
          *
          *     Functions of terminals, control sources and the mapping of process data. The shaft is watched:
-         *     where it begins to turn, the setting is put back and the axis is stopped.
+         *     where it begins to turn, the setting is put back and the axis is stopped. The grant is for this
+         *     one write and ends with it; ``reason`` stands in log and audit.
          */
         put: operations["write_motion_setting"];
         post?: never;
@@ -5624,6 +5625,22 @@ export interface components {
             safe_in_motion: boolean;
         };
         /**
+         * MotionSettingWrite
+         * @description A new value of a setting that can start a motion, and why it is set.
+         */
+        MotionSettingWrite: {
+            /** Raw */
+            raw?: number | string | null;
+            /**
+             * Reason
+             * @description why it is set; stands in log and audit
+             * @default
+             */
+            reason: string;
+            /** Value */
+            value?: number | string | null;
+        };
+        /**
          * MoveRequest
          * @description One move in a profile mode, in units of the axis (see AxisState.units) or of its load.
          */
@@ -8581,6 +8598,7 @@ export type MessageInfo = components['schemas']['MessageInfo'];
 export type MissingPort = components['schemas']['MissingPort'];
 export type MotionClass = components['schemas']['MotionClass'];
 export type MotionClassRequest = components['schemas']['MotionClassRequest'];
+export type MotionSettingWrite = components['schemas']['MotionSettingWrite'];
 export type MoveRequest = components['schemas']['MoveRequest'];
 export type NamedSetup = components['schemas']['NamedSetup'];
 export type NetworkInterface = components['schemas']['NetworkInterface'];
@@ -17334,7 +17352,7 @@ export interface operations {
         };
         requestBody: {
             content: {
-                "application/json": components["schemas"]["ParameterWrite"];
+                "application/json": components["schemas"]["MotionSettingWrite"];
             };
         };
         responses: {

@@ -18,10 +18,12 @@ import {
 import { FaultElsewhere } from './FaultElsewhere'
 import { AxisNotes } from './AxisNotes'
 import { Late } from './Late'
+import { LanguageSwitch } from './LanguageSwitch'
 import { LeaseControl, LeaseNotices } from './LeaseControl'
 import { PointerLayer } from './PointerLayer'
 import { Preferences } from './Preferences'
 import { StopButton } from './StopButton'
+import { currentReport } from './stop'
 import { StopElsewhere } from './StopElsewhere'
 import { SupportBar } from './SupportBar'
 import { TurningNote } from './TurningNote'
@@ -31,6 +33,8 @@ import { useHasIo } from './useHasIo'
 
 /** What a thumb reaches on a phone: with an axis, and before there is one. */
 const HANDY = ['overview', 'parameters', 'motion', 'scope', 'alarms'] as const
+/** More than these are listed in one line each, so that all of them are in sight. */
+const FEW_AXES = 2
 const EMPTY_BENCH = ['connect', 'files', 'people'] as const
 
 /** What surrounds every page: axis, state, link, control, STOP, and the way to the pages. */
@@ -75,7 +79,8 @@ export function Frame({ children }: { children: ReactNode }) {
           <LinkBadge />
           <LeaseControl drive={chosen} />
         </div>
-        <div className="wide-only">
+        <div className="wide-only row">
+          <LanguageSwitch />
           <Preferences />
         </div>
       </header>
@@ -93,13 +98,14 @@ export function Frame({ children }: { children: ReactNode }) {
         zIndex={250}
       >
         <Pages />
-        <div className="narrow-only">
+        <div className="narrow-only row">
+          <LanguageSwitch />
           <Preferences />
         </div>
       </Drawer>
       <main id="main" tabIndex={-1}>
-        <TurningNote />
         <Late page={key}>
+          <TurningNote />
           <Refused />
           <LeaseNotices />
           <SupportBar />
@@ -133,7 +139,7 @@ function Pages() {
     // The list of axes pushes the pages away when it comes.
     <div className={known === null ? 'arriving' : 'arrived'}>
       <h2>{t('frame.axes')}</h2>
-      <div className="axes">
+      <div className={drives.length > FEW_AXES ? 'axes many' : 'axes'}>
         {drives.map((each) => (
           <AxisEntry key={each.id} id={each.id} />
         ))}
@@ -163,11 +169,13 @@ function AxisEntry({ id }: { id: string }) {
     if (chosen) entry.current?.scrollIntoView({ block: 'nearest' })
   }, [chosen])
   if (!summary) return null
+  const words = state?.fresh ? known(t, 'state', state.state) : t('state.noAnswer')
   return (
     <button
       ref={entry}
       type="button"
       className="entry axis-entry"
+      title={`${summary.name}: ${words}`}
       aria-current={chosen ? 'true' : undefined}
       onClick={() => chooseDrive(id)}
     >
@@ -176,7 +184,7 @@ function AxisEntry({ id }: { id: string }) {
       </span>
       <span className="grow">
         {summary.name}
-        <small>{state?.fresh ? known(t, 'state', state.state) : t('state.noAnswer')}</small>
+        <small>{words}</small>
       </span>
     </button>
   )
@@ -325,7 +333,9 @@ function Refused() {
     const timer = setTimeout(() => setSeen(refused.at), REFUSED_MS)
     return () => clearTimeout(timer)
   }, [refused])
-  if (!refused || refused.at <= seen) return null
+  // What STOP did not reach stands in its own report, with the other axes.
+  const reported = useStore('stop', currentReport)?.answer != null
+  if (!refused || refused.at <= seen || (refused.request === 'stop' && reported)) return null
   return (
     <div className="note fault" role="alert">
       <p>

@@ -1,12 +1,11 @@
 import { ActionIcon, Menu, useMantineColorScheme } from '@mantine/core'
-import { setLanguage, useLanguage, useT } from '../i18n'
+import { useT } from '../i18n'
 import { Icon } from '../widgets/Icon'
 import { leave, useSession } from './session'
 
-/** Appearance, language, and who is logged in. */
+/** Appearance, the time zone of what is shown, and who is logged in. */
 export function Preferences() {
   const t = useT()
-  const language = useLanguage()
   const session = useSession()
   const zone = Intl.DateTimeFormat().resolvedOptions().timeZone
   const { colorScheme, setColorScheme } = useMantineColorScheme()
@@ -26,17 +25,6 @@ export function Preferences() {
             onClick={() => setColorScheme(scheme)}
           >
             {t(`scheme.${scheme}`)}
-          </Menu.Item>
-        ))}
-        <Menu.Label>{t('frame.language')}</Menu.Label>
-        {(['en', 'zh'] as const).map((each) => (
-          <Menu.Item
-            key={each}
-            lang={each}
-            rightSection={language === each ? <Icon name="check" /> : null}
-            onClick={() => setLanguage(each)}
-          >
-            {t(`language.${each}`)}
           </Menu.Item>
         ))}
         <Menu.Label>{t('frame.times', { zone })}</Menu.Label>

@@ -24,7 +24,15 @@ export function TurningNote() {
           </p>
         )
       })}
-      <button type="button" className="danger" onClick={() => void stopEverything()}>
+      <button
+        type="button"
+        className="danger"
+        // As with STOP itself: down, and a click alone by voice control and screen readers.
+        onPointerDown={() => void stopEverything()}
+        onClick={(event) => {
+          if (event.detail === 0) void stopEverything()
+        }}
+      >
         {t('stop.label')}
       </button>
     </div>

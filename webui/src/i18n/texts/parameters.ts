@@ -98,15 +98,33 @@ export const parameters = {
   'mark.readOnly': ['read only', '只读'],
   'mark.energises': ['moves', '致动'],
   'motion.energises': [
-    'can put energy into the motor: not written here',
-    '可能使电机得电：不能在此写入',
+    'Can put energy into the motor: it is not written in this table.',
+    '可能使电机得电：不能在此表中写入。',
   ],
   'motion.goMotion': ['Open the Motion page', '打开运动页面'],
   'motion.goIo': ['Open the I/O page', '打开 I/O 页面'],
-  'motion.script': [
-    'Its value is set by a script that has the right to move (PUT …/motion-settings/{key}), with the axis disabled.',
-    '需由具有运动权限的脚本（PUT …/motion-settings/{key}）在轴未使能时设置。',
+  'motion.procedure': ['Instead: {how}.', '请改为：{how}。'],
+  'motion.set': ['Set with permission…', '凭许可设置…'],
+  'motion.noRight': [
+    'It is set with the right to move the axis, which you do not have. Ask somebody who has it.',
+    '设置该值需要该轴的运动权限，您没有此权限。请向有权限的人员提出。',
   ],
+  'motion.settingWarning': [
+    'WARNING: the axis can start to move with this value. The motor must have no power. The shaft is watched for 0.3 s after the write; where it turns, the old value is written back and a quick stop is sent.',
+    '警告：写入该值后轴可能开始运动。电机必须未得电。写入后监视轴 0.3 秒；若轴转动，将写回旧值并发送快速停止。',
+  ],
+  'motion.reason': ['Reason (log and audit)', '原因（记入日志和审计）'],
+  'motion.until': [
+    'The permission is for this one write and ends with it. The value stays in the drive until it is set again.',
+    '许可仅限本次写入，写入后即失效。该值在驱动器中保持，直到再次设置。',
+  ],
+  'motion.consent': [
+    'Nobody is in the danger zone of the axis, and a hand is on the emergency stop.',
+    '轴的危险区域内无人，且手在急停按钮上。',
+  ],
+  'motion.write': ['Write this setting', '写入该设置'],
+  'motion.disableFirst': ['The axis has power: disable it first.', '轴已得电：请先取消使能。'],
+  'motion.reasonMissing': ['Give a reason.', '请填写原因。'],
   'mark.unreachable': ['not on this link', '此链路不可达'],
   'compare.with': ['Compare with', '比较对象'],
   'compare.defaults': ['the defaults of the manual', '手册默认值'],

@@ -49,7 +49,10 @@ export function TerminalTable({
     const value: ParameterValue = await ask(
       // A function that jogs or enables needs the right to move, and a shaft that stands.
       moves
-        ? api.PUT('/api/v1/drives/{drive_id}/motion-settings/{key}', { params, body })
+        ? api.PUT('/api/v1/drives/{drive_id}/motion-settings/{key}', {
+            params,
+            body: { ...body, reason: '' },
+          })
         : api.PUT('/api/v1/drives/{drive_id}/parameters/{key}', { params, body }),
     )
     setReadings(drive, [value])

@@ -14,6 +14,7 @@ import { setEdit, useEdits, writeEdits } from './edits'
 import { editable } from './Grid'
 import { editText, pendingKey, range, readingText } from './GridRow'
 import { MotionClass } from './MotionClass'
+import { OtherDoor } from './OtherDoor'
 
 /** Everything about one parameter, and its editor: enum, bits, raw and physical. */
 export function Detail({
@@ -102,24 +103,6 @@ export function Detail({
       {row.access !== 'ro' && <MotionClass key={row.key} profile={profile} parameter={row.key} />}
       <Facts row={row} />
     </aside>
-  )
-}
-
-/** Where an object is used that can move the axis, and so has no field here. */
-function OtherDoor({ drive, row }: { drive: string; row: ParameterRow }) {
-  const t = useT()
-  const page = row.motion_page
-  return (
-    <div className="note warn">
-      <p>{t('motion.energises')}</p>
-      {page === 'motion' || page === 'io' ? (
-        <a href={`#/axis/${encodeURIComponent(drive)}/${page}`}>
-          {t(page === 'io' ? 'motion.goIo' : 'motion.goMotion')}
-        </a>
-      ) : (
-        page === '' && <p>{t('motion.script', { key: row.key })}</p>
-      )}
-    </div>
   )
 }
 

@@ -1,5 +1,6 @@
 import { useComputedColorScheme } from '@mantine/core'
-import { useState } from 'react'
+import { useEffect, useRef, useState } from 'react'
+import type { DriveSummary, MeasurementInfo } from '../../api/schema'
 import { known, useT } from '../../i18n'
 import { useAxisState, useDrive } from '../../live/store'
 import { dateTime } from '../../widgets/format'
@@ -34,6 +35,14 @@ export function ResponsePage({ drive }: { drive: string }) {
   const [over, setOver] = useState<string | null>(null)
   const { content, sweep, problem } = useSweep(shown)
   const other = useSweep(over)
+  const opened = useRef('')
+  useEffect(() => {
+    // Once for each axis: what is measured elsewhere later takes nobody's picture away.
+    if (!summary || !measured.asked || opened.current === drive) return
+    opened.current = drive
+    setShown(newestOf(measured.list, summary))
+    setOver(null)
+  }, [drive, summary, measured.asked, measured.list])
   const notches = useNotches(drive, sweep?.frequency_hz ?? NO_LINES)
   const { gains } = useGains(drive)
   useJobEnd(job?.id ?? null, (ended) => {
@@ -111,6 +120,14 @@ export function ResponsePage({ drive }: { drive: string }) {
       </div>
     </div>
   )
+}
+
+/** The newest usable response of this axis; the list is newest first. */
+function newestOf(list: MeasurementInfo[], axis: DriveSummary): string | null {
+  const found = list.find(
+    (each) => each.problem === '' && each.drive === axis.name && each.profile === axis.profile,
+  )
+  return found?.file ?? null
 }
 
 function titleOf(

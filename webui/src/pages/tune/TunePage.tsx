@@ -104,6 +104,17 @@ export function TunePage({ drive }: { drive: string }) {
               onChange={refresh}
             />
           </div>
+          {possible && designable && (
+            <AutotunePanel
+              drive={drive}
+              state={state}
+              limits={limits.agreed ? limits.limits : null}
+              obstacle={obstacle}
+              cycleMs={cycleMs}
+              now={gains.gains?.raw ?? null}
+              onChanged={() => void gains.read()}
+            />
+          )}
           {possible && (
             <div id="step-inertia">
               <InertiaPanel
@@ -120,17 +131,6 @@ export function TunePage({ drive }: { drive: string }) {
           </div>
         </div>
         <div className="stack">
-          {possible && designable && (
-            <AutotunePanel
-              drive={drive}
-              state={state}
-              limits={limits.agreed ? limits.limits : null}
-              obstacle={obstacle}
-              cycleMs={cycleMs}
-              now={gains.gains?.raw ?? null}
-              onChanged={() => void gains.read()}
-            />
-          )}
           {gains.gains && !designable && (
             <Panel title={t('autotune.title')}>
               <p className="note info">
