@@ -71,7 +71,7 @@ async def gain_steps(
     value = si_value(parameter, float(parameter.to_value(now)))
     quiet = oscillation_percent(present, settings)
     done: list[GainStep] = []
-    count = max(1, int(np.ceil(wanted_db / _STEP_DB)))
+    count = steps_to(wanted_db)
     for db in wanted_db * np.arange(1, count + 1) / count:
         raw = gain_tool.raised(drive, key, now, float(10 ** (db / 20.0)))
         held = si_value(parameter, float(parameter.to_value(raw)))
@@ -95,6 +95,11 @@ async def gain_steps(
     shown = [each.gain_db for each in done if each.stable]
     onset = next((each.gain_db for each in done if not each.stable), None)
     return GainSteps(max(shown, default=0.0), onset, tuple(done))
+
+
+def steps_to(wanted_db: float) -> int:
+    """How many raised gains lead up to this one."""
+    return max(1, int(np.ceil(wanted_db / _STEP_DB)))
 
 
 def _judged(step: StepResult, settings: StepSettings, gain_db: float, quiet: float) -> GainStep:

@@ -127,7 +127,7 @@ async def autotune(
         NotAllowed: a step cannot be done or its answer cannot be trusted; says which and why.
         DriveError: as the single tools.
     """
-    time_left = TimeLeft.of(settings.budget_s)
+    time_left = TimeLeft.of(settings.budget_s, cycle_s(session))
     progress(0.0, "1 of 6: pre-checks")
     facts = await _pre_checks(axis, settings)
     async with stopping_hard(axis, settings.envelope.speed_rpm):
