@@ -135,9 +135,8 @@ async def verify(
         await go_back(axis, session, check.home_raw, check.envelope, check.facts)
     settings = sweep_evaluation.SweepSettings(
         check.envelope, kind="speed_loop", realisations=1,
-        inertia_kgm2=check.inertia_kgm2, hold=check.hold,
+        inertia_kgm2=check.inertia_kgm2, hold=check.hold, pairs_before=check.pairs_before,
         rated_torque_nm=check.rated_torque_nm, coulomb_nm=check.coulomb_nm,
-        pairs_before=check.pairs_before,
     )  # fmt: skip
     clock = time_left or TimeLeft()
     begun_s = time.monotonic()
@@ -148,8 +147,8 @@ async def verify(
     looks = LOOKS - bool(check.pairs_before) if read else 0
     took_s = time.monotonic() - begun_s
     verdict = _verdict(axis, check, candidate, swept, None)
-    hidden = tuple(each for each in _misses(verdict, promised) if _by_raised_gain(each))
-    clock.require_raising(steps_to(_wanted_db(hidden, promised)) if hidden else 0)
+    above = tuple(each for each in _misses(verdict, promised) if _by_raised_gain(each))
+    clock.require_raising(steps_to(_wanted_db(above, promised)) if above else 0)
     pairs = clock.pairs(took_s, MOST_PAIRS, looks)
     missed = worse_than(promised, read)
     blurred = any(each.end == "measured" for each in _misses(verdict, promised))
