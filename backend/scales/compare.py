@@ -25,9 +25,12 @@ _MOST_STEPS = 3.0
 
 
 def disagreement_of(
-    position: FloatArray, velocity: FloatArray, cycle_s: float, scale: FeedbackScale
-) -> Halted | None:
+    position: FloatArray, velocity: FloatArray, cycle_s: float, scale: FeedbackScale,
+    valid: npt.NDArray[np.bool_] | None = None,
+) -> Halted | None:  # fmt: skip
     """What a recording of raw 6064h and 606Ch [n] contradicts itself by; None where it agrees.
+
+    Only means over samples that are all ``valid`` [n] count: across a gap both are guessed.
 
     ``value`` and ``limit`` of the answer are root mean squares of both speeds, raw 606Ch, with the
     sign in which they go together.
@@ -40,6 +43,12 @@ def disagreement_of(
     means = 0.5 * (velocity[1:] + velocity[:-1])[: count * length]
     told = means.reshape(count, length).mean(axis=1)
     seen = _moved(position[edges]) / (length * cycle_s) * scale.velocity_per_inc_s
+    if valid is not None:
+        lost = np.concatenate([[0], np.cumsum(~valid)])
+        whole = lost[edges[1:] + 1] == lost[edges[:-1]]
+        told, seen = told[whole], seen[whole]
+        if told.size < 2:
+            return None
     power = float(np.mean(seen**2))
     rms_told, rms_seen = float(np.sqrt(np.mean(told**2))), float(np.sqrt(power))
     steps = np.abs(np.diff(velocity))

@@ -34,10 +34,11 @@ from backend.analysis.response.reference_gain import ReferenceLoop
 from backend.analysis.response.sampled_model import LoopModel, SampledFit
 from backend.analysis.response.sampling import (
     DIRECT_SHARE,
-    STEP_LEAD_S,
     USUAL_CURRENT_HZ,
     Hold,
     SignalPath,
+    command_delay_s,
+    cycles_of,
     delay_response,
     lag_response,
 )
@@ -313,16 +314,15 @@ class _Task:
 
     def at_cycles(self, path: SignalPath, hold: Hold) -> _Trial:
         """A fit with this hold and the whole cycles of delay that leave the least of one."""
-        lead_s = STEP_LEAD_S if hold == "linear" else 0.0
         rate = path.sample_rate_hz
         # What is too early shows as a delay that is left, what is too late may not.
         cycles = max(math.floor(path.command_delay_s * rate - 0.25), 0)
-        late_s = max(cycles / rate - lead_s, 0.0)
+        late_s = command_delay_s(cycles, hold, rate)
         trial = self.trial(replace(path, hold=hold, command_delay_s=late_s))
         more = round(trial.fit.delay_s * rate)
         if more == 0 or cycles + more < 0:
             return trial
-        late_s = max((cycles + more) / rate - lead_s, 0.0)
+        late_s = command_delay_s(cycles + more, hold, rate)
         other = self.trial(replace(path, hold=hold, command_delay_s=late_s))
         return min(trial, other, key=_rank)
 
@@ -468,8 +468,7 @@ def _implausible(fit: SampledFit) -> float:
     path = fit.path
     first_s = min(fit.delay_s, fit.position_delay_s)
     early = max(-first_s * path.sample_rate_hz - 0.1, 0.0)
-    lead_s = STEP_LEAD_S if path.hold == "linear" else 0.0
-    cycles = (path.command_delay_s + lead_s) * path.sample_rate_hz
+    cycles = cycles_of(path)
     return _EARLY * early + _FRACTION * abs(cycles - round(cycles))
 
 

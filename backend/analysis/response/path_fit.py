@@ -13,9 +13,10 @@ from scipy.optimize import least_squares, minimize_scalar
 
 from backend.analysis.response.sampled_model import LoopModel, SampledFit
 from backend.analysis.response.sampling import (
-    STEP_LEAD_S,
     Hold,
     SignalPath,
+    command_delay_s,
+    cycles_of,
     delay_response,
     lag_response,
     sampled_command_response,
@@ -113,10 +114,10 @@ def torque_left(records: tuple[Record, ...], path: SignalPath) -> float:
 def moved_path(path: SignalPath, cycles: float, log_corner: float) -> SignalPath:
     """A path with another delay, and with another corner where there is one."""
     corner = path.current_bandwidth_hz
-    late_s = path.command_delay_s + cycles / path.sample_rate_hz
+    late_s = command_delay_s(cycles_of(path) + cycles, path.hold, path.sample_rate_hz)
     if corner is not None:
         corner *= float(np.exp(log_corner))
-    return replace(path, command_delay_s=max(late_s, 0.0), current_bandwidth_hz=corner)
+    return replace(path, command_delay_s=late_s, current_bandwidth_hz=corner)
 
 
 def path_between(one: SignalPath, other: SignalPath) -> FloatArray:
@@ -148,8 +149,7 @@ def ranked(fit: PathFit, holds: tuple[Hold, ...]) -> tuple[SignalPath, ...]:
 
 def at_whole_cycles(path: SignalPath) -> bool:
     """Whether set-points take effect with a cycle of the bus, as drives in step with it do."""
-    lead_s = STEP_LEAD_S if path.hold == "linear" else 0.0
-    cycles = (path.command_delay_s + lead_s) * path.sample_rate_hz
+    cycles = cycles_of(path)
     return abs(cycles - round(cycles)) < _WHOLE
 
 
@@ -227,9 +227,7 @@ class PathFit:
 
     def _path_of(self, x: FloatArray, hold: Hold) -> SignalPath:
         """Parameters are cycles of delay and, where it is not known, the log of the corner."""
-        period_s = 1.0 / self.path.sample_rate_hz
-        lead_s = STEP_LEAD_S if hold == "linear" else 0.0
-        late_s = max(float(x[0]) * period_s - lead_s, 0.0)
+        late_s = command_delay_s(float(x[0]), hold, self.path.sample_rate_hz)
         known = self.path.current_bandwidth_hz
         corner = float(np.exp(x[1])) if known is None else known
         return replace(self.path, hold=hold, command_delay_s=late_s, current_bandwidth_hz=corner)

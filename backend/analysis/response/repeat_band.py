@@ -24,14 +24,22 @@ from backend.analysis.signals.arrays import ComplexArray, FloatArray, neighbour_
 _REACH, _POOL = 6, 8
 #: One deviation each, fitted to simulated benches (two masses with Coulomb and Stribeck friction,
 #: backlash, ripple; 0.5 to 2 times the level): `benchmarks/import_accuracy.py` prints the coverage.
-MODE_SHIFT, DAMPING_SHIFT, FRICTION_SHIFT = 0.004, 0.25, 0.35
+MODE_SHIFT, DAMPING_SHIFT = 0.004, 0.25
+#: The pole that friction makes goes with 1/level: at half the level it has twice its frequency,
+#: which 1.96 deviations are to reach.
+FRICTION_SHIFT = 0.5
 #: A pole is friction's, not a filter's, up to so many times the lowest line.
 _FRICTION_BELOW = 2.0
-#: Gain by temperature of magnets and amplifier, phase by sampling: of any two runs.
-_GAIN, _TURN = 0.01, 0.01
-#: Two runs differ by the variances of both; the other one's may be twice this one's, as at 0.7
-#: times the level, where friction distorts more.
-_BOTH = 3.0
+#: Gain of any two runs: by temperature of magnets and amplifier (1 %), and by the place where each
+#: of them happens to stand, as a motor's torque goes with its place by 1 to 3 % (two places of a
+#: ripple of 2 % differ by 2 %, one deviation). A run that hardly travels shows nothing of it.
+_BY_TEMPERATURE, _BY_PLACE = 0.01, 0.02
+_GAIN = float(np.hypot(_BY_TEMPERATURE, _BY_PLACE))
+#: Phase by sampling.
+_TURN = 0.01
+#: Two runs differ by the variances of both; at half the level noise and what friction distorts are
+#: twice as large beside the lines, so that the other one's variance is four times this one's.
+_BOTH = 1.0 + 2.0**2
 
 
 @dataclass(frozen=True)

@@ -52,6 +52,24 @@ class SignalPath:
     response_bandwidth_hz: float | None = None
 
 
+def lead_s(hold: Hold) -> float:
+    """How much earlier than whole cycles say a hold's torque is, in s."""
+    return STEP_LEAD_S if hold == "linear" else 0.0
+
+
+def command_delay_s(cycles: float, hold: Hold, sample_rate_hz: float) -> float:
+    """Delay of a path whose set-points take effect after so many cycles, in s; 0 cycles at least.
+
+    Negative by the lead where a drive begins its interpolation in the cycle of the set-point.
+    """
+    return max(cycles, 0.0) / sample_rate_hz - lead_s(hold)
+
+
+def cycles_of(path: SignalPath) -> float:
+    """After how many cycles set-points take effect: the reverse of `command_delay_s`."""
+    return (path.command_delay_s + lead_s(path.hold)) * path.sample_rate_hz
+
+
 def hold_response(frequency_hz: FloatArray, sample_rate_hz: float, hold: Hold) -> ComplexArray:
     """Frequency response of the hold, unit gain at 0 Hz."""
     x = np.asarray(frequency_hz, dtype=np.float64) / sample_rate_hz
@@ -174,4 +192,8 @@ def _difference_equation(path: SignalPath) -> tuple[FloatArray, float, int]:
     t = np.arange(4) * period_s - part
     impulse = after(t) - after(t - period_s)
     a = 0.0 if wc is None else float(np.exp(-wc * period_s))
-    return impulse - a * np.concatenate([[0.0], impulse[:-1]]), a, int(whole)
+    numerator = impulse - a * np.concatenate([[0.0], impulse[:-1]])
+    if whole < 0.0:
+        # A line that begins before its set-point's cycle does is not yet at its value there.
+        return numerator[1:], a, int(whole) + 1
+    return numerator, a, int(whole)

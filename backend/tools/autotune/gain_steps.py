@@ -70,9 +70,8 @@ async def gain_steps(
     parameter = drive.parameter(key)
     now = await drive.raw(key)
     value = si_value(parameter, float(parameter.to_value(now)))
-    quiet = oscillation_percent(present, settings)
     done: list[GainStep] = []
-    count = max(1, int(np.ceil(wanted_db / _STEP_DB)))
+    count = steps_to(wanted_db)
     for db in wanted_db * np.arange(1, count + 1) / count:
         raw = gain_tool.raised(drive, key, now, float(10 ** (db / 20.0)))
         held = si_value(parameter, float(parameter.to_value(raw)))
@@ -90,7 +89,7 @@ async def gain_steps(
                     raise
                 done.append(GainStep(real_db, float("inf"), False))
                 break
-        done.append(_judged(step, settings, real_db, quiet))
+        done.append(judged(step, present, settings, real_db))
         if not done[-1].stable:
             break
     shown = [each.gain_db for each in done if each.stable]
@@ -98,13 +97,33 @@ async def gain_steps(
     return GainSteps(max(shown, default=0.0), onset, tuple(done))
 
 
-def _judged(step: StepResult, settings: StepSettings, gain_db: float, quiet: float) -> GainStep:
-    """Whether the torque settles, as it does of a loop that is stable."""
-    size = oscillation_percent(step, settings)
-    first, second = (float(np.std(part)) for part in np.array_split(_steady(step, settings), 2))
-    allowed = max(_QUIET_PERCENT, _NOISE * 10 ** (gain_db / 20.0) * quiet)
-    grows = second > _GROWS * first and second > _QUIET_PERCENT
+def steps_to(wanted_db: float) -> int:
+    """How many raised gains lead up to this one."""
+    return max(1, int(np.ceil(wanted_db / _STEP_DB)))
+
+
+def judged(
+    step: StepResult, present: StepResult, settings: StepSettings, gain_db: float
+) -> GainStep:
+    """Whether the torque settles, as it does of a loop that is stable.
+
+    ``present`` is the same step with the gain as it is. A torque that goes with the place (cogging,
+    a load off its axis, an inertia by place) is the same in both, and may well be larger in the
+    second half: an oscillation is in the step and in what it differs from ``present`` by.
+    """
+    before = _steady(present, settings)
+    after = _steady(step, settings)
+    count = min(before.size, after.size)
+    parts = (after, after[:count] - before[:count])
+    size = min(float(np.std(part)) for part in parts)
+    allowed = max(_QUIET_PERCENT, _NOISE * 10 ** (gain_db / 20.0) * float(np.std(before)))
+    grows = all(_grows(part) for part in parts)
     return GainStep(gain_db, size, size <= allowed and not grows)
+
+
+def _grows(torque: npt.NDArray[np.float64]) -> bool:
+    first, second = (float(np.std(part)) for part in np.array_split(torque, 2))
+    return second > _GROWS * first and second > _QUIET_PERCENT
 
 
 def oscillation_percent(step: StepResult, settings: StepSettings) -> float:

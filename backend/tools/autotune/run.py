@@ -128,7 +128,7 @@ async def autotune(
         NotAllowed: a step cannot be done or its answer cannot be trusted; says which and why.
         DriveError: as the single tools.
     """
-    time_left = TimeLeft.of(settings.budget_s)
+    time_left = TimeLeft.of(settings.budget_s, cycle_s(session))
     progress(0.0, text("autotune.pre-checks"))
     facts = await _pre_checks(axis, settings)
     async with stopping_hard(axis, settings.envelope.speed_rpm):

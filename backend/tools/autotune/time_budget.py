@@ -8,12 +8,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+from backend.analysis.response.sampling import DIRECT_SHARE
 from backend.tools.measuring.repeats import Repeats
 
 #: Writing a design, standing still and a step, beside the measurement of the loop.
 _AROUND_S = 4.0
 #: What follows the measurements: computing designs, writing one and verifying it.
 _DESIGNED_AND_VERIFIED_S = 12.0
+#: A step with a raised gain, how many of them a loop needs that crosses above the measured band,
+#: and up to how many Hz tuned loops cross.
+_GAIN_STEP_S, _GAIN_STEPS, _CROSSES_HZ = 2.1, 3, 400.0
 #: What a verification takes longer at most where samples are lost all the time.
 _LOST_S = 6.0
 #: A frequency response, as far as it must be.
@@ -39,11 +43,20 @@ class TimeLeft:
     """How much of the frequency response was measured again for lost samples, 0 to 1."""
     given_up: list[str] = field(default_factory=list)
     """What was not measured as well as it could be, in words."""
+    raising_s: float = 0.0
+    """What raising the gain in steps takes, where a loop may cross above the measured band."""
 
     @classmethod
-    def of(cls, budget_s: float) -> TimeLeft:
-        """From now on."""
-        return cls(time.monotonic() + budget_s)
+    def of(cls, budget_s: float, cycle_s: float | None = None) -> TimeLeft:
+        """From now on, for a bus with this cycle time; None: it shows any loop."""
+        time_left = cls(time.monotonic() + budget_s)
+        if cycle_s is not None and DIRECT_SHARE / cycle_s < _CROSSES_HZ:
+            time_left.require_raising(_GAIN_STEPS)
+        return time_left
+
+    def require_raising(self, steps: int) -> None:
+        """Keep time for so many raised gains."""
+        self.raising_s = _GAIN_STEP_S * steps
 
     def verifications(self) -> float:
         """How many more as long as the longest fit; the first always does."""
@@ -56,7 +69,7 @@ class TimeLeft:
 
         Beside so many ``looks``, further verifications, where there is time for all of them.
         """
-        left_s = self.until_s - time.monotonic() - _AROUND_S
+        left_s = self.until_s - self.raising_s - time.monotonic() - _AROUND_S
         spare_s = looks * (first_s + _AROUND_S)
         if left_s >= spare_s:
             left_s -= spare_s
@@ -64,19 +77,24 @@ class TimeLeft:
 
     def learning(self) -> Repeats:
         """What may be measured before the designs, as long as one is verified in time."""
-        return Repeats(self.until_s - _DESIGNED_AND_VERIFIED_S - self.lossy * _LOST_S)
+        return Repeats(self._measured_by_s - self.lossy * _LOST_S)
 
     def measuring(self, learning_s: float) -> Repeats:
         """What of a frequency response, where learning what notches do takes so long after it."""
-        return Repeats(self.until_s - _DESIGNED_AND_VERIFIED_S - learning_s)
+        return Repeats(self._measured_by_s - learning_s)
 
     def moving(self) -> Repeats:
         """What of moves for the inertia; the frequency response comes after them."""
-        return Repeats(self.until_s - _DESIGNED_AND_VERIFIED_S - _SWEEP_S)
+        return Repeats(self._measured_by_s - _SWEEP_S)
 
     def verifying_again(self) -> Repeats:
         """What of a tuned loop."""
-        return Repeats(self.until_s - _AROUND_S)
+        return Repeats(self.until_s - _AROUND_S - self.raising_s)
+
+    @property
+    def _measured_by_s(self) -> float:
+        """When designing and verifying must begin at the latest."""
+        return self.until_s - _DESIGNED_AND_VERIFIED_S - self.raising_s
 
     def give_up(self, words: str) -> None:
         """Note once what was not done for its time."""

@@ -19,7 +19,7 @@ from backend.analysis.response.sampling import Hold
 from backend.axis.axis import Axis, Envelope
 from backend.axis.cyclic import CyclicSession
 from backend.tools.autotune.axis_facts import AxisFacts
-from backend.tools.autotune.gain_steps import GainSteps, gain_steps
+from backend.tools.autotune.gain_steps import GainSteps, gain_steps, steps_to
 from backend.tools.autotune.time_budget import NOT_AGAIN, TimeLeft
 from backend.tools.autotune.verdict import (
     BLURRED_DEG,
@@ -136,9 +136,8 @@ async def verify(
         await go_back(axis, session, check.home_raw, check.envelope, check.facts)
     settings = sweep_evaluation.SweepSettings(
         check.envelope, kind="speed_loop", realisations=1,
-        inertia_kgm2=check.inertia_kgm2, hold=check.hold,
+        inertia_kgm2=check.inertia_kgm2, hold=check.hold, pairs_before=check.pairs_before,
         rated_torque_nm=check.rated_torque_nm, coulomb_nm=check.coulomb_nm,
-        pairs_before=check.pairs_before,
     )  # fmt: skip
     clock = time_left or TimeLeft()
     begun_s = time.monotonic()
@@ -147,14 +146,16 @@ async def verify(
     read = sharp_margins(swept)
     # To verify once more what this loop says is worth more than to measure it for longer.
     looks = LOOKS - bool(check.pairs_before) if read else 0
-    pairs = clock.pairs(time.monotonic() - begun_s, MOST_PAIRS, looks)
-    missed = worse_than(promised, read)
+    took_s = time.monotonic() - begun_s
     verdict = _verdict(axis, check, candidate, swept, None)
+    above = tuple(each for each in _misses(verdict, promised) if _by_raised_gain(each))
+    clock.require_raising(steps_to(_wanted_db(above, promised)) if above else 0)
+    pairs = clock.pairs(took_s, MOST_PAIRS, looks)
+    missed = worse_than(promised, read)
     blurred = any(each.end == "measured" for each in _misses(verdict, promised))
     as_predicted = _as_predicted(candidate.bandwidth_hz, _width_of(read), _DOUBTED)
-    unsure = not read or blurred or not as_predicted
     every: Frf | None = None
-    if unsure and pairs > 1 and not missed:
+    if (not read or blurred or not as_predicted) and pairs > 1 and not missed:
         settings = replace(settings, realisations=pairs)
         with clock.extra():
             more = await sweep_tool.sweep(axis, session, settings, measuring, keep, again)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,7 +62,8 @@ class Probed:
     rated_nm: float
 
 
-#: Share of the wanted speed below which an axis stood, and how long a brake may take to open then.
+#: Share of the wanted speed below which an axis stood, and how long a brake may take to open after
+#: Operation enabled.
 _STOOD, _BRAKE_S = 0.05, 0.5
 
 
@@ -107,9 +109,11 @@ def _integer(raw: object) -> int:
 
 async def probe_axis(
     axis: Axis, session: CyclicSession, envelope: Envelope, facts: AxisFacts, home_raw: int,
-    inertia_kgm2: float | None = None,
+    inertia_kgm2: float | None = None, *, moved_before: bool = False,
 ) -> Probed:  # fmt: skip
     """Feel the axis in CST, from 2 % of rated torque upwards.
+
+    ``moved_before``: moves have shown whether a brake opens late (`Axis.brake_wait_s`).
 
     Where its inertia is known, from half of the torque that moves it well without any friction,
     but of a quarter of the permitted one at most.
@@ -130,8 +134,10 @@ async def probe_axis(
         needed = enough * inertia_kgm2 / (2.0 / np.pi * _DURATION_S / 4.0)
         first = max(first, min(0.5 * needed, 0.25 * highest))
     peak = min(first, highest)
-    waited = False
+    waited = moved_before
     async with enabled(axis, session, Mode.CST):
+        # Of the time that a brake may take, the first sequence is a part.
+        open_s = time.monotonic() + _BRAKE_S
         while True:
             values = excite.probe(rate, peak, _DURATION_S, step)
             raw = np.round(values / step).astype(np.int64)
@@ -145,7 +151,7 @@ async def probe_axis(
                 # A brake that opens late must not let go of an axis under ever more torque.
                 waited = True
                 # The last setpoint, no torque, is renewed: unrenewed it would expire and disable.
-                await dwell(axis, session, _BRAKE_S)
+                await dwell(axis, session, max(open_s - time.monotonic(), 0.0))
                 continue
             # Doubling brings a free axis to the wanted speed without ever jumping past it.
             peak = min(2.0 * peak, highest)

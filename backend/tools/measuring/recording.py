@@ -307,19 +307,19 @@ async def play(
         aligned, whole, catch.runs(), drive.name, ended_early=ended_early
     )
     if limits.feedback is not None:
-        _require_agreement(axis, bridged(table, valid), period_s, limits.feedback)
+        _require_agreement(axis, bridged(table, valid), valid, period_s, limits.feedback)
     return await _in_si(axis, whole, table, valid, period_s, rated_torque_nm)
 
 
 def _require_agreement(
-    axis: Axis, table: FloatArray, period_s: float, scale: FeedbackScale
+    axis: Axis, table: FloatArray, valid: BoolArray, period_s: float, scale: FeedbackScale
 ) -> None:
     """Nothing is computed from a 606Ch that the position contradicts.
 
     Raises:
         Interrupted: naming both speeds.
     """
-    halt = disagreement_of(table[:, 0], table[:, 1], period_s, scale)
+    halt = disagreement_of(table[:, 0], table[:, 1], period_s, scale, valid)
     if halt is not None:
         raise interrupted_by(axis, halt)
 

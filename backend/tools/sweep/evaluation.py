@@ -25,9 +25,9 @@ from backend.analysis.response.reported import (
 )
 from backend.analysis.response.sampling import (
     MODEL_SHARE,
-    STEP_LEAD_S,
     Hold,
     SignalPath,
+    command_delay_s,
     lag_response,
     sampled_command,
 )
@@ -157,7 +157,7 @@ def evaluate(
         sample_rate_hz=rate,
         hold=hold,
         current_bandwidth_hz=facts.current_bandwidth_hz,
-        command_delay_s=max((1.0 / rate if dc else 0.0) - (hold == "linear") * STEP_LEAD_S, 0.0),
+        command_delay_s=command_delay_s(1.0 if dc else 0.0, hold, rate),
         response_bandwidth_hz=facts.speed_filter_hz,
     )
     if settings.kind != "mechanics":

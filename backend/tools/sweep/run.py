@@ -83,7 +83,13 @@ async def sweep(
             else:
                 progress(0.02, text("sweep.feeling-axis-small-torque"))
                 probed = await probe_axis(
-                    axis, session, settings.envelope, facts, home, settings.inertia_kgm2
+                    axis,
+                    session,
+                    settings.envelope,
+                    facts,
+                    home,
+                    settings.inertia_kgm2,
+                    moved_before=settings.inertia_deviation is not None,
                 )
                 loop = chosen_loop(axis, settings, probed)
         how = _Sweep(axis, session, settings, facts, home, probed, repeats)

@@ -72,6 +72,20 @@ def test_a_straight_line_is_told_from_a_staircase(interpolates):
         assert best.current_bandwidth_hz == pytest.approx(1000.0, rel=0.03)
 
 
+@pytest.mark.parametrize("known_hz", [None, 1000.0])
+def test_a_line_that_begins_in_its_own_cycle_is_a_line(known_hz):
+    """Set-points that act at once: the line of steps is 25 µs before one of whole cycles.
+
+    A staircase with part of a cycle of delay is near it in the sampled torque (0.68 cycles, a
+    current loop of 1 kHz), and 25 µs too late a line explains less than that.
+    """
+    case = case_of(1000.0, late_steps=0, interpolates=True, current_hz=1000.0)
+    path = SignalPath(1000.0, current_bandwidth_hz=known_hz)
+    best = find_paths(records_of(case), path, loop_closed=False, hold_known=False)[0]
+    assert best.hold == "linear"
+    assert best.command_delay_s == pytest.approx(-25e-6, abs=5e-6)
+
+
 def test_a_delay_just_short_of_whole_cycles_is_found():
     """Two samples tell it: beyond the whole cycle the misfit hardly changes any more."""
     path = SignalPath(1000.0, current_bandwidth_hz=700.0)

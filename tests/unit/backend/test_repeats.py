@@ -264,3 +264,16 @@ async def test_what_stops_an_axis_on_its_way_home_is_told_first() -> None:
 
     with pytest.raises(NotAllowed, match="Operation enabled"):
         await meanwhile(short, stopped())
+
+
+def test_raised_gains_that_a_slow_cycle_needs_have_their_time(clock: Clock) -> None:
+    """At 1 ms a loop is measured up to 250 Hz and may cross above; at 0.5 ms hardly any does."""
+    slow, fast = TimeLeft.of(60.0, 1e-3), TimeLeft.of(60.0, 5e-4)
+    ends = [slow.moving(), slow.measuring(20.0), slow.learning(), slow.verifying_again()]
+    # Three steps of about 2 s each.
+    assert [each.by_s - clock.now_s for each in ends] == pytest.approx([25.7, 21.7, 41.7, 49.7])
+    assert fast.verifying_again().by_s - clock.now_s == 56.0
+    slow.require_raising(0)
+    assert slow.verifying_again().by_s - clock.now_s == 56.0
+    slow.require_raising(4)
+    assert slow.pairs(2.0, 30) == (60.0 - 4.0 - 8.4) // 2.0

@@ -71,3 +71,16 @@ def test_the_scale_of_an_unknown_606c_is_measured() -> None:
     found = measured_scale(position, np.round(speeds(position) / RPM * 10), CYCLE_S)
     assert found == pytest.approx(600 / COUNTS, rel=0.02)
     assert measured_scale(position, np.zeros(len(position)), CYCLE_S) is None
+
+
+def test_a_straight_line_across_lost_samples_is_no_contradiction() -> None:
+    """What a gap hides is guessed of both, and differs where the axis swings meanwhile."""
+    position = places(600.0, 15.0)
+    velocity = speeds(position)
+    valid = (np.arange(len(position)) % 400) >= 40
+    rows, good = np.arange(len(position)), np.flatnonzero(valid)
+    place, speed = (np.interp(rows, good, x[good]) for x in (position, velocity))
+    assert disagreement_of(place, speed, CYCLE_S, SCALE) is not None
+    assert disagreement_of(place, speed, CYCLE_S, SCALE, valid) is None
+    # A wrong scale shows beside the gaps.
+    assert disagreement_of(place, 0.5 * speed, CYCLE_S, SCALE, valid) is not None

@@ -100,22 +100,30 @@ class _Computing:
             cls.count += calls
 
     @classmethod
-    def rest(cls) -> None:
-        """Let threads compute for `_REST_S` of processor time, or until they are through."""
+    def rest(cls) -> float:
+        """Let threads compute for `_REST_S` of processor time, or until they are through.
+
+        Returns the processor time that passed, in s: the drive's turn stands for it.
+        """
         begun = time.process_time()
         while cls.count and time.process_time() - begun < _REST_S:
             # Not asyncio's: that would be over in no time, as it is the drive's.
             time.sleep(_REST_S / 5)
+        return time.process_time() - begun
 
 
 class _Clock:
     """`time.monotonic` of who waits for a drive whose time is ``drive_ns``.
 
-    To that comes the processor's time while the exchange ``runs``, and else the computer's.
+    To that comes the processor's time while the exchange ``runs``, and else the computer's; not
+    what it takes to ``simulate`` the drive, which no computer beside a real one does.
     """
 
-    def __init__(self, drive_ns: Callable[[], int], runs: Callable[[], bool]) -> None:
-        self._drive_ns, self._runs = drive_ns, runs
+    def __init__(
+        self, drive_ns: Callable[[], int], runs: Callable[[], bool], simulate: Callable[[], float]
+    ) -> None:
+        self._drive_ns, self._runs, self._simulate = drive_ns, runs, simulate
+        self._simulated = simulate()
         self._computers = time.monotonic
         self._lock = threading.Lock()
         self._passed = self._wall = self._computers()
@@ -125,7 +133,10 @@ class _Clock:
         with self._lock:
             wall, processor = self._computers(), time.process_time()
             # Threads may compute side by side.
-            computed = min(processor - self._processor, wall - self._wall)
+            simulated = self._simulate()
+            own = processor - self._processor - (simulated - self._simulated)
+            self._simulated = simulated
+            computed = max(min(own, wall - self._wall), 0.0)
             self._passed += computed if self._runs() else wall - self._wall
             self._wall, self._processor = wall, processor
             return self._passed + self._drive_ns() / 1e9
@@ -158,6 +169,8 @@ class DirectLink:
         self._count = 0
         """Of cycles whose samples were delivered."""
         self._ordinary_time = time.monotonic
+        self.simulated_s = 0.0
+        """Processor time that simulating took, and that passed as turns of the drive."""
         self._consumers: list[Callable[[ScopeBlock], None]] = []
         self._channels: tuple[str, ...] = ()
         self._written: dict[int, int] = {}
@@ -177,7 +190,7 @@ class DirectLink:
     async def open(self) -> None:
         self.device.advance(0)
         _Computing.watch(asyncio.get_running_loop())
-        time.monotonic = _Clock(lambda: self.now_ns, lambda: self.running)
+        time.monotonic = _Clock(lambda: self.now_ns, lambda: self.running, lambda: self.simulated_s)
 
     async def close(self) -> None:
         await self.stop()
@@ -295,7 +308,7 @@ class DirectLink:
         per_turn = max(1, round(_TURN_NS / self.cycle_ns))
         while True:
             rows: list[list[float]] = []
-            missed = 0
+            missed, begun = 0, time.thread_time()
             for _ in range(per_turn):
                 if late := self.late():
                     self._deliver(rows, missed)
@@ -310,11 +323,12 @@ class DirectLink:
                     # What was sent is known all the same.
                     inputs = len(self._columns[1])
                     rows[-1][-inputs:] = [np.nan] * inputs
+            self.simulated_s += time.thread_time() - begun
             if not self._reached:
                 return
             self._deliver(rows, missed)
             await asyncio.sleep(0)
-            _Computing.rest()
+            self.simulated_s += _Computing.rest()
 
     def _deliver(self, rows: list[list[float]], missed: int) -> None:
         if not rows:
