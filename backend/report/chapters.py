@@ -18,7 +18,9 @@ from backend.report.numbers import (
 )
 from backend.report.plot import Curve, Plot
 from backend.report.texts import Words
+from backend.report.tools import kind_title, tool_blocks
 from backend.report.views import InertiaView, StepView, SweepView
+from backend.tools.tool import ToolResult
 
 #: Told apart in print and by the colour-blind: dark blue, orange.
 _NOW, _EARLIER, _DEMAND = "#1a5c94", "#c2571a", "#5b6770"
@@ -30,9 +32,11 @@ _TURN = 360.0
 
 def chapter(measured: Measured, words: Words) -> list[Block]:
     """Everything about one measurement."""
-    blocks: list[Block] = [Heading(words(f"kind.{measured.kind}"), 3)]
+    blocks: list[Block] = [Heading(kind_title(measured.kind, words), 3)]
     view = measured.view
-    if isinstance(view, SweepView):
+    if isinstance(view, ToolResult):
+        blocks += tool_blocks(measured.kind, view, words)
+    elif isinstance(view, SweepView):
         blocks += _sweep(measured, view, words)
     elif isinstance(view, InertiaView):
         blocks += _inertia(view, words)

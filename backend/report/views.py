@@ -7,6 +7,8 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from backend.library.measurements import BadMeasurement
+from backend.tools.registry import BY_KIND
+from backend.tools.tool import ToolResult
 
 
 class View(BaseModel):
@@ -97,7 +99,7 @@ class StepView(View):
     widened: bool = False
 
 
-AnyView = SweepView | InertiaView | StepView
+AnyView = SweepView | InertiaView | StepView | ToolResult
 
 
 def view_of(tool: object, result: dict[str, object]) -> AnyView:
@@ -109,7 +111,8 @@ def view_of(tool: object, result: dict[str, object]) -> AnyView:
     kinds: dict[object, type[AnyView]] = {
         "sweep": SweepView, "inertia": InertiaView, "step": StepView,
     }  # fmt: skip
-    kind = kinds.get(tool)
+    known = BY_KIND.get(str(tool))
+    kind = known.result if known is not None else kinds.get(tool)
     if kind is None:
         raise BadMeasurement(f"a report cannot show what {tool!r} measures", value=str(tool))
     try:
