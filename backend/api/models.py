@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from backend.tools.registry import ToolOutcome
+from backend.tools.results import ToolOutcome
 
 Raw = int | float | str
 

@@ -19,7 +19,7 @@ from backend.report.facts import Facts, Measured
 from backend.report.numbers import NONE, fixed, hertz, margin, milliseconds, moment, significant
 from backend.report.texts import Words
 from backend.report.tools import kind_title, tool_verdict
-from backend.report.views import InertiaView, StepView, SweepView
+from backend.report.views import StepView, SweepView
 from backend.tools.tool import ToolResult
 
 #: docs/tuning.md: 45° or more is calm, 8 dB or more, Ms below 2; and what is no longer sound.
@@ -95,10 +95,6 @@ def _verdict(measured: Measured, words: Words) -> Note:
     view, kind = measured.view, kind_title(measured.kind, words)
     if isinstance(view, ToolResult):
         return tool_verdict(measured.kind, view, words)
-    if isinstance(view, InertiaView):
-        good = view.identifiable
-        text = words("inertia.known" if good else "inertia.unknown")
-        return Note(words("inertia.verdict", verdict=text), "good" if good else "warn")
     if isinstance(view, StepView):
         return _step_verdict(view, kind, words)
     if view.kind == "mechanics":

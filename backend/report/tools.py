@@ -27,7 +27,7 @@ def tool_blocks(kind: str, result: ToolResult, words: Words) -> list[Block]:
     section: Section = tool.report(result)
     head = (words("quantity"), words("value"), words("interval"))
     rows = tuple(
-        (tool.text(row.name, words.language, **row.values), significant(row.value, row.unit, 3),
+        (tool.text(row.name, words.language, row.values), significant(row.value, row.unit, 3),
          _interval(row.ci95))
         for row in section.rows
     )  # fmt: skip
@@ -47,7 +47,7 @@ def tool_verdict(kind: str, result: ToolResult, words: Words) -> Note:
 
 
 def _note(tool: AnyTool, note: ToolNote, words: Words) -> Note:
-    return Note(tool.text(note.name, words.language, **note.values), note.tone)
+    return Note(tool.text(note.name, words.language, note.values), note.tone)
 
 
 def _plot(tool: AnyTool, chart: Chart, words: Words) -> Plot:

@@ -11,7 +11,6 @@ import numpy as np
 from backend.axis.axis import Envelope
 from backend.library.measurements import BadMeasurement, Measurement
 from backend.response_import import stored as response_import
-from backend.tools.inertia import evaluation as inertia_evaluation
 from backend.tools.measuring.recording import Recording
 from backend.tools.registry import BY_KIND
 from backend.tools.step import run as step_tool
@@ -64,8 +63,6 @@ def recompute(measurement: Measurement) -> dict[str, object]:
         match meta.get("tool"):
             case "sweep":
                 return sweep_evaluation.as_json(sweep_evaluation.reevaluate(arrays, meta))
-            case "inertia":
-                return inertia_evaluation.as_json(inertia_evaluation.reevaluate(arrays, meta))
             case "response-import":
                 return response_import.reevaluate(arrays, meta)
             case "step":

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
-from backend.tools import friction
-from backend.tools.friction.result import FrictionResult
+from backend.tools.friction.run import TOOL as FRICTION
+from backend.tools.inertia.run import TOOL as INERTIA
 from backend.tools.tool import AnyTool
 
-TOOLS: tuple[AnyTool, ...] = (friction.TOOL,)
+TOOLS: tuple[AnyTool, ...] = (INERTIA, FRICTION)
 BY_KIND: dict[str, AnyTool] = {tool.kind: tool for tool in TOOLS}
-ToolOutcome: TypeAlias = FrictionResult

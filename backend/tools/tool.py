@@ -10,25 +10,40 @@ from __future__ import annotations
 import time
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Generic, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeAlias, TypeVar
 
-import numpy as np
-import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field
 
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
 from backend.people.rights import Right
 from backend.tools.measuring.repeats import Repeats
 from backend.work.jobs import Progress
 
-Arrays = Mapping[str, npt.NDArray[np.generic]]
+if TYPE_CHECKING:  # who only reads results or settings imports no analysis
+    import numpy as np
+    import numpy.typing as npt
+
+    from backend.axis.axis import Axis
+    from backend.axis.cyclic import CyclicSession
+    from backend.motion.envelope import Envelope
+
+Arrays: TypeAlias = "Mapping[str, npt.NDArray[np.generic]]"
 Meta = Mapping[str, object]
-Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
+Keep: TypeAlias = "Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]"
 Interval = tuple[float | None, float | None]
 """Lower and upper end of a 95 % interval; None where an end is not known."""
 Texts = Mapping[str, tuple[str, str]]
 """English and Chinese by name."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """How a setting is called on the command line, where not by its own name.
+
+    A pair has two names. ``default`` stands in where the interface asks for a value.
+    """
+
+    names: tuple[str, ...] = ()
+    default: float | None = None
 
 
 class ToolSettings(BaseModel):
@@ -36,9 +51,15 @@ class ToolSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    travel_limit: float = Field(gt=0)
-    speed_limit: float = Field(gt=0)
-    torque_limit: float = Field(gt=0, le=400)
+    travel_limit: Annotated[float, Option(("--travel-rev",), 3.0)] = Field(
+        gt=0, description="longest way from the start, in revolutions"
+    )
+    speed_limit: Annotated[float, Option(("--speed-rpm",), 1200.0)] = Field(
+        gt=0, description="highest speed, in rpm"
+    )
+    torque_limit: Annotated[float, Option(("--torque-percent",), 80.0)] = Field(
+        gt=0, le=400, description="highest torque, in % of rated"
+    )
     time_limit_s: float = Field(default=60.0, gt=0, le=300)
     rated_torque_nm: float | None = Field(
         default=None, gt=0, description="overrides what the drive says"
@@ -56,6 +77,8 @@ class ToolSettings(BaseModel):
     @property
     def envelope(self) -> Envelope:
         """The limits of the motion."""
+        from backend.motion.envelope import Envelope
+
         return Envelope(self.travel_limit, self.speed_limit, self.torque_limit, self.time_limit_s)
 
 
@@ -162,7 +185,10 @@ class Tool(Generic[S, R]):
     right: Right = Right.MEASURE
     motion: bool = True
 
-    def text(self, name: str, language: Literal["en", "zh"] = "en", **values: str) -> str:
+    def text(
+        self, name: str, language: Literal["en", "zh"] = "en",
+        values: Mapping[str, str] | None = None,
+    ) -> str:  # fmt: skip
         """A text of this tool with its places filled in."""
         found = self.texts[name][1 if language == "zh" else 0]
         return found.format(**values) if values else found

@@ -35,7 +35,7 @@ TOLD_THERE = frozenset(
             f"{_DRIVE}/sets", f"{_DRIVE}/transition", f"{_DRIVE}/fault-reset",
             f"{_DRIVE}/procedures/{{name}}", f"{_DRIVE}/jobs/load_set", f"{_DRIVE}/jobs/move",
             f"{_DRIVE}/jobs/sequence", f"{_DRIVE}/jobs/generate", f"{_DRIVE}/jobs/home",
-            f"{_DRIVE}/jobs/identify", f"{_DRIVE}/jobs/sweep", f"{_DRIVE}/jobs/inertia",
+            f"{_DRIVE}/jobs/identify", f"{_DRIVE}/jobs/sweep",
             f"{_DRIVE}/jobs/step", f"{_DRIVE}/jobs/autotune", f"{_DRIVE}/jobs/firmware",
             f"{_DRIVE}/jobs/put-back",
             f"{_DRIVE}/io/forcing/{{name}}", f"{_DRIVE}/tune/undo",

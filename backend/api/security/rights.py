@@ -134,7 +134,6 @@ _API: dict[str, Need] = {
     "POST /drives/{drive_id}/jobs/home": _MOTION,
     "POST /drives/{drive_id}/jobs/identify": _MOTION,
     "POST /drives/{drive_id}/jobs/sweep": _MEASURE,
-    "POST /drives/{drive_id}/jobs/inertia": _MEASURE,
     "POST /drives/{drive_id}/jobs/step": _MEASURE,
     "POST /drives/{drive_id}/jobs/autotune": _MEASURE,
     **{f"POST /drives/{{drive_id}}/jobs/{tool.kind}": Need(tool.right, "drive") for tool in TOOLS},

@@ -21,7 +21,6 @@ from backend.api.tuning.measurements import change_log
 from backend.api.tuning.models import (
     AutotuneRequest,
     ExcitationInfo,
-    InertiaRequest,
     StepRequest,
     SweepRequest,
     ToolInfo,
@@ -35,8 +34,6 @@ from backend.station.connected_drive import Member
 from backend.station.measuring import EXCHANGE_ENDS_S, exchange_for
 from backend.tools.autotune import run as autotune
 from backend.tools.autotune.apply import take_back
-from backend.tools.inertia import evaluation as inertia_evaluation
-from backend.tools.inertia import run as inertia
 from backend.tools.registry import TOOLS
 from backend.tools.step import run as step_response
 from backend.tools.sweep import evaluation as sweep_evaluation
@@ -147,23 +144,6 @@ async def start_sweep(bench: TheBench, member: Controlled, request: SweepRequest
         )
 
     return await _start(bench, member, request, "sweep", "Frequency response", tool)
-
-
-@router.post("/drives/{drive_id}/jobs/inertia", status_code=202)
-async def start_inertia(bench: TheBench, member: Controlled, request: InertiaRequest) -> JobInfo:
-    """Measure inertia and friction. The result has the form of ``servodeck inertia --out``."""
-    settings = inertia_evaluation.InertiaSettings(
-        request.envelope, request.scheme, request.ends_rev, request.search_torque,
-        request.search_speed, request.repetitions, request.rated_torque_nm,
-        request.motor_inertia_kgm2,
-    )  # fmt: skip
-
-    async def tool(session: CyclicSession, progress: Progress, keep: Keep) -> JobResult:
-        return inertia_evaluation.as_json(
-            await inertia.inertia(member.axis, session, settings, progress, keep)
-        )
-
-    return await _start(bench, member, request, "inertia", "Inertia and friction", tool)
 
 
 @router.post("/drives/{drive_id}/jobs/step", status_code=202)

@@ -55,17 +55,6 @@ class ExcitationInfo(Message):
     inertia_kgm2: float = Field(description="that was assumed")
 
 
-class InertiaRequest(TuneLimits):
-    """Inertia and friction."""
-
-    scheme: Literal["free", "limited", "taught"] = "free"
-    ends_rev: tuple[float, float] | None = None
-    search_torque: float = Field(default=20.0, gt=0, le=100)
-    search_speed: float = Field(default=30.0, gt=0)
-    repetitions: int = Field(default=4, ge=1, le=10)
-    motor_inertia_kgm2: float | None = Field(default=None, gt=0)
-
-
 class StepRequest(TuneLimits):
     """A step of speed (rpm) or a move (rev)."""
 

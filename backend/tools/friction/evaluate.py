@@ -263,10 +263,25 @@ def _level(
         torque = torque - ripple.at(angle, plateau.rpm)
     count = int(whole) if whole >= 4.0 else _BLOCKS
     parts = np.array([np.mean(part) for part in np.array_split(torque, count)])
-    time = np.arange(angle.size) / rate
-    acceleration = 2.0 * float(np.polyfit(time - time.mean(), angle, 2)[0])
-    lost = inertia * acceleration
+    lost = inertia * _acceleration(angle, int(whole), rate)
     return float(np.mean(torque)) - lost, parts - lost, revolutions
+
+
+def _acceleration(angle: FloatArray, whole: int, rate: float) -> float:
+    """Mean in rad/s², from the times of the first and the last revolution; 0 with fewer than two.
+
+    Within one revolution the ripple of the speed cannot be told from an acceleration.
+    """
+    if whole < 2:
+        return 0.0
+    gone = np.abs(angle - angle[0])
+    marks = np.interp([0.0, _TURN, (whole - 1) * _TURN, whole * _TURN], gone, np.arange(gone.size))
+    first, last = (marks[1] - marks[0]) / rate, (marks[3] - marks[2]) / rate
+    if min(first, last) <= 0.0:
+        return 0.0
+    apart = 0.5 * (marks[2] + marks[3] - marks[0] - marks[1]) / rate
+    change = _TURN / last - _TURN / first
+    return float(np.sign(angle[-1] - angle[0]) * change / apart)
 
 
 # --- ripple ----------------------------------------------------------------------------------

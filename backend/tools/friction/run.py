@@ -1,4 +1,4 @@
-"""The moves of a friction map: constant speeds both ways, to and fro about the place of the axis."""
+"""The moves of a friction map: constant speeds both ways, to and fro about one place."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ import numpy.typing as npt
 from backend.axis.axis import Envelope
 from backend.scales.units import AxisUnits
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts
-from backend.tools.friction.evaluate import Map, evaluate
+from backend.tools.friction.evaluate import Map, evaluate, reevaluate
 from backend.tools.friction.result import FrictionResult
 from backend.tools.friction.settings import FrictionSettings
+from backend.tools.friction.texts import TEXTS, report
 from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.inertia.moves import first_look, speed_move
 from backend.tools.inertia.probe import RoughFit
 from backend.tools.measuring.computing import meanwhile
 from backend.tools.measuring.recording import Recording, cycle_s, require_signals, share
 from backend.tools.moves.go_back import go_back
-from backend.tools.tool import Run
+from backend.tools.tool import Run, Tool
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
 
@@ -275,3 +276,14 @@ def _require_torque(run: Run, first: Recording, facts: AxisFacts, units: AxisUni
         drive=drive.name, parameter=key,
         remedy="use a drive or a bus that reports the actual torque with every cycle",
     )  # fmt: skip
+
+
+TOOL = Tool(
+    kind="friction",
+    settings=FrictionSettings,
+    result=FrictionResult,
+    run=run,
+    reevaluate=reevaluate,
+    report=report,
+    texts=TEXTS,
+)
