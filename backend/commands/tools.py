@@ -15,14 +15,14 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from backend.commands import measure
-from backend.commands.options import Json
+from backend.commands.options import Json, Server
 from backend.commands.session import progress
 from backend.tools.registry import BY_KIND
 from backend.tools.tool import AnyTool, Option, Row, Run, ToolResult
 
 _WHERE: dict[str, tuple[Any, object]] = {
     "url": (measure.Url, None), "station": (measure.Station, 1), "profile": (measure.Profile, None),
-    "server": (measure.Server, None), "axis": (measure.AxisName, None),
+    "server": (Server, None), "axis": (measure.AxisName, None),
 }  # fmt: skip
 _OUTPUT: dict[str, tuple[Any, object]] = {"out": (measure.Out, None), "as_json": (Json, False)}
 
@@ -51,11 +51,10 @@ def command_of(tool: AnyTool) -> Callable[..., None]:
 
     command.__name__, command.__doc__ = tool.kind, tool.text("help")
     # What typer reads options from; the settings are written down once, in the tool.
+    only = inspect.Parameter.KEYWORD_ONLY
     command.__dict__["__signature__"] = inspect.Signature(
         [
-            inspect.Parameter(
-                name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind
-            )
+            inspect.Parameter(name, only, default=default, annotation=kind)
             for name, (kind, default) in own.items()
         ]
     )
@@ -66,8 +65,10 @@ def command_of(tool: AnyTool) -> Callable[..., None]:
 def lines_of(tool: AnyTool, result: ToolResult) -> list[str]:
     """What a person is shown of a result."""
     section = tool.report(result)
-    lines = [tool.text(note.name, **note.values) for note in section.notes]
-    return lines + [f"{tool.text(row.name, **row.values)}: {_shown(row)}" for row in section.rows]
+    lines = [tool.text(note.name, values=note.values) for note in section.notes]
+    return lines + [
+        f"{tool.text(row.name, values=row.values)}: {_shown(row)}" for row in section.rows
+    ]
 
 
 def _shown(row: Row) -> str:

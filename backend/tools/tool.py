@@ -60,7 +60,9 @@ class ToolSettings(BaseModel):
     torque_limit: Annotated[float, Option(("--torque-percent",), 80.0)] = Field(
         gt=0, le=400, description="highest torque, in % of rated"
     )
-    time_limit_s: float = Field(default=60.0, gt=0, le=300)
+    time_limit_s: float = Field(
+        default=60.0, gt=0, le=300, description="longest time of a motion, in s"
+    )
     rated_torque_nm: float | None = Field(
         default=None, gt=0, description="overrides what the drive says"
     )

@@ -13,7 +13,9 @@ class FrictionSettings(ToolSettings):
     The time limit is that of all moves together: slow speeds are left out where it ends them.
     """
 
-    time_limit_s: float = Field(default=120.0, gt=0, le=300)
+    time_limit_s: float = Field(
+        default=120.0, gt=0, le=300, description="longest time of all moves together, in s"
+    )
     speeds: int = Field(default=10, ge=3, le=24, description="speeds in each direction")
     slowest_rpm: float | None = Field(
         default=None, gt=0, description="lowest speed; as low as the time limit allows without it"
