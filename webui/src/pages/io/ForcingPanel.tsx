@@ -32,6 +32,7 @@ export function ForcingPanel({
   const act = useAction()
   const job = useJob(mine?.job ?? forcing.job ?? null)
   const path = { drive_id: drive, name: forcing.name }
+  const plain = plainResult(job?.result)
   const over = mine !== null && job !== null && job.state !== 'running'
   useEffect(() => {
     if (!mine || over) return

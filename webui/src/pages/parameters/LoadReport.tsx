@@ -119,8 +119,7 @@ export function LoadReport({
                       failed: Number(plain.failed ?? 0),
                     })}
                   </strong>{' '}
-                  {typeof plain.backup === 'string' &&
-                    t('load.backup', { file: plain.backup })}
+                  {typeof plain.backup === 'string' && t('load.backup', { file: plain.backup })}
                 </p>
               )}
               {rows.length > 0 && (

@@ -7,7 +7,12 @@ import { NumberField } from '../../widgets/NumberField'
 
 /** What the form of the limits asks for already. */
 const LIMITS = new Set([
-  'travel_limit', 'speed_limit', 'torque_limit', 'time_limit_s', 'rated_torque_nm', 'cycle_ms',
+  'travel_limit',
+  'speed_limit',
+  'torque_limit',
+  'time_limit_s',
+  'rated_torque_nm',
+  'cycle_ms',
   'consent',
 ])
 
@@ -15,9 +20,7 @@ interface Field {
   name: string
   type: 'number' | 'integer' | 'boolean'
   optional: boolean
-  min?: number
-  max?: number
-  above?: number
+  limits: { min?: number; max?: number; above?: number }
   initial: number | boolean | null
 }
 
@@ -45,9 +48,11 @@ export function fieldsOf(settings: Record<string, unknown>): Field[] {
         name,
         type,
         optional: property.anyOf !== undefined,
-        min: shape.minimum,
-        max: shape.maximum,
-        above: shape.exclusiveMinimum,
+        limits: {
+          ...(shape.minimum !== undefined && { min: shape.minimum }),
+          ...(shape.maximum !== undefined && { max: shape.maximum }),
+          ...(shape.exclusiveMinimum !== undefined && { above: shape.exclusiveMinimum }),
+        },
         initial: typeof initial === 'number' || typeof initial === 'boolean' ? initial : null,
       },
     ]
@@ -91,7 +96,8 @@ export function ToolForm({
   text: (name: string) => string
   onChange: (values: Values) => void
 }) {
-  const set = (name: string, value: number | boolean | null) => onChange({ ...values, [name]: value })
+  const set = (name: string, value: number | boolean | null) =>
+    onChange({ ...values, [name]: value })
   return (
     <div className="fields">
       {fields.map((field) =>
@@ -106,12 +112,10 @@ export function ToolForm({
           <NumberField
             key={field.name}
             label={text(`field.${field.name}`)}
-            unit={field.name.endsWith('_rpm') ? 'rpm' : undefined}
+            {...(field.name.endsWith('_rpm') && { unit: 'rpm' })}
+            {...field.limits}
             value={typeof values[field.name] === 'number' ? (values[field.name] as number) : null}
             onChange={(value) => set(field.name, value)}
-            min={field.min}
-            max={field.max}
-            above={field.above}
             integer={field.type === 'integer'}
             optional={field.optional}
           />
