@@ -22,7 +22,7 @@ from backend import cli
 from backend.analysis.mechanics.inertia import InertiaResult, Interval
 from backend.api.app import make_app
 from backend.api.audit.audited import TOLD_THERE
-from backend.api.security.rights import POLICY
+from backend.api.security.rights import ROUTES
 from backend.axis.axis import Axis
 from backend.commands import measure, report
 from backend.commands.remote import Remote
@@ -146,7 +146,7 @@ def test_wrong_words(words: list[str], code: int, said: str) -> None:
 def test_everything_around_a_tool_is_there(tool: AnyTool) -> None:
     path = f"POST /api/v1/drives/{{drive_id}}/jobs/{tool.kind}"
     assert path in TOLD_THERE
-    assert any(tool.kind in rule and rule.startswith("POST") for rule in POLICY)
+    assert ROUTES[path].right is tool.right
     assert tool.kind in cli.COMMANDS
     own = set(tool.settings.model_fields) - set(inspect.getmro(tool.settings)[1].model_fields)  # type: ignore[attr-defined]
     for name in ("title", "help", *(f"field.{each}" for each in own)):
