@@ -70,10 +70,12 @@ def asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[InertiaSettin
         link = DirectLink(make_device("mms7", ONE), load_profile("mms7"))
         bench = Bench(tmp_path, {URL: lambda: link})
         transport = httpx.ASGITransport(make_app(bench, hosts=frozenset({"test"})))
-        async with httpx.AsyncClient(transport=transport, base_url=f"{address}/api/v1") as http:
-            yield Remote(address, http)
-        assert [m.drive.profile.drive for m in bench.members.values()] == ["mms7"]
-        await bench.close()
+        try:
+            async with httpx.AsyncClient(transport=transport, base_url=f"{address}/api/v1") as http:
+                yield Remote(address, http)
+            assert [m.drive.profile.drive for m in bench.members.values()] == ["mms7"]
+        finally:
+            await bench.close()
 
     monkeypatch.setattr(inertia_run, "inertia", measured)
     for module in (measure, report):
