@@ -57,8 +57,12 @@ COMMANDS = {
         "Frequency responses from recordings of other programs. Nothing moves.",
     ),
     "inertia": (
-        "measure:inertia",
+        "tools:inertia",
         "Measure inertia and friction and write them as JSON. The axis moves.",
+    ),
+    "friction": (
+        "tools:friction",
+        "Map friction over speed and torque over position, both directions. The axis moves.",
     ),
     "autotune": (
         "tune:autotune",

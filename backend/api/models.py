@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from backend.tools.results import ToolOutcome
+
 Raw = int | float | str
 
 
@@ -71,7 +73,9 @@ class JobInfo(Message):
     started: datetime
     ended: datetime | None
     motion: bool
-    result: dict[str, object] | None
+    result: Annotated[ToolOutcome | dict[str, object] | None, Field(union_mode="left_to_right")] = (
+        Field(description="of a tool: its result, which its field tool names")
+    )
     problem: Problem | None
 
 

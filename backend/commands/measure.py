@@ -1,31 +1,32 @@
-"""``servodeck sweep`` and ``servodeck inertia``: a measurement without the page."""
+"""``servodeck sweep``, and what all measurements without the page have in common."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 
 from backend.api.station.models import DriveSummary
 from backend.axis.axis import Axis, Envelope
 from backend.axis.cyclic import CyclicSession
+from backend.commands.options import Json, Server, server_for
 from backend.commands.remote import Remote, remote
 from backend.commands.restoring import restore_first
 from backend.commands.session import drive_and_pending, progress, run_in_order
 from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
 
+Answer = Mapping[str, object]
 Url = Annotated[str | None, typer.Argument(metavar="[BUS_URL]")]
 Station = Annotated[int, typer.Option(help="station address on the bus")]
 Profile = Annotated[str | None, typer.Option(help="drive family; recognised where possible")]
-Server = Annotated[str | None, typer.Option(help="measure through this running server")]
 AxisName = Annotated[str | None, typer.Option("--axis", help="the server's name of the drive")]
-Out = Annotated[Path, typer.Option(help="JSON file to write")]
+Out = Annotated[Path | None, typer.Option(help="JSON file to write")]
 Cycle = Annotated[float, typer.Option(help="cycle time in ms")]
 Travel = Annotated[float, typer.Option(help="longest way from the start, in revolutions")]
 Speed = Annotated[float, typer.Option(help="highest speed, in rpm")]
@@ -67,16 +68,7 @@ class WaveformName(StrEnum):
     stepped = "stepped"
 
 
-class SchemeName(StrEnum):
-    """How the axis may travel."""
-
-    free = "free"
-    limited = "limited"
-    taught = "taught"
-
-
 def sweep(
-    out: Out,
     url: Url = None,
     station: Station = 1,
     profile: Profile = None,
@@ -95,11 +87,13 @@ def sweep(
     excitation: Annotated[WaveformName, typer.Option(help="signal")] = WaveformName.multisine,
     rated_torque_nm: Rated = None,
     consent: Consent = False,
+    out: Out = None,
+    as_json: Json = False,
 ) -> None:
     """Measure a frequency response and write it as JSON. The axis moves."""
     limits = {
         "travel_limit": travel_rev, "speed_limit": speed_rpm, "torque_limit": torque_percent,
-        "time_limit_s": 60.0, "consent": consent,
+        "time_limit_s": 60.0, "consent": consent, "cycle_ms": cycle_ms,
     }  # fmt: skip
     more: dict[str, object] = {
         "kind": kind.value, "loop": loop.value, "f_min_hz": f_min_hz, "f_max_hz": f_max_hz,
@@ -125,55 +119,8 @@ def sweep(
                 await sweep_tool.sweep(found, session, settings, progress())
             )
 
-    _measure(out, here, "sweep", server, axis, cycle_ms, limits | more)
-
-
-def inertia(
-    out: Out,
-    url: Url = None,
-    station: Station = 1,
-    profile: Profile = None,
-    server: Server = None,
-    axis: AxisName = None,
-    scheme: SchemeName = SchemeName.free,
-    end_low_rev: Annotated[float | None, typer.Option(help="taught end")] = None,
-    end_high_rev: Annotated[float | None, typer.Option(help="taught end")] = None,
-    cycle_ms: Cycle = 1.0,
-    travel_rev: Travel = 3.0,
-    speed_rpm: Speed = 1200.0,
-    torque_percent: Torque = 80.0,
-    repetitions: Annotated[int, typer.Option(help="moves forth and back")] = 4,
-    rated_torque_nm: Rated = None,
-    motor_inertia_kgm2: Annotated[float | None, typer.Option(help="of the motor alone")] = None,
-    consent: Consent = False,
-) -> None:
-    """Measure inertia and friction and write them as JSON. The axis moves."""
-    ends = taught_ends(end_low_rev, end_high_rev)
-    request: dict[str, object] = {
-        "travel_limit": travel_rev, "speed_limit": speed_rpm, "torque_limit": torque_percent,
-        "time_limit_s": 60.0, "consent": consent, "scheme": scheme.value, "ends_rev": ends,
-        "repetitions": repetitions, "rated_torque_nm": rated_torque_nm,
-        "motor_inertia_kgm2": motor_inertia_kgm2,
-    }  # fmt: skip
-
-    async def here() -> dict[str, object]:
-        from backend.tools.inertia import evaluation as inertia_evaluation
-        from backend.tools.inertia.run import inertia as measure_inertia
-
-        settings = inertia_evaluation.InertiaSettings(
-            Envelope(travel_rev, speed_rpm, torque_percent, 60.0), scheme.value, ends,
-            repetitions=repetitions, rated_torque_nm=rated_torque_nm,
-            motor_inertia_kgm2=motor_inertia_kgm2,
-        )  # fmt: skip
-        async with exchanging(url, station, profile, cycle_ms, settings.envelope, consent) as (
-            found,
-            session,
-        ):
-            return inertia_evaluation.as_json(
-                await measure_inertia(found, session, settings, progress())
-            )
-
-    _measure(out, here, "inertia", server, axis, cycle_ms, request)
+    where = Where(url, station, profile, server, axis)
+    measure(where, "sweep", here, limits | more, out, _told, as_json=as_json)
 
 
 @asynccontextmanager
@@ -185,8 +132,7 @@ async def exchanging(
     from backend.commands.scales import take_taught
     from backend.tools.sweep import profile_speed
 
-    if url is None:
-        raise NotAllowed("command.give-bus-url-server")
+    assert url is not None, "Where.asked says so"
     async with drive_and_pending(url, station, profile) as (drive, pending):
         axis = Axis(drive)
         await restore_first(axis, pending)
@@ -205,90 +151,88 @@ async def exchanging(
             await session.stop()
 
 
-def _measure(
-    out: Path, here: object, tool: str, server: str | None, axis: str | None, cycle_ms: float,
-    request: dict[str, object],
+class Where(NamedTuple):
+    """A drive by bus URL and station, or by the name that a server gives it."""
+
+    url: str | None
+    station: int
+    profile: str | None
+    server: str | None
+    axis: str | None
+
+    @property
+    def asked(self) -> str | None:
+        """The server to ask; None where the bus is opened here.
+
+        Raises:
+            NotAllowed: neither a bus nor a drive of a server is named. OutOfRange: no bus URL.
+        """
+        if self.url is None:
+            if self.server is None or self.axis is None:
+                raise NotAllowed("give a bus URL and --station, or --server and --axis",
+                                 remedy="see --help")  # fmt: skip
+            return self.server
+        return server_for(self.url, self.server)
+
+    async def drive(self, at: Remote) -> DriveSummary:
+        """The server's drive; one at a bus URL is put on its bench where it is not.
+
+        Raises:
+            NotAllowed: there is none, or several families would fit.
+        """
+        if self.url is not None:
+            return await at.drive(self.url, self.station, self.profile)
+        drives = await at.drives()
+        drive = next((d for d in drives if self.axis in (d.name, d.id)), None)
+        if drive is None:
+            names = ", ".join(d.name for d in drives) or "none"
+            raise NotAllowed(f"{at.address} has no drive {self.axis!r}", value=self.axis,
+                             limit=names, remedy="give its name with --axis, or a bus URL and "
+                             "--station")  # fmt: skip
+        return drive
+
+
+def measure(
+    where: Where, kind: str, here: Callable[[], Awaitable[Answer]], request: Answer,
+    out: Path | None, told: Callable[[Answer], list[str]], *, as_json: bool,
 ) -> None:  # fmt: skip
+    """Measure by a server or ``here``, write and show the result.
+
+    Ctrl+C ends the motion first: see `run_in_order`.
+    """
+
     async def work() -> None:
-        if server is not None:
-            answer = await through_server(server, axis, tool, cycle_ms, request)
-        else:
-            assert callable(here)
+        server = where.asked
+        if server is None:
             answer = await here()
-        write_atomically(out, json.dumps(answer, indent=1).encode())
-        for line in _told(tool, answer):
-            print(line)
-        print(f"written: {out}")
+        else:
+            async with remote(server) as at:
+                drive = await where.drive(at)
+                answer = await at.result(f"/drives/{drive.id}/jobs/{kind}", request)
+        show(answer, out, told, as_json=as_json)
 
     run_in_order(work)
 
 
-def _told(tool: str, answer: dict[str, object]) -> list[str]:
-    if tool == "inertia":
-        return [
-            f"inertia {_shown(answer['inertia_kgm2'])} kg·m²  friction "
-            f"{_shown(answer['coulomb_nm'])} Nm + {_shown(answer['viscous_nms'])} Nm·s  load "
-            f"{_shown(answer['gravity_nm'])} Nm",
-            *_told_beside(answer),
-            f"verdict: {answer['verdict']}",
-        ]
-    rows = answer["resonances"]
+def show(
+    answer: Answer, out: Path | None, told: Callable[[Answer], list[str]], *, as_json: bool
+) -> None:
+    """Write a result to ``out``, and print it as JSON or in words."""
+    if out is not None:
+        write_atomically(out, json.dumps(answer, indent=1).encode())
+    if as_json:
+        print(json.dumps(answer, indent=1))
+        return
+    for line in told(answer):
+        print(line)
+    if out is not None:
+        print(f"written: {out}")
+
+
+def _told(answer: Answer) -> list[str]:
+    rows, warnings = answer["resonances"], answer["warnings"]
     lines = [
         f"{row['kind']:14} {row['frequency_hz']:8.1f} Hz  damping {row['damping']:.3f}"
         for row in (rows if isinstance(rows, list) else [])
     ]
-    warnings = answer["warnings"]
     return lines + [f"note: {w}" for w in (warnings if isinstance(warnings, list) else [])]
-
-
-def _told_beside(answer: dict[str, object]) -> list[str]:
-    """Torques beside inertia and friction, where some are found."""
-    words = {
-        "place_nm": "position-dependent torque (spring, arm, imbalance)",
-        "fan_nm": "torque by the square of the speed (fan, pump)",
-    }
-    return [
-        f"{text}: up to {_shown(answer[key])} Nm"
-        for key, text in words.items()
-        if answer.get(key) is not None
-    ]
-
-
-def _shown(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else "not known"
-
-
-async def through_server(
-    server: str, name: str | None, tool: str, cycle_ms: float, request: dict[str, object]
-) -> dict[str, object]:
-    """Run the job on a server and wait for it; its own bus exchange is started where needed."""
-    async with remote(server) as at:
-        drive = await drive_of(at, name)
-        return await at.result(f"/drives/{drive.id}/jobs/{tool}", request | {"cycle_ms": cycle_ms})
-
-
-async def drive_of(at: Remote, name: str | None) -> DriveSummary:
-    """The server's drive of this name or id.
-
-    Raises:
-        NotAllowed: there is none; the message lists those that are.
-    """
-    drives = await at.drives()
-    drive = next((d for d in drives if name in (d.name, d.id)), None)
-    if drive is None:
-        names = ", ".join(d.name for d in drives) or "none"
-        raise NotAllowed("command.no-drive", value=name, limit=names, address=at.address)
-    return drive
-
-
-def taught_ends(low_rev: float | None, high_rev: float | None) -> tuple[float, float] | None:
-    """Both ends, or none of them.
-
-    Raises:
-        typer.BadParameter: only one is given.
-    """
-    if low_rev is None or high_rev is None:
-        if low_rev is not None or high_rev is not None:
-            raise typer.BadParameter("give both --end-low-rev and --end-high-rev, or none of them")
-        return None
-    return low_rev, high_rev

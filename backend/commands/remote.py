@@ -14,7 +14,7 @@ from contextlib import asynccontextmanager
 from typing import TypeVar
 
 import httpx
-from pydantic import TypeAdapter, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from backend.api.models import JobInfo, Problem
 from backend.api.station.models import Bus, DriveSummary, FoundDrive
@@ -90,6 +90,8 @@ class Remote:
                 told.detail if told else f"{job.title}: the job was {job.state}",
                 remedy=told.remedy if told else None,
             )
+        if isinstance(job.result, BaseModel):
+            return job.result.model_dump(mode="json")
         return job.result or {}
 
     async def drives(self) -> list[DriveSummary]:

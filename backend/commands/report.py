@@ -8,20 +8,23 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import httpx
 import typer
 
+from backend.api.report.models import ReportInfo
+from backend.commands.measure import AxisName, Profile, Station, Where
+from backend.commands.options import Json, Server
+from backend.commands.remote import remote
 from backend.commands.session import run
 from backend.library.measurements import SUFFIX, BadMeasurement, Head, MeasurementStore, unpack
 from backend.report.gather import About, choose, facts_of_files, measured_from
 from backend.report.store import FORMATS, Format, render
 from backend.store.files import write_atomically
-from drivers.errors import DriveError, LinkLost, NotAllowed
+from drivers.errors import NotAllowed
 
 if TYPE_CHECKING:
     from backend.station.evaluation import Evaluation
 
-Files = Annotated[list[Path] | None, typer.Argument(metavar="[FILE.sdmeas]...")]
+Files = Annotated[list[str] | None, typer.Argument(metavar="[BUS_URL | FILE.sdmeas...]")]
 Out = Annotated[Path, typer.Option(help="report to write; .html or .pdf")]
 
 
@@ -35,26 +38,34 @@ class LanguageName(StrEnum):
 def report(
     out: Out,
     files: Files = None,
-    server: Annotated[str | None, typer.Option(help="ask this running server")] = None,
-    axis: Annotated[str | None, typer.Option(help="the server's name of the drive")] = None,
+    station: Station = 1,
+    profile: Profile = None,
+    server: Server = None,
+    axis: AxisName = None,
     language: Annotated[LanguageName, typer.Option()] = LanguageName.en,
     person: Annotated[str, typer.Option(help="who commissioned")] = "",
     machine: Annotated[str, typer.Option(help="name of the machine")] = "",
     notes: Annotated[str, typer.Option(help="free text")] = "",
+    as_json: Json = False,
 ) -> None:
     """Write the commissioning report of an axis, from measurement files or a running server."""
     about = About(person, machine, notes)
 
     async def work() -> None:
         form = _format(out)
-        if (server is None) == (not files):
-            raise NotAllowed("command.give-either-measurement-files")
-        if server is not None:
-            data = await _from_server(server, axis, form, language.value, about)
+        given = files or []
+        urls = [each for each in given if "://" in each]
+        named = axis is not None or bool(urls)
+        if named == (len(given) > len(urls)) or len(urls) > 1:
+            raise NotAllowed("give either measurement files, or a bus URL and --station, or "
+                             "--server and --axis", remedy="see --help")  # fmt: skip
+        if named:
+            where = Where(urls[0] if urls else None, station, profile, server, axis)
+            data = await _from_server(where, form, language.value, about)
         else:
-            data = _from_files(files or [], form, language, about)
+            data = _from_files([Path(each) for each in given], form, language, about)
         write_atomically(out, data)
-        print(f"written: {out}")
+        print(json.dumps({"written": str(out)}) if as_json else f"written: {out}")
 
     run(work)
 
@@ -81,36 +92,21 @@ def _from_files(files: list[Path], form: Format, language: LanguageName, about: 
     return render(whole, "zh" if language is LanguageName.zh else "en", form)
 
 
-async def _from_server(
-    server: str, axis: str | None, form: Format, language: str, about: About
-) -> bytes:
-    base = server.rstrip("/") + "/api/v1"
-    try:
-        async with httpx.AsyncClient(base_url=base, timeout=120.0) as http:
-            drives = _ok(await http.get("/drives")).json()
-            drive = next((d for d in drives if axis in (d["name"], d["id"])), None)
-            if drive is None:
-                names = ", ".join(str(d["name"]) for d in drives) or "none"
-                raise NotAllowed(
-                    "command.no-drive-give-name", value=axis, limit=names, server=server
-                )
-            body = {"format": form, "language": language, "person": about.person,
-                    "machine": about.machine, "notes": about.notes}  # fmt: skip
-            made = _ok(await http.post(f"/drives/{drive['id']}/reports", json=body)).json()
-            return _ok(await http.get(f"/reports/{made['file']}")).content
-    except httpx.HTTPError as error:
-        raise LinkLost("command.cannot-reached", server=server, cause=str(error)) from error
-
-
-def _ok(answer: httpx.Response) -> httpx.Response:
-    if answer.is_success:
-        return answer
-    try:
-        problem = answer.json()
-    except ValueError:
-        problem = {}
-    detail = problem.get("detail") or f"the server says {answer.status_code}"
-    raise DriveError(str(detail), remedy=problem.get("remedy"))
+async def _from_server(where: Where, form: Format, language: str, about: About) -> bytes:
+    server = where.asked
+    if server is None:
+        raise NotAllowed(
+            "the report of a drive on a bus is made by a running server, which holds its "
+            "measurements", value=where.url,
+            remedy="start `servodeck serve` and give its address with --server, or give "
+            "measurement files",
+        )  # fmt: skip
+    body = {"format": form, "language": language, "person": about.person,
+            "machine": about.machine, "notes": about.notes}  # fmt: skip
+    async with remote(server) as at:
+        drive = await where.drive(at)
+        made = await at.ask("POST", f"/drives/{drive.id}/reports", ReportInfo, body=body)
+        return (await at.raw("GET", f"/reports/{made.file}")).content
 
 
 def recompute(

@@ -53,8 +53,15 @@ def _told(message: str, remedy: str | None, code: int) -> typer.Exit:
 
 
 def run(work: Callable[[], Awaitable[T]], *, error_code: int = 1) -> T:
-    """Run a command; see `reported`."""
+    """Run a command; see `reported`. Ctrl+C ends it with exit code 130."""
+    try:
+        return _run(work, error_code)
+    except KeyboardInterrupt:
+        print("cancelled", file=sys.stderr)
+        raise typer.Exit(130) from None
 
+
+def _run(work: Callable[[], Awaitable[T]], error_code: int = 1) -> T:
     async def body() -> T:
         return await work()
 
@@ -72,7 +79,7 @@ def run_in_order(work: Callable[[], Awaitable[T]]) -> T:
     interrupt = signal.signal(signal.SIGINT, signal.default_int_handler)
     before = signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
     try:
-        return run(work)
+        return _run(work)
     except KeyboardInterrupt:
         print("cancelled; the axis is disabled, its settings are as before", file=sys.stderr)
         raise typer.Exit(130) from None
@@ -91,7 +98,7 @@ def until_interrupted(work: Callable[[], Awaitable[None]]) -> None:
     signal.signal(signal.SIGTERM, end)
     # uvicorn has already shut down in order when the interrupt arrives here.
     with contextlib.suppress(KeyboardInterrupt):
-        run(work)
+        _run(work)
 
 
 def told(command: Callable[P, T]) -> Callable[P, T]:

@@ -2,39 +2,42 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from enum import StrEnum
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from backend.axis.axis import Envelope
 from backend.commands.measure import (
+    Answer,
     AxisName,
     Consent,
     Cycle,
     LoopName,
+    Out,
     Profile,
     Rated,
-    SchemeName,
-    Server,
     Speed,
     Station,
     Torque,
     Travel,
     Url,
-    drive_of,
+    Where,
     exchanging,
-    taught_ends,
+    show,
 )
+from backend.commands.options import Json, Server
 from backend.commands.remote import remote
 from backend.commands.session import progress, run_in_order
-from backend.store.files import write_atomically
-from drivers.errors import NotAllowed
 
-Answer = Mapping[str, object]
+
+class SchemeName(StrEnum):
+    """How the axis may travel."""
+
+    free = "free"
+    limited = "limited"
+    taught = "taught"
 
 
 class MarkName(StrEnum):
@@ -83,10 +86,11 @@ def autotune(
     rated_torque_nm: Rated = None,
     motor_inertia_kgm2: Annotated[float | None, typer.Option(help="of the motor alone")] = None,
     consent: Consent = False,
-    out: Annotated[Path | None, typer.Option(help="JSON file to write")] = None,
+    out: Out = None,
+    as_json: Json = False,
 ) -> None:
     """Measure, design and, with --apply or --keep, verify an axis's loop gains. The axis moves."""
-    ends = taught_ends(end_low_rev, end_high_rev)
+    ends = _taught_ends(end_low_rev, end_high_rev)
     writes = apply or keep
     request: dict[str, object] = {
         "travel_limit": travel_rev, "speed_limit": speed_rpm, "torque_limit": torque_percent,
@@ -112,9 +116,11 @@ def autotune(
                 await take_back(at, found.before)
             return tool.as_json(found)
 
+    where = Where(url, station, profile, server, axis)
+
     async def there(address: str) -> Answer:
         async with remote(address) as at:
-            drive = await drive_of(at, axis)
+            drive = await where.drive(at)
             found = await at.result(f"/drives/{drive.id}/jobs/autotune", request)
             if not keep and found["before"]:
                 body = {"before": found["before"]}
@@ -122,15 +128,9 @@ def autotune(
             return found
 
     async def work() -> None:
-        if server is None and url is None:
-            raise NotAllowed("command.give-bus-url-server")
-        answer = await (here() if server is None else there(server))
-        if out is not None:
-            write_atomically(out, json.dumps(answer, indent=1).encode())
-        for line in told(answer, kept=keep):
-            print(line)
-        if out is not None:
-            print(f"written: {out}")
+        address = where.asked
+        answer = await (here() if address is None else there(address))
+        show(answer, out, lambda found: told(found, kept=keep), as_json=as_json)
 
     run_in_order(work)
 
@@ -249,3 +249,16 @@ def _map(value: object) -> Answer:
 
 def _maps(value: object) -> Iterable[Answer]:
     return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []
+
+
+def _taught_ends(low_rev: float | None, high_rev: float | None) -> tuple[float, float] | None:
+    """Both ends, or none of them.
+
+    Raises:
+        typer.BadParameter: only one is given.
+    """
+    if low_rev is None or high_rev is None:
+        if low_rev is not None or high_rev is not None:
+            raise typer.BadParameter("give both --end-low-rev and --end-high-rev, or none of them")
+        return None
+    return low_rev, high_rev

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from backend.report.document import Block, Figure, Heading, Note, Table
 from backend.report.facts import Measured
 from backend.report.numbers import (
-    NONE,
     fixed,
     hertz,
     margin,
@@ -18,7 +17,9 @@ from backend.report.numbers import (
 )
 from backend.report.plot import Curve, Plot
 from backend.report.texts import Words
-from backend.report.views import InertiaView, StepView, SweepView
+from backend.report.tools import kind_title, tool_blocks
+from backend.report.views import StepView, SweepView
+from backend.tools.tool import ToolResult
 
 #: Told apart in print and by the colour-blind: dark blue, orange.
 _NOW, _EARLIER, _DEMAND = "#1a5c94", "#c2571a", "#5b6770"
@@ -30,12 +31,12 @@ _TURN = 360.0
 
 def chapter(measured: Measured, words: Words) -> list[Block]:
     """Everything about one measurement."""
-    blocks: list[Block] = [Heading(words(f"kind.{measured.kind}"), 3)]
+    blocks: list[Block] = [Heading(kind_title(measured.kind, words), 3)]
     view = measured.view
-    if isinstance(view, SweepView):
+    if isinstance(view, ToolResult):
+        blocks += tool_blocks(measured.kind, view, words)
+    elif isinstance(view, SweepView):
         blocks += _sweep(measured, view, words)
-    elif isinstance(view, InertiaView):
-        blocks += _inertia(view, words)
     else:
         blocks += _step(measured, view, words)
     return [*blocks, *_origin(measured, words)]
@@ -47,12 +48,13 @@ def _origin(measured: Measured, words: Words) -> list[Block]:
     if measured.earlier is not None:
         earlier = measured.earlier
         text += " " + words("compared", time=moment(earlier.saved), file=earlier.file)
-    envelope = measured.settings.get("envelope")
-    if isinstance(envelope, dict):
-        text += " " + words(
-            "limits", travel=_plain(envelope.get("travel_rev")),
-            speed=_plain(envelope.get("speed_rpm")), torque=_plain(envelope.get("torque_percent")),
-        )  # fmt: skip
+    envelope = measured.settings.get("envelope", measured.settings)
+    if isinstance(envelope, Mapping):
+        travel, speed, torque = (
+            _plain(envelope.get(inner, envelope.get(f"{inner.split('_')[0]}_limit")))
+            for inner in ("travel_rev", "speed_rpm", "torque_percent")
+        )
+        text += " " + words("limits", travel=travel, speed=speed, torque=torque)
     found: list[Block] = [Note(text)]
     if measured.differences:
         found.append(Note(words("differs", what=", ".join(measured.differences)), "warn"))
@@ -61,41 +63,6 @@ def _origin(measured: Measured, words: Words) -> list[Block]:
 
 def _plain(value: object) -> str:
     return f"{value:g}" if isinstance(value, (int, float)) else "?"
-
-
-# --- inertia ---------------------------------------------------------------------------
-
-
-def _inertia(view: InertiaView, words: Words) -> list[Block]:
-    si = view.unit == "SI"
-    rows = [
-        ("inertia", view.inertia_kgm2, "inertia_kgm2", "kg·m²"),
-        ("load_ratio", view.load_ratio, "load_ratio", ""),
-        ("coulomb", view.coulomb_nm, "coulomb_nm", "N·m"),
-        ("viscous", view.viscous_nms, "viscous_nms", "N·m·s/rad"),
-        ("gravity", view.gravity_nm, "gravity_nm", "N·m"),
-        ("place", view.place_nm, "place_nm", "N·m"),
-        ("fan", view.fan_nm, "fan_nm", "N·m"),
-    ]  # fmt: skip
-    rows = [row for row in rows if row[0] not in ("place", "fan") or row[1] is not None]
-    table = tuple(
-        (words(name), significant(value, unit if si else "", 3), _interval(view.ci95.get(key)))
-        for name, value, key, unit in rows
-    )
-    head = (words("quantity"), words("value"), words("interval"))
-    verdict = (
-        Note(words("identified", r2=fixed(view.r2, 4)), "good")
-        if view.identifiable
-        else Note(words("unidentified", why=view.verdict), "warn")
-    )
-    rated = [] if si else [Note(words("per_rated"))]
-    return [verdict, Table(head, table, (False, True, True)), *rated]
-
-
-def _interval(found: tuple[float | None, float | None] | None) -> str:
-    if found is None or None in found:
-        return NONE
-    return f"{significant(found[0], digits=3)} … {significant(found[1], digits=3)}"
 
 
 # --- frequency response ----------------------------------------------------------------

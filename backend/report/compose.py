@@ -18,7 +18,9 @@ from backend.report.document import (
 from backend.report.facts import Facts, Measured
 from backend.report.numbers import NONE, fixed, hertz, margin, milliseconds, moment, significant
 from backend.report.texts import Words
-from backend.report.views import InertiaView, StepView, SweepView
+from backend.report.tools import kind_title, tool_verdict
+from backend.report.views import StepView, SweepView
+from backend.tools.tool import ToolResult
 
 #: docs/tuning.md: 45° or more is calm, 8 dB or more, Ms below 2; and what is no longer sound.
 _SOUND = (45.0, 8.0, 2.0)
@@ -90,11 +92,9 @@ def _is_loop(measured: Measured) -> bool:
 
 
 def _verdict(measured: Measured, words: Words) -> Note:
-    view, kind = measured.view, words(f"kind.{measured.kind}")
-    if isinstance(view, InertiaView):
-        good = view.identifiable
-        text = words("inertia.known" if good else "inertia.unknown")
-        return Note(words("inertia.verdict", verdict=text), "good" if good else "warn")
+    view, kind = measured.view, kind_title(measured.kind, words)
+    if isinstance(view, ToolResult):
+        return tool_verdict(measured.kind, view, words)
     if isinstance(view, StepView):
         return _step_verdict(view, kind, words)
     if view.kind == "mechanics":
@@ -193,7 +193,7 @@ def _stale(facts: Facts, words: Words) -> list[Note]:
         return []
     if not any(_is_loop(m) and m.saved >= last for m in shown):
         return [Note(words("warn.unverified"), "warn")]
-    return [Note(words("warn.stale", kind=words(f"kind.{m.kind}")), "warn") for m in old]
+    return [Note(words("warn.stale", kind=kind_title(m.kind, words)), "warn") for m in old]
 
 
 def _settings(facts: Facts, words: Words) -> list[Block]:

@@ -15,13 +15,14 @@ from backend.report.views import view_of
 from backend.station.bench import Bench
 from backend.station.connected_drive import Member
 from backend.station.evaluation import evaluate
+from backend.tools.registry import TOOLS
 from drivers.errors import DriveError, NotAllowed
 from profiles.schema import Parameter
 
 #: The order in which an axis is commissioned, and a report is read.
 _ORDER = (
     "inertia", "sweep-mechanics", "sweep-speed_loop", "sweep-position_loop", "step-speed",
-    "step-move",
+    "step-move", *(tool.kind for tool in TOOLS),
 )  # fmt: skip
 
 

@@ -213,6 +213,7 @@ class Words:
     """The texts of one language."""
 
     def __init__(self, language: Language) -> None:
+        self.language = language
         self._column = 1 if language == "zh" else 0
 
     def __call__(self, name: str, **values: str) -> str:

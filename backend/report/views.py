@@ -7,6 +7,8 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from backend.library.measurements import BadMeasurement
+from backend.tools.registry import BY_KIND
+from backend.tools.tool import ToolResult
 
 
 class View(BaseModel):
@@ -45,24 +47,6 @@ class SweepView(View):
     warnings: list[str]
 
 
-class InertiaView(View):
-    """Inertia and friction with 95 % intervals, in SI units where ``unit`` says so."""
-
-    method: str
-    inertia_kgm2: float | None
-    load_ratio: float | None
-    coulomb_nm: float | None
-    viscous_nms: float | None
-    gravity_nm: float | None
-    place_nm: float | None = None
-    fan_nm: float | None = None
-    ci95: dict[str, tuple[float | None, float | None] | None]
-    r2: float
-    verdict: str
-    identifiable: bool
-    unit: str
-
-
 class StepNumbers(View):
     """Read-outs of a step of speed."""
 
@@ -97,7 +81,7 @@ class StepView(View):
     widened: bool = False
 
 
-AnyView = SweepView | InertiaView | StepView
+AnyView = SweepView | StepView | ToolResult
 
 
 def view_of(tool: object, result: dict[str, object]) -> AnyView:
@@ -107,9 +91,10 @@ def view_of(tool: object, result: dict[str, object]) -> AnyView:
         BadMeasurement: it is not what that tool concludes.
     """
     kinds: dict[object, type[AnyView]] = {
-        "sweep": SweepView, "inertia": InertiaView, "step": StepView,
+        "sweep": SweepView, "step": StepView,
     }  # fmt: skip
-    kind = kinds.get(tool)
+    known = BY_KIND.get(str(tool))
+    kind = known.result if known is not None else kinds.get(tool)
     if kind is None:
         raise BadMeasurement("report.report-cannot-show-measures", value=str(tool), tool=str(tool))
     try:

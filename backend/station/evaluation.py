@@ -11,8 +11,8 @@ import numpy as np
 from backend.axis.axis import Envelope
 from backend.library.measurements import BadMeasurement, Measurement
 from backend.response_import import stored as response_import
-from backend.tools.inertia import evaluation as inertia_evaluation
 from backend.tools.measuring.recording import Recording
+from backend.tools.registry import BY_KIND
 from backend.tools.step import run as step_tool
 from backend.tools.sweep import evaluation as sweep_evaluation
 
@@ -57,11 +57,12 @@ def recompute(measurement: Measurement) -> dict[str, object]:
     """
     arrays, meta = measurement.arrays, measurement.meta
     try:
+        tool = BY_KIND.get(str(meta.get("tool")))
+        if tool is not None:
+            return dict(tool.reevaluate(arrays, meta).model_dump(mode="json"))
         match meta.get("tool"):
             case "sweep":
                 return sweep_evaluation.as_json(sweep_evaluation.reevaluate(arrays, meta))
-            case "inertia":
-                return inertia_evaluation.as_json(inertia_evaluation.reevaluate(arrays, meta))
             case "response-import":
                 return response_import.reevaluate(arrays, meta)
             case "step":

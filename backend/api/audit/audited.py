@@ -17,6 +17,7 @@ from backend.audit import AuditLog, Fact
 from backend.audit.asked import MOST_BYTES, Asked, asked, fields_of
 from backend.audit.facts import Kind
 from backend.people.rights import Right
+from backend.tools.registry import TOOLS
 
 #: Longest that an answer waits. The change itself never does.
 WAIT_S = 1.0
@@ -34,10 +35,11 @@ TOLD_THERE = frozenset(
             f"{_DRIVE}/sets", f"{_DRIVE}/transition", f"{_DRIVE}/fault-reset",
             f"{_DRIVE}/procedures/{{name}}", f"{_DRIVE}/jobs/load_set", f"{_DRIVE}/jobs/move",
             f"{_DRIVE}/jobs/sequence", f"{_DRIVE}/jobs/generate", f"{_DRIVE}/jobs/home",
-            f"{_DRIVE}/jobs/identify", f"{_DRIVE}/jobs/sweep", f"{_DRIVE}/jobs/inertia",
+            f"{_DRIVE}/jobs/identify", f"{_DRIVE}/jobs/sweep",
             f"{_DRIVE}/jobs/step", f"{_DRIVE}/jobs/autotune", f"{_DRIVE}/jobs/firmware",
             f"{_DRIVE}/jobs/put-back",
             f"{_DRIVE}/io/forcing/{{name}}", f"{_DRIVE}/tune/undo",
+            *(f"{_DRIVE}/jobs/{tool.kind}" for tool in TOOLS),
         ),
         "PUT": (
             "/session/password", "/invitations/{invitation_id}/grant", "/sets/{file}",

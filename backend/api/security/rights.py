@@ -15,6 +15,7 @@ from typing import Literal
 from starlette.routing import compile_path
 
 from backend.people.rights import Right
+from backend.tools.registry import TOOLS
 
 API = "/api/v1"
 
@@ -133,9 +134,10 @@ _API: dict[str, Need] = {
     "POST /drives/{drive_id}/jobs/home": _MOTION,
     "POST /drives/{drive_id}/jobs/identify": _MOTION,
     "POST /drives/{drive_id}/jobs/sweep": _MEASURE,
-    "POST /drives/{drive_id}/jobs/inertia": _MEASURE,
     "POST /drives/{drive_id}/jobs/step": _MEASURE,
     "POST /drives/{drive_id}/jobs/autotune": _MEASURE,
+    **{f"POST /drives/{{drive_id}}/jobs/{tool.kind}": Need(tool.right, "drive") for tool in TOOLS},
+    "GET /tools": _LOOK,
     "POST /drives/{drive_id}/jobs/firmware": Need(Right.STATION, "drive", _FILE),
     "GET /drives/{drive_id}/io": _LOOK,
     "POST /drives/{drive_id}/io/forcing/{name}": _MOTION,

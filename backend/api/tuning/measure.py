@@ -21,12 +21,10 @@ from backend.api.tuning.measurements import change_log
 from backend.api.tuning.models import (
     AutotuneRequest,
     ExcitationInfo,
-    InertiaRequest,
     StepRequest,
     SweepRequest,
-    TuneLimits,
+    ToolInfo,
 )
-from backend.axis.axis import Envelope
 from backend.axis.cyclic import CyclicSession
 from backend.axis.restoring import shielded
 from backend.library.measurements import MeasurementStore
@@ -36,13 +34,13 @@ from backend.station.connected_drive import Member
 from backend.station.measuring import EXCHANGE_ENDS_S, exchange_for
 from backend.tools.autotune import run as autotune
 from backend.tools.autotune.apply import take_back
-from backend.tools.inertia import evaluation as inertia_evaluation
-from backend.tools.inertia import run as inertia
+from backend.tools.registry import TOOLS
 from backend.tools.step import run as step_response
 from backend.tools.sweep import evaluation as sweep_evaluation
 from backend.tools.sweep import profile_speed
 from backend.tools.sweep import run as sweep
 from backend.tools.sweep.preview import preview
+from backend.tools.tool import AnyTool, Keep, Run, ToolSettings
 from backend.work.jobs import JobResult, Progress
 from drivers.errors import DriveError
 from texts.message import text
@@ -51,12 +49,11 @@ router = APIRouter()
 for part in (routes_design, routes_measurements, routes_report, routes_response_import):
     router.include_router(part.router)
 
-Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
-Tool = Callable[[CyclicSession, Progress, Keep], Awaitable[JobResult]]
+Measure = Callable[[CyclicSession, Progress, Keep], Awaitable[JobResult]]
 
 
 async def _start(
-    bench: Bench, member: Member, request: TuneLimits, kind: str, title: str, tool: Tool
+    bench: Bench, member: Member, request: ToolSettings, kind: str, title: str, tool: Measure
 ) -> JobInfo:
     """Start a measurement as a job; raw data are stored before they are evaluated."""
     bench.motion.require_idle(member)
@@ -71,7 +68,7 @@ async def _start(
 
     async def work(progress: Progress) -> JobResult:
         exchange.taken = True
-        limits = _envelope(request)
+        limits = request.envelope
         try:
             async with profile_speed.prepared(member.axis, session, limits, request.consent):
                 result = await tool(session, progress, keep)
@@ -121,15 +118,9 @@ def _conclude(store: MeasurementStore, files: Sequence[str], result: JobResult) 
             store.conclude(file, part)
 
 
-def _envelope(request: TuneLimits) -> Envelope:
-    return Envelope(
-        request.travel_limit, request.speed_limit, request.torque_limit, request.time_limit_s
-    )
-
-
 def _sweep_settings(request: SweepRequest) -> sweep_evaluation.SweepSettings:
     return sweep_evaluation.SweepSettings(
-        _envelope(request), request.kind, request.loop, request.f_min_hz, request.f_max_hz,
+        request.envelope, request.kind, request.loop, request.f_min_hz, request.f_max_hz,
         request.share, request.realisations, request.base_motion, request.rated_torque_nm,
         excitation=request.excitation,
     )  # fmt: skip
@@ -160,28 +151,11 @@ async def start_sweep(bench: TheBench, member: Controlled, request: SweepRequest
     return await _start(bench, member, request, "sweep", "api-tuning.frequency-response", tool)
 
 
-@router.post("/drives/{drive_id}/jobs/inertia", status_code=202)
-async def start_inertia(bench: TheBench, member: Controlled, request: InertiaRequest) -> JobInfo:
-    """Measure inertia and friction. The result has the form of ``servodeck inertia --out``."""
-    settings = inertia_evaluation.InertiaSettings(
-        _envelope(request), request.scheme, request.ends_rev, request.search_torque,
-        request.search_speed, request.repetitions, request.rated_torque_nm,
-        request.motor_inertia_kgm2,
-    )  # fmt: skip
-
-    async def tool(session: CyclicSession, progress: Progress, keep: Keep) -> JobResult:
-        return inertia_evaluation.as_json(
-            await inertia.inertia(member.axis, session, settings, progress, keep)
-        )
-
-    return await _start(bench, member, request, "inertia", "api-tuning.inertia-and-friction", tool)
-
-
 @router.post("/drives/{drive_id}/jobs/step", status_code=202)
 async def start_step(bench: TheBench, member: Controlled, request: StepRequest) -> JobInfo:
     """Step of speed, or a move, with its numbers."""
     settings = step_response.StepSettings(
-        _envelope(request), request.kind, request.size, request.hold_s, request.speed,
+        request.envelope, request.kind, request.size, request.hold_s, request.speed,
         request.acceleration, request.window, request.rated_torque_nm,
     )  # fmt: skip
 
@@ -197,7 +171,7 @@ async def start_step(bench: TheBench, member: Controlled, request: StepRequest) 
 async def start_autotune(bench: TheBench, member: Controlled, request: AutotuneRequest) -> JobInfo:
     """All steps from inertia to verification; `before` of the result undoes what was applied."""
     settings = autotune.AutotuneSettings(
-        _envelope(request), request.mark, request.load, request.loop, request.scheme,
+        request.envelope, request.mark, request.load, request.loop, request.scheme,
         request.ends_rev, request.apply, request.rated_torque_nm, request.motor_inertia_kgm2,
     )  # fmt: skip
 
@@ -217,3 +191,40 @@ async def start_autotune(bench: TheBench, member: Controlled, request: AutotuneR
         return autotune.as_json(found) | {"after": after}
 
     return await _start(bench, member, request, "autotune", "api-tuning.tune", tool)
+
+
+# --- tools with a descriptor ---------------------------------------------------------------
+
+
+@router.get("/tools")
+async def list_tools() -> list[ToolInfo]:
+    """Every tool that has a descriptor: its words, and the form of its settings."""
+    return [
+        ToolInfo(
+            kind=tool.kind, texts={name: list(both) for name, both in tool.texts.items()},
+            settings=tool.settings.model_json_schema(),
+        )
+        for tool in TOOLS
+    ]  # fmt: skip
+
+
+def _add(tool: AnyTool) -> None:
+    """The route that starts this tool."""
+
+    async def start(bench: TheBench, member: Controlled, request: ToolSettings) -> JobInfo:
+        async def measure(session: CyclicSession, progress: Progress, keep: Keep) -> JobResult:
+            found = await tool.run(Run(member.axis, session, progress, keep), request)
+            return dict(found.model_dump(mode="json"))
+
+        return await _start(bench, member, request, tool.kind, tool.text("title"), measure)
+
+    # The body is the tool's own settings, which the interface's description shows.
+    start.__annotations__["request"] = tool.settings
+    router.add_api_route(
+        f"/drives/{{drive_id}}/jobs/{tool.kind}", start, methods=["POST"], status_code=202,
+        name=f"start_{tool.kind}", description=tool.text("help"),
+    )  # fmt: skip
+
+
+for each in TOOLS:
+    _add(each)

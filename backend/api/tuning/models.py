@@ -8,27 +8,19 @@ from typing import Literal
 from pydantic import Field
 
 from backend.api.models import Message
+from backend.tools.tool import ToolSettings
 
 
-class TuneLimits(Message):
-    """The motion envelope: rev from the start, rpm, % of rated torque, s."""
+class TuneLimits(ToolSettings):
+    """The motion envelope of a tool that has no descriptor yet."""
 
-    travel_limit: float = Field(gt=0)
-    speed_limit: float = Field(gt=0)
-    torque_limit: float = Field(gt=0, le=400)
-    time_limit_s: float = Field(default=60.0, gt=0, le=300)
-    rated_torque_nm: float | None = Field(
-        default=None, gt=0, description="overrides what the drive says"
-    )
-    cycle_ms: float = Field(
-        default=1.0, gt=0, le=10,
-        description="cycle of the exchange that is started where none runs, and ended afterwards",
-    )  # fmt: skip
-    consent: bool = Field(
-        default=False,
-        description="the user agreed that nothing in the drive ends a speed when this computer "
-        "falls silent; needed where the drive has no watchdog (DS_C)",
-    )
+
+class ToolInfo(Message):
+    """A tool as its descriptor has it."""
+
+    kind: str
+    texts: dict[str, list[str]] = Field(description="English, Chinese")
+    settings: dict[str, object] = Field(description="JSON schema of what starting it takes")
 
 
 class SweepRequest(TuneLimits):
@@ -61,17 +53,6 @@ class ExcitationInfo(Message):
     duration_s: float = Field(description="of all realisations together")
     realisations: int
     inertia_kgm2: float = Field(description="that was assumed")
-
-
-class InertiaRequest(TuneLimits):
-    """Inertia and friction."""
-
-    scheme: Literal["free", "limited", "taught"] = "free"
-    ends_rev: tuple[float, float] | None = None
-    search_torque: float = Field(default=20.0, gt=0, le=100)
-    search_speed: float = Field(default=30.0, gt=0)
-    repetitions: int = Field(default=4, ge=1, le=10)
-    motor_inertia_kgm2: float | None = Field(default=None, gt=0)
 
 
 class StepRequest(TuneLimits):

@@ -400,7 +400,7 @@ def as_json(result: AutotuneResult) -> dict[str, object]:
     """For files and pages."""
     verified = result.verified
     return {
-        "inertia": inertia_evaluation.as_json(result.inertia),
+        "inertia": inertia_evaluation.answer_of(result.inertia).model_dump(mode="json"),
         "mechanics": sweep_evaluation.as_json(result.mechanics),
         "load": result.load,
         "candidates": [candidate_json(c) for c in result.candidates],

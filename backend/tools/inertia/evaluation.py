@@ -12,8 +12,10 @@ from backend.analysis.mechanics.inertia import InertiaResult, Interval, estimate
 from backend.analysis.signals.spectrum import power_density
 from backend.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.inertia.result import InertiaAnswer, InertiaIntervals
 from backend.tools.measuring.recording import Recording
 from backend.tools.sweep.quiet_velocity import quiet_velocity
+from backend.tools.tool import Arrays, Meta
 from drivers.errors import NotAllowed
 
 Scheme = Literal["free", "limited", "taught"]
@@ -139,9 +141,7 @@ def raw_of(
     }
 
 
-def reevaluate(
-    arrays: dict[str, npt.NDArray[np.generic]], meta: dict[str, object]
-) -> InertiaOutcome:
+def reevaluate(arrays: Arrays, meta: Meta) -> InertiaAnswer:
     """The answer again, from kept raw data.
 
     Raises:
@@ -163,45 +163,38 @@ def reevaluate(
     rate = float(str(meta["sample_rate_hz"]))
     facts = AxisFacts(**told)
     recording = Recording(rate, **columns, valid=valid)
-    return InertiaOutcome(
-        evaluate(recording, settings, facts), f"host, {settings.scheme}",
-        facts.torque_known, settings.ends_rev, recording.velocity_rad_s.size / rate,
-        ratio_against(facts, settings),
+    return answer_of(
+        InertiaOutcome(
+            evaluate(recording, settings, facts), f"host, {settings.scheme}",
+            facts.torque_known, settings.ends_rev, recording.velocity_rad_s.size / rate,
+            ratio_against(facts, settings),
+        )
     )  # fmt: skip
 
 
-def as_json(outcome: InertiaOutcome) -> dict[str, object]:
-    """The form that ``servodeck inertia --out`` writes (architecture.md)."""
+def answer_of(outcome: InertiaOutcome) -> InertiaAnswer:
+    """The result as page, report, files and command line have it."""
     r = outcome.result
     parts: dict[str, Interval] = {
         "inertia_kgm2": r.inertia_kgm2, "viscous_nms": r.viscous_nms,
         "coulomb_nm": r.coulomb_nm, "gravity_nm": r.gravity_nm,
     }  # fmt: skip
-    ratio = r.load_ratio
-    spread = None
+    ratio, spread = r.load_ratio, None
     if ratio is not None and np.isfinite(r.inertia_kgm2.value):
         rotor = r.inertia_kgm2.value / (1.0 + ratio)
-        spread = [r.inertia_kgm2.low / rotor - 1.0, r.inertia_kgm2.high / rotor - 1.0]
-    return {
-        "method": outcome.method,
-        **{name: _number(part.value) for name, part in parts.items()},
-        "load_ratio": ratio,
-        "load_ratio_against": outcome.ratio_against,
-        "ci95": {
-            **{name: [_number(p.low), _number(p.high)] for name, p in parts.items()},
-            "load_ratio": spread,
-        },
-        # A spring, an arm or a load out of balance; and a fan or a pump at the highest speed.
-        "place_nm": r.beside.place_nm or None,
-        "place_periods_rev": [period / (2 * np.pi) for period in r.beside.periods_rad],
-        "fan_nm": r.beside.fan_nm or None,
-        "r2": r.r2,
-        "verdict": r.verdict,
-        "identifiable": r.identifiable,
-        "unit": "SI" if outcome.torque_known else "torque as a share of rated torque",
-        "ends_rev": outcome.ends_rev,
-        "motion_s": outcome.motion_s,
-    }  # fmt: skip
+        spread = (r.inertia_kgm2.low / rotor - 1.0, r.inertia_kgm2.high / rotor - 1.0)
+    values = {name: _number(part.value) for name, part in parts.items()}
+    ends = {name: (_number(part.low), _number(part.high)) for name, part in parts.items()}
+    return InertiaAnswer(
+        method=outcome.method, **values, load_ratio=ratio,
+        load_ratio_against=outcome.ratio_against,
+        ci95=InertiaIntervals(**ends, load_ratio=spread),
+        place_nm=r.beside.place_nm or None,
+        place_periods_rev=tuple(period / (2 * np.pi) for period in r.beside.periods_rad),
+        fan_nm=r.beside.fan_nm or None, r2=r.r2, verdict=r.verdict, identifiable=r.identifiable,
+        unit="SI" if outcome.torque_known else "torque as a share of rated torque",
+        ends_rev=outcome.ends_rev, motion_s=outcome.motion_s,
+    )  # fmt: skip
 
 
 def _number(value: float) -> float | None:

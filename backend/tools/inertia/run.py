@@ -9,11 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable
 from dataclasses import replace
-
-import numpy as np
-import numpy.typing as npt
 
 from backend.analysis.mechanics.inertia import InertiaResult
 from backend.axis.axis import Axis, Envelope
@@ -22,25 +18,29 @@ from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.inertia.evaluation import (
     InertiaOutcome,
     InertiaSettings,
+    answer_of,
     doubt_of,
     evaluate,
     oscillation_hz,
     ratio_against,
     raw_of,
+    reevaluate,
 )
 from backend.tools.inertia.moves import Shape, first_look, identification_moves
 from backend.tools.inertia.probe import RoughFit
+from backend.tools.inertia.result import InertiaAnswer
+from backend.tools.inertia.settings import InertiaRequest
+from backend.tools.inertia.texts import TEXTS, report
 from backend.tools.measuring.computing import meanwhile
 from backend.tools.measuring.recording import require_signals, share
 from backend.tools.measuring.repeats import Repeats
 from backend.tools.moves.end_search import find_ends
 from backend.tools.moves.go_back import go_back
+from backend.tools.tool import Keep, Run, Tool
 from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
 from texts.message import text
-
-Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 
 _END_MARGIN_REV = 0.15
 #: Gentle moves last about so many times as long; seconds beside them, such as going back.
@@ -151,3 +151,21 @@ def _wide(settings: InertiaSettings, ends: tuple[float, float] | None) -> Envelo
     if ends is None:
         return settings.envelope
     return replace(settings.envelope, travel_rev=ends[1] - ends[0])
+
+
+async def run(run: Run, request: InertiaRequest) -> InertiaAnswer:
+    """As `inertia`, for the descriptor."""
+    return answer_of(
+        await inertia(run.axis, run.session, request.inner, run.progress, run.keep, run.repeats)
+    )
+
+
+TOOL = Tool(
+    kind="inertia",
+    settings=InertiaRequest,
+    result=InertiaAnswer,
+    run=run,
+    reevaluate=reevaluate,
+    report=report,
+    texts=TEXTS,
+)

@@ -40,6 +40,13 @@ def write_physics(p: Parameters, spec: MechanicsSpec, motor: MotorData) -> None:
     p[k.P_COULOMB] = spec.friction.coulomb_nm
     p[k.P_STICTION] = max(spec.friction.static_nm - spec.friction.coulomb_nm, 0.0)
     p[k.P_STRIBECK] = spec.friction.stribeck_rad_s
+    p[k.P_STRIBECK_TANH] = spec.friction.stribeck_law == "tanh"
+    ripple = spec.ripple
+    p[k.P_RIPPLE_REVOLUTION], p[k.P_RIPPLE_PHASE] = ripple.revolution_nm, ripple.phase_rad
+    p[k.P_RIPPLE_POLE_PAIR], p[k.P_RIPPLE_POLE_PAIRS] = ripple.pole_pair_nm, ripple.pole_pairs
+    p[k.P_RIPPLE_COGGING] = ripple.cogging_nm
+    p[k.P_RIPPLE_COGGING_SECOND] = ripple.cogging_second_nm
+    p[k.P_RIPPLE_COGGING_PER_REV] = ripple.cogging_per_rev
     p[k.P_GRAVITY] = spec.friction.gravity_nm
     p[k.P_PLACE_NM] = spec.place.torque_nm
     p[k.P_PLACE_PER_RAD] = 1.0 / spec.place.period_rev

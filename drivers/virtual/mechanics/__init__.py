@@ -1,6 +1,7 @@
 """The machine that a virtual drive turns: an inertia chain with friction, gravity and stops."""
 
 from drivers.virtual.mechanics.chain import analytic_response
+from drivers.virtual.mechanics.friction_curve import friction_nm, ripple_nm
 from drivers.virtual.mechanics.rough import RoughTorqueSpec
 from drivers.virtual.mechanics.spec import (
     EncoderSpec,
@@ -9,6 +10,7 @@ from drivers.virtual.mechanics.spec import (
     MechanicsSpec,
     MotorSpec,
     PlaceSpec,
+    RippleSpec,
     SupplySpec,
     SwitchSpec,
     TravelSpec,
@@ -23,11 +25,14 @@ __all__ = [
     "MechanicsSpec",
     "MotorSpec",
     "PlaceSpec",
+    "RippleSpec",
     "RoughTorqueSpec",
     "SupplySpec",
     "SwitchSpec",
     "TravelSpec",
     "analytic_response",
+    "friction_nm",
     "load_mechanics",
+    "ripple_nm",
     "standard_mechanics",
 ]

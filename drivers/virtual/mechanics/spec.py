@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import tomllib
 from pathlib import Path
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -40,7 +41,8 @@ class FrictionSpec(_Finite):
     """Friction at the motor shaft, and torques on the last inertia of the chain.
 
     Friction begins at ``static_nm``, where that is more than ``coulomb_nm``, and falls to it within
-    ``stribeck_rad_s`` (Stribeck's curve). The motor holds the load with ``+gravity_nm``: the load
+    ``stribeck_rad_s`` (Stribeck's curve): by exp(-(ω/ω_s)²), or by 1 - tanh(ω/ω_s) where
+    ``stribeck_law`` is "tanh". The motor holds the load with ``+gravity_nm``: the load
     itself pulls to negative positions. ``fan_nms2`` grows with the square of the speed, as the
     torque of a fan, a pump or a stirrer does.
     """
@@ -49,6 +51,7 @@ class FrictionSpec(_Finite):
     coulomb_nm: float = Field(default=0.0, ge=0)
     static_nm: float = Field(default=0.0, ge=0)
     stribeck_rad_s: float = Field(default=1.0, gt=0)
+    stribeck_law: Literal["gaussian", "tanh"] = "gaussian"
     gravity_nm: float = 0.0
     fan_nms2: float = Field(default=0.0, ge=0)
 
@@ -65,6 +68,23 @@ class PlaceSpec(_Finite):
     torque_nm: float = 0.0
     period_rev: float = Field(default=1.0, gt=0)
     at_rev: float = 0.0
+
+
+class RippleSpec(_Finite):
+    """Periodic torque of the motor itself, as the motor has to make it, by its angle θ in rad.
+
+    ``revolution_nm`` sin(θ + φ) of a bearing or a coupling, ``pole_pair_nm`` sin(pθ + φ) of a
+    current offset with p ``pole_pairs``, and cogging of two harmonics, ``cogging_nm`` sin(cθ + φ)
+    and ``cogging_second_nm`` sin(2cθ + φ), with c ``cogging_per_rev`` and φ ``phase_rad``.
+    """
+
+    revolution_nm: float = Field(default=0.0, ge=0)
+    pole_pair_nm: float = Field(default=0.0, ge=0)
+    pole_pairs: int = Field(default=4, ge=1, le=64)
+    cogging_nm: float = Field(default=0.0, ge=0)
+    cogging_second_nm: float = Field(default=0.0, ge=0)
+    cogging_per_rev: int = Field(default=24, ge=1, le=512)
+    phase_rad: float = 0.0
 
 
 class EncoderSpec(_Finite):
@@ -151,6 +171,7 @@ class MechanicsSpec(_Part):
     motor: MotorSpec
     friction: FrictionSpec = FrictionSpec()
     place: PlaceSpec = PlaceSpec()
+    ripple: RippleSpec = RippleSpec()
     encoder: EncoderSpec = EncoderSpec()
     travel: TravelSpec = TravelSpec()
     switches: SwitchSpec = SwitchSpec()

@@ -31,7 +31,7 @@ from tests.virtual.tools.direct import DirectLink, direct
 from tests.virtual.tools.rig import mechanics
 
 ONE = mechanics((1e-4, 60.0, 0.006))
-URL = "ethercat://virtual7"
+URL = "ethercat://eth7"
 #: Bandwidth of the speed loop and inertia, which every design changes.
 GAINS = ("2005:03", "2001:06")
 
@@ -196,7 +196,7 @@ def test_a_drive_that_the_server_does_not_have(
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        ([], 1, "give a bus URL, or --server and --axis"),
+        ([], 1, "give a bus URL and --station, or --server and --axis"),
         ([URL, "--end-low-rev", "0.5"], 2, "give both --end-low-rev and --end-high-rev"),
         ([URL, "--mark", "quick"], 2, "'quick' is not one of"),
     ],

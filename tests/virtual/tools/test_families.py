@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import pytest
 
-from backend.commands.measure import _told
+from backend.commands.tools import lines_of
 from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, autotune
-from backend.tools.inertia.evaluation import InertiaSettings, as_json
+from backend.tools.inertia.evaluation import InertiaSettings, answer_of
+from backend.tools.inertia.run import TOOL as INERTIA
 from backend.tools.inertia.run import inertia
 from backend.tools.measuring.temporary import put_back
 from backend.tools.notch.meaning import meaning_of
@@ -138,13 +139,13 @@ async def test_a_load_that_pulls_by_its_place_is_no_inertia(drive: str, place: P
     spec = ONE.model_copy(update={"place": place})
     async with direct(spec, drive=drive) as b:
         outcome = await inertia(b.axis, b.session, InertiaSettings(WIDE), silent())
-    found, answer = outcome.result, as_json(outcome)
+    found, answer = outcome.result, answer_of(outcome)
     assert found.verdict == "ok"
     assert found.inertia_kgm2.value == pytest.approx(spec.total_inertia_kgm2, rel=0.02)
     assert found.coulomb_nm.value == pytest.approx(spec.friction.coulomb_nm, rel=0.1)
     assert found.beside.place_nm > 0.02
-    assert answer["place_nm"] == found.beside.place_nm
-    assert answer["fan_nm"] is None
-    told = _told("inertia", answer)
-    assert any("position-dependent torque" in line for line in told)
+    assert answer.place_nm == found.beside.place_nm
+    assert answer.fan_nm is None
+    told = lines_of(INERTIA, answer)
+    assert any("Position-dependent torque" in line for line in told)
     assert not any("fan, pump" in line for line in told)

@@ -736,6 +736,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/jobs/friction": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Friction
+         * @description Map friction over speed and torque over position, both directions. The axis moves.
+         */
+        post: operations["start_friction"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/jobs/generate": {
         parameters: {
             query?: never;
@@ -807,7 +827,7 @@ export interface paths {
         put?: never;
         /**
          * Start Inertia
-         * @description Measure inertia and friction. The result has the form of ``servodeck inertia --out``.
+         * @description Measure inertia and friction and write them as JSON. The axis moves.
          */
         post: operations["start_inertia"];
         delete?: never;
@@ -2764,6 +2784,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/tools": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Tools
+         * @description Every tool that has a descriptor: its words, and the form of its settings.
+         */
+        get: operations["list_tools"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
 }
 export type webhooks = Record<string, never>;
 export interface components {
@@ -3017,16 +3057,26 @@ export interface components {
              * @enum {string}
              */
             scheme: "free" | "limited" | "taught";
-            /** Speed Limit */
+            /**
+             * Speed Limit
+             * @description highest speed, in rpm
+             */
             speed_limit: number;
             /**
              * Time Limit S
+             * @description longest time of a motion, in s
              * @default 60
              */
             time_limit_s: number;
-            /** Torque Limit */
+            /**
+             * Torque Limit
+             * @description highest torque, in % of rated
+             */
             torque_limit: number;
-            /** Travel Limit */
+            /**
+             * Travel Limit
+             * @description longest way from the start, in revolutions
+             */
             travel_limit: number;
         };
         /**
@@ -3814,6 +3864,19 @@ export interface components {
             type: "enable_renew";
         };
         /**
+         * Estimate
+         * @description A value with its 95 % interval, in the unit that the field's name says.
+         */
+        Estimate: {
+            /** Ci95 */
+            ci95: [
+                number | null,
+                number | null
+            ];
+            /** Value */
+            value: number;
+        };
+        /**
          * EthercatPermissions
          * @description What is missing to use an interface, and the commands that grant it.
          */
@@ -4000,6 +4063,25 @@ export interface components {
             source: string;
         };
         /**
+         * Finding
+         * @description What the map says, or cannot say, as a code with the figure that it rests on.
+         */
+        Finding: {
+            /**
+             * Code
+             * @enum {string}
+             */
+            code: "mapped" | "standstill_not_measured" | "stribeck_not_seen" | "stribeck_not_reached" | "few_speeds" | "ripple_not_asked" | "ripple_needs_revolution" | "ripple_not_seen" | "uneven_speeds" | "fastest_by_travel" | "slowest_by_time" | "model_misfit";
+            /**
+             * Unit
+             * @default
+             * @enum {string}
+             */
+            unit: "" | "rpm" | "rev" | "s" | "%";
+            /** Value */
+            value?: number | null;
+        };
+        /**
          * Forcing
          * @description A way to overrule terminals: outputs that are forced, or inputs that are simulated.
          *
@@ -4132,6 +4214,161 @@ export interface components {
             url: string;
             /** Vendor Id */
             vendor_id: number | null;
+        };
+        /**
+         * FrictionPoint
+         * @description Torque at one constant speed; negative speeds turn backwards. A load's pull is part of it.
+         */
+        FrictionPoint: {
+            /**
+             * Revolutions
+             * @description that the mean is taken over
+             */
+            revolutions: number;
+            /** Speed Rpm */
+            speed_rpm: number;
+            /** Torque Ci95 Percent */
+            torque_ci95_percent: [
+                number,
+                number
+            ];
+            /** Torque Percent */
+            torque_percent: number;
+        };
+        /**
+         * FrictionResult
+         * @description The map. ``curve_*`` is the model through the points, over the speeds measured only.
+         *
+         *     The model: torque = load + sign(v) · (Coulomb + Stribeck · exp(-(|v|/v_s)^δ)) + viscous · v.
+         *     Parameters are None where the data cannot say them; ``findings`` say why.
+         */
+        FrictionResult: {
+            coulomb_percent: components["schemas"]["Estimate"] | null;
+            /** Curve Percent */
+            curve_percent: number[];
+            /** Curve Speed Rpm */
+            curve_speed_rpm: number[];
+            /** Findings */
+            findings: components["schemas"]["Finding"][];
+            /**
+             * Harmonics
+             * @description largest first
+             */
+            harmonics: components["schemas"]["Harmonic"][];
+            /** @description constant pull of the load (gravity) */
+            load_percent: components["schemas"]["Estimate"] | null;
+            /**
+             * Measurements
+             * @description names of the stored raw data
+             * @default []
+             */
+            measurements: string[];
+            /** Motion S */
+            motion_s: number;
+            /** Points */
+            points: components["schemas"]["FrictionPoint"][];
+            /**
+             * Rated Torque Nm
+             * @description what 100 % is; null where it is not known
+             */
+            rated_torque_nm: number | null;
+            /**
+             * Ripple Angle Deg
+             * @description [n] over one motor revolution
+             */
+            ripple_angle_deg: number[];
+            /**
+             * Ripple Backward Percent
+             * @description [n] about its mean
+             */
+            ripple_backward_percent: (number | null)[];
+            /**
+             * Ripple Forward Percent
+             * @description [n] about its mean
+             */
+            ripple_forward_percent: (number | null)[];
+            /** Ripple Speed Rpm */
+            ripple_speed_rpm: number | null;
+            /** @description break-away torque; null: standstill friction is not measured */
+            standstill_percent?: components["schemas"]["Estimate"] | null;
+            /** @description above Coulomb friction, towards 0 rpm */
+            stribeck_percent: components["schemas"]["Estimate"] | null;
+            stribeck_speed_rpm: components["schemas"]["Estimate"] | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            tool: "friction";
+            viscous_percent_per_rpm: components["schemas"]["Estimate"] | null;
+        };
+        /**
+         * FrictionSettings
+         * @description Speeds of the map; its limits are those of every measurement.
+         *
+         *     The time limit is that of all moves together: slow speeds are left out where it ends them.
+         */
+        FrictionSettings: {
+            /**
+             * Consent
+             * @description the user agreed that nothing in the drive ends a speed when this computer falls silent; needed where the drive has no watchdog (DS_C)
+             * @default false
+             */
+            consent: boolean;
+            /**
+             * Cycle Ms
+             * @description cycle of the exchange that is started where none runs, and ended afterwards
+             * @default 1
+             */
+            cycle_ms: number;
+            /**
+             * Orders
+             * @description highest order of the ripple, per revolution
+             * @default 60
+             */
+            orders: number;
+            /**
+             * Rated Torque Nm
+             * @description overrides what the drive says
+             */
+            rated_torque_nm?: number | null;
+            /**
+             * Ripple
+             * @description one slow revolution each way for the ripple
+             * @default true
+             */
+            ripple: boolean;
+            /**
+             * Slowest Rpm
+             * @description lowest speed; as low as the time limit allows without it
+             */
+            slowest_rpm?: number | null;
+            /**
+             * Speed Limit
+             * @description highest speed, in rpm
+             */
+            speed_limit: number;
+            /**
+             * Speeds
+             * @description speeds in each direction
+             * @default 10
+             */
+            speeds: number;
+            /**
+             * Time Limit S
+             * @description longest time of all moves together, in s
+             * @default 120
+             */
+            time_limit_s: number;
+            /**
+             * Torque Limit
+             * @description highest torque, in % of rated
+             */
+            torque_limit: number;
+            /**
+             * Travel Limit
+             * @description longest way from the start, in revolutions
+             */
+            travel_limit: number;
         };
         /**
          * Functions
@@ -4530,6 +4767,26 @@ export interface components {
             title: string;
         };
         /**
+         * Harmonic
+         * @description Torque that repeats ``order_per_rev`` times per motor revolution.
+         *
+         *     Torque = ``amplitude_percent`` · sin(order · angle + ``phase_deg``), by the angle that the
+         *     drive reports (6064h).
+         */
+        Harmonic: {
+            /** Amplitude Ci95 Percent */
+            amplitude_ci95_percent: [
+                number,
+                number
+            ];
+            /** Amplitude Percent */
+            amplitude_percent: number;
+            /** Order Per Rev */
+            order_per_rev: number;
+            /** Phase Deg */
+            phase_deg: number;
+        };
+        /**
          * Health
          * @description The server is alive.
          */
@@ -4717,6 +4974,105 @@ export interface components {
             problems: string[];
         };
         /**
+         * InertiaAnswer
+         * @description Values are None where they are not finite; they count only where ``identifiable``.
+         */
+        InertiaAnswer: {
+            ci95: components["schemas"]["InertiaIntervals"];
+            /** Coulomb Nm */
+            coulomb_nm: number | null;
+            /** Ends Rev */
+            ends_rev: [
+                number,
+                number
+            ] | null;
+            /**
+             * Fan Nm
+             * @description torque by the square of the speed, at the highest: fan, pump
+             */
+            fan_nm?: number | null;
+            /** Gravity Nm */
+            gravity_nm: number | null;
+            /** Identifiable */
+            identifiable: boolean;
+            /** Inertia Kgm2 */
+            inertia_kgm2: number | null;
+            /** Load Ratio */
+            load_ratio: number | null;
+            /**
+             * Load Ratio Against
+             * @description what it compares with; empty without a ratio
+             */
+            load_ratio_against: string;
+            /**
+             * Measurements
+             * @description names of the stored raw data
+             * @default []
+             */
+            measurements: string[];
+            /** Method */
+            method: string;
+            /** Motion S */
+            motion_s: number;
+            /**
+             * Place Nm
+             * @description half the span of a torque by place: spring, arm, imbalance
+             */
+            place_nm?: number | null;
+            /**
+             * Place Periods Rev
+             * @default []
+             */
+            place_periods_rev: number[];
+            /** R2 */
+            r2: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            tool: "inertia";
+            /**
+             * Unit
+             * @enum {string}
+             */
+            unit: "SI" | "torque as a share of rated torque";
+            /** Verdict */
+            verdict: string;
+            /** Viscous Nms */
+            viscous_nms: number | null;
+        };
+        /**
+         * InertiaIntervals
+         * @description 95 % intervals of the fields of the same names.
+         */
+        InertiaIntervals: {
+            /** Coulomb Nm */
+            coulomb_nm: [
+                number | null,
+                number | null
+            ];
+            /** Gravity Nm */
+            gravity_nm: [
+                number | null,
+                number | null
+            ];
+            /** Inertia Kgm2 */
+            inertia_kgm2: [
+                number | null,
+                number | null
+            ];
+            /** Load Ratio */
+            load_ratio: [
+                number | null,
+                number | null
+            ] | null;
+            /** Viscous Nms */
+            viscous_nms: [
+                number | null,
+                number | null
+            ];
+        };
+        /**
          * InertiaRequest
          * @description Inertia and friction.
          */
@@ -4733,12 +5089,18 @@ export interface components {
              * @default 1
              */
             cycle_ms: number;
-            /** Ends Rev */
+            /**
+             * Ends Rev
+             * @description taught end
+             */
             ends_rev?: [
                 number,
                 number
             ] | null;
-            /** Motor Inertia Kgm2 */
+            /**
+             * Motor Inertia Kgm2
+             * @description inertia of the motor alone
+             */
             motor_inertia_kgm2?: number | null;
             /**
              * Rated Torque Nm
@@ -4747,35 +5109,49 @@ export interface components {
             rated_torque_nm?: number | null;
             /**
              * Repetitions
+             * @description moves forth and back
              * @default 4
              */
             repetitions: number;
             /**
              * Scheme
+             * @description how the axis may travel
              * @default free
              * @enum {string}
              */
             scheme: "free" | "limited" | "taught";
             /**
              * Search Speed
+             * @description speed of the search, in rpm
              * @default 30
              */
             search_speed: number;
             /**
              * Search Torque
+             * @description torque of the search for an end, in % of rated
              * @default 20
              */
             search_torque: number;
-            /** Speed Limit */
+            /**
+             * Speed Limit
+             * @description highest speed, in rpm
+             */
             speed_limit: number;
             /**
              * Time Limit S
+             * @description longest time of a motion, in s
              * @default 60
              */
             time_limit_s: number;
-            /** Torque Limit */
+            /**
+             * Torque Limit
+             * @description highest torque, in % of rated
+             */
             torque_limit: number;
-            /** Travel Limit */
+            /**
+             * Travel Limit
+             * @description longest way from the start, in revolutions
+             */
             travel_limit: number;
         };
         /**
@@ -4884,8 +5260,11 @@ export interface components {
             problem: components["schemas"]["Problem"] | null;
             /** Progress */
             progress: number;
-            /** Result */
-            result: {
+            /**
+             * Result
+             * @description of a tool: its result, which its field tool names
+             */
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"]) | {
                 [key: string]: unknown;
             } | null;
             /**
@@ -7825,16 +8204,26 @@ export interface components {
              * @default 300
              */
             speed: number;
-            /** Speed Limit */
+            /**
+             * Speed Limit
+             * @description highest speed, in rpm
+             */
             speed_limit: number;
             /**
              * Time Limit S
+             * @description longest time of a motion, in s
              * @default 60
              */
             time_limit_s: number;
-            /** Torque Limit */
+            /**
+             * Torque Limit
+             * @description highest torque, in % of rated
+             */
             torque_limit: number;
-            /** Travel Limit */
+            /**
+             * Travel Limit
+             * @description longest way from the start, in revolutions
+             */
             travel_limit: number;
             /** Window */
             window?: number | null;
@@ -8053,16 +8442,26 @@ export interface components {
              * @default 0.35
              */
             share: number;
-            /** Speed Limit */
+            /**
+             * Speed Limit
+             * @description highest speed, in rpm
+             */
             speed_limit: number;
             /**
              * Time Limit S
+             * @description longest time of a motion, in s
              * @default 60
              */
             time_limit_s: number;
-            /** Torque Limit */
+            /**
+             * Torque Limit
+             * @description highest torque, in % of rated
+             */
             torque_limit: number;
-            /** Travel Limit */
+            /**
+             * Travel Limit
+             * @description longest way from the start, in revolutions
+             */
             travel_limit: number;
         };
         /**
@@ -8282,6 +8681,28 @@ export interface components {
             person: string;
             /** Scopes */
             scopes: components["schemas"]["Right"][];
+        };
+        /**
+         * ToolInfo
+         * @description A tool as its descriptor has it.
+         */
+        ToolInfo: {
+            /** Kind */
+            kind: string;
+            /**
+             * Settings
+             * @description JSON schema of what starting it takes
+             */
+            settings: {
+                [key: string]: unknown;
+            };
+            /**
+             * Texts
+             * @description English, Chinese
+             */
+            texts: {
+                [key: string]: string[];
+            };
         };
         /**
          * TouchProbe
@@ -8527,16 +8948,21 @@ export type DrivesChanged = components['schemas']['DrivesChanged'];
 export type EnablePress = components['schemas']['EnablePress'];
 export type EnableRelease = components['schemas']['EnableRelease'];
 export type EnableRenew = components['schemas']['EnableRenew'];
+export type Estimate = components['schemas']['Estimate'];
 export type EthercatPermissions = components['schemas']['EthercatPermissions'];
 export type EthercatSegment = components['schemas']['EthercatSegment'];
 export type ExcitationInfo = components['schemas']['ExcitationInfo'];
 export type FaultHistory = components['schemas']['FaultHistory'];
 export type FaultHistoryInfo = components['schemas']['FaultHistoryInfo'];
+export type Finding = components['schemas']['Finding'];
 export type Forcing = components['schemas']['Forcing'];
 export type ForcingInfo = components['schemas']['ForcingInfo'];
 export type ForcingStart = components['schemas']['ForcingStart'];
 export type ForcingValues = components['schemas']['ForcingValues'];
 export type FoundDrive = components['schemas']['FoundDrive'];
+export type FrictionPoint = components['schemas']['FrictionPoint'];
+export type FrictionResult = components['schemas']['FrictionResult'];
+export type FrictionSettings = components['schemas']['FrictionSettings'];
 export type Functions = components['schemas']['Functions'];
 export type GainBlock = components['schemas']['GainBlock'];
 export type GainInfo = components['schemas']['GainInfo'];
@@ -8550,6 +8976,7 @@ export type GenerateRequest = components['schemas']['GenerateRequest'];
 export type GrantView = components['schemas']['GrantView'];
 export type Guide = components['schemas']['Guide'];
 export type GuideStep = components['schemas']['GuideStep'];
+export type Harmonic = components['schemas']['Harmonic'];
 export type Health = components['schemas']['Health'];
 export type Hello = components['schemas']['Hello'];
 export type HistorySlot = components['schemas']['HistorySlot'];
@@ -8559,6 +8986,8 @@ export type IdentifyRequest = components['schemas']['IdentifyRequest'];
 export type ImportFinding = components['schemas']['ImportFinding'];
 export type ImportedDescription = components['schemas']['ImportedDescription'];
 export type ImportedList = components['schemas']['ImportedList'];
+export type InertiaAnswer = components['schemas']['InertiaAnswer'];
+export type InertiaIntervals = components['schemas']['InertiaIntervals'];
 export type InertiaRequest = components['schemas']['InertiaRequest'];
 export type Interfaces = components['schemas']['Interfaces'];
 export type InvitationView = components['schemas']['InvitationView'];
@@ -8711,6 +9140,7 @@ export type TerminalInfo = components['schemas']['TerminalInfo'];
 export type ThreeWay = components['schemas']['ThreeWay'];
 export type ThreeWayRow = components['schemas']['ThreeWayRow'];
 export type TokenInfo = components['schemas']['TokenInfo'];
+export type ToolInfo = components['schemas']['ToolInfo'];
 export type TouchProbe = components['schemas']['TouchProbe'];
 export type TransitionRequest = components['schemas']['TransitionRequest'];
 export type TurnedUpdate = components['schemas']['TurnedUpdate'];
@@ -15076,6 +15506,149 @@ export interface operations {
         requestBody: {
             content: {
                 "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_friction: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["FrictionSettings"];
             };
         };
         responses: {
@@ -32218,6 +32791,143 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    list_tools: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ToolInfo"][];
+                };
             };
             /** @description Not a request of this interface */
             400: {

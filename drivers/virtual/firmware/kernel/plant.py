@@ -49,6 +49,25 @@ def _beyond(p, x, size):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True)
+def _stribeck(p, omega):  # type: ignore[no-untyped-def]
+    """Friction above Coulomb's at this speed."""
+    slow = abs(omega) / p[k.P_STRIBECK]
+    if p[k.P_STRIBECK_TANH] > 0.0:
+        return p[k.P_STICTION] * (1.0 - math.tanh(slow))
+    return p[k.P_STICTION] * math.exp(-slow * slow)
+
+
+@njit(nogil=True)
+def _ripple(p, angle):  # type: ignore[no-untyped-def]
+    """Periodic torque that the motor has to make at this angle."""
+    at, cogging = p[k.P_RIPPLE_PHASE], p[k.P_RIPPLE_COGGING_PER_REV]
+    torque = p[k.P_RIPPLE_REVOLUTION] * math.sin(angle + at)
+    torque += p[k.P_RIPPLE_POLE_PAIR] * math.sin(p[k.P_RIPPLE_POLE_PAIRS] * angle + at)
+    torque += p[k.P_RIPPLE_COGGING] * math.sin(cogging * angle + at)
+    return torque + p[k.P_RIPPLE_COGGING_SECOND] * math.sin(2.0 * cogging * angle + at)
+
+
+@njit(nogil=True)
 def step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-untyped-def]
     """One exact step of the linear chain, then friction and end stops on the velocity level."""
     size = x.shape[0]
@@ -58,8 +77,9 @@ def step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-
             contact |= 1 << g
     am, bm = a[contact], b[contact]
     pull = _pull(p, x, size)
+    ripple = _ripple(p, x[0])
     for i in range(size):
-        total = bm[i, 0] * s[k.S_TORQUE_COMMAND] - bm[i, 2] * pull
+        total = bm[i, 0] * s[k.S_TORQUE_COMMAND] - bm[i, 1] * ripple - bm[i, 2] * pull
         for j in range(size):
             total += am[i, j] * x[j]
         for g in range(gap_state.shape[0]):
@@ -68,8 +88,7 @@ def step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-
         scratch[i] = total
     coulomb = p[k.P_COULOMB]
     if p[k.P_STICTION] > 0.0:
-        slow = x[1] / p[k.P_STRIBECK]
-        coulomb += p[k.P_STICTION] * math.exp(-slow * slow)
+        coulomb += _stribeck(p, x[1])
     if int(p[k.P_LOOP]) == k.LOOP_OFF or p[k.P_BRAKE_CLOSED] > 0.0:
         coulomb += p[k.P_BRAKE_TORQUE]
     friction = 0.0

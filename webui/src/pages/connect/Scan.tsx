@@ -2,6 +2,7 @@ import { Button, Checkbox, NativeSelect, TextInput } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { FoundDrive, ImportedDescription, MissingPort, ProfileInfo } from '../../api/schema'
+import { plainResult } from '../../api/results'
 import { href } from '../../app/router'
 import { type T, useT } from '../../i18n'
 import { setJob, useDrives, useJob, useJobs } from '../../live/store'
@@ -30,7 +31,7 @@ export function Scan({ url, onUrl }: { url: string; onUrl: (url: string) => void
   const bad = stations.trim() !== '' && list === null
   const running = job?.state === 'running'
   const ready = url !== '' && !bad && !running && !scan.busy
-  const found = (job?.result?.found ?? []) as FoundDrive[]
+  const found = (plainResult(job?.result).found ?? []) as FoundDrive[]
   const start = () =>
     scan.run(async () => {
       const begun = await ask(

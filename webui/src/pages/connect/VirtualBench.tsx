@@ -2,6 +2,7 @@ import { Button } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { FoundDrive, JobInfo } from '../../api/schema'
+import { plainResult } from '../../api/results'
 import { useT } from '../../i18n'
 import { contents, setJob, subscribe } from '../../live/store'
 import { ProblemNote } from '../../widgets/ProblemNote'
@@ -74,7 +75,7 @@ async function search(url: string): Promise<FoundDrive[]> {
   const begun = await ask(api.POST('/api/v1/scan', { body }))
   setJob(begun)
   const job = await ended(begun.id)
-  return (job.result?.found ?? []) as FoundDrive[]
+  return (plainResult(job.result).found ?? []) as FoundDrive[]
 }
 
 function ended(id: string): Promise<JobInfo> {

@@ -2,6 +2,7 @@ import { Button, Checkbox, SegmentedControl } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask, problemOf } from '../../api/client'
 import type { ForcingInfo } from '../../api/schema'
+import { plainResult } from '../../api/results'
 import { useT } from '../../i18n'
 import { useJob } from '../../live/store'
 import { Panel } from '../../widgets/Panel'
@@ -31,6 +32,7 @@ export function ForcingPanel({
   const act = useAction()
   const job = useJob(mine?.job ?? forcing.job ?? null)
   const path = { drive_id: drive, name: forcing.name }
+  const plain = plainResult(job?.result)
   const over = mine !== null && job !== null && job.state !== 'running'
   useEffect(() => {
     if (!mine || over) return
@@ -90,7 +92,7 @@ export function ForcingPanel({
       {over && job?.problem && <ProblemNote problem={job.problem} onClose={() => setMine(null)} />}
       {over && !job?.problem && (
         <p className="note info" role="status">
-          {typeof job?.result?.reason === 'string' ? job.result.reason : ''}
+          {typeof plain.reason === 'string' ? plain.reason : ''}
         </p>
       )}
       {!holding && forcing.running && !mine ? (

@@ -2,6 +2,7 @@ import { Button, Checkbox, Modal } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { Diff, DriveSummary } from '../../api/schema'
+import { plainResult } from '../../api/results'
 import { useT } from '../../i18n'
 import { setJob, useJob } from '../../live/store'
 import { JobNote, useJobEnd } from '../../widgets/JobNote'
@@ -56,7 +57,8 @@ export function LoadReport({
       setJob(begun)
       setId(begun.id)
     })
-  const rows = (job?.result?.rows ?? []) as Row[]
+  const plain = plainResult(job?.result)
+  const rows = (plain.rows ?? []) as Row[]
   const close = () => {
     setOpen(false)
     setId(null)
@@ -113,12 +115,11 @@ export function LoadReport({
                 <p>
                   <strong>
                     {t('load.report', {
-                      written: Number(job.result.written ?? 0),
-                      failed: Number(job.result.failed ?? 0),
+                      written: Number(plain.written ?? 0),
+                      failed: Number(plain.failed ?? 0),
                     })}
                   </strong>{' '}
-                  {typeof job.result.backup === 'string' &&
-                    t('load.backup', { file: job.result.backup })}
+                  {typeof plain.backup === 'string' && t('load.backup', { file: plain.backup })}
                 </p>
               )}
               {rows.length > 0 && (

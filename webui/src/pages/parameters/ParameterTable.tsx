@@ -2,6 +2,7 @@ import { Button, Checkbox, NativeSelect, TextInput } from '@mantine/core'
 import { useCallback, useDeferredValue, useMemo, useRef, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { DriveSummary, JobInfo, ParameterRow } from '../../api/schema'
+import { plainResult } from '../../api/results'
 import { known, useT } from '../../i18n'
 import { setJob, useJobs, useReadings } from '../../live/store'
 import { JobNote } from '../../widgets/JobNote'
@@ -216,7 +217,7 @@ function Actions({ drive, shown }: { drive: DriveSummary; shown: ParameterRow[] 
 
 function ReadFailures({ job }: { job: JobInfo }) {
   const t = useT()
-  const failed = Object.entries((job.result?.failed ?? {}) as Record<string, string>)
+  const failed = Object.entries((plainResult(job.result).failed ?? {}) as Record<string, string>)
   if (failed.length === 0) return null
   return (
     <details className="note warn">

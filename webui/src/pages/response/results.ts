@@ -1,4 +1,6 @@
-/** Results of tuning jobs, as the server's tools write them (backend/tools, `as_json`). */
+/** Results of tuning jobs, as the server's tools write them (backend/tools). */
+
+import type { InertiaAnswer } from '../../api/schema'
 
 export interface Resonance {
   kind: 'resonance' | 'antiresonance'
@@ -56,26 +58,8 @@ export interface ImportedAxis {
   candidates?: Candidate[]
 }
 
-export interface Inertia {
-  method: string
-  inertia_kgm2: number | null
-  viscous_nms: number | null
-  coulomb_nm: number | null
-  gravity_nm: number | null
-  /** Half the span of a torque that depends on the place; missing in older measurements. */
-  place_nm?: number | null
-  /** A torque that grows with the square of the speed, at the highest; likewise. */
-  fan_nm?: number | null
-  load_ratio: number | null
-  load_ratio_against: string
-  ci95: Record<string, [number | null, number | null] | null>
-  r2: number
-  verdict: string
-  identifiable: boolean
-  unit: string
-  ends_rev: [number, number] | null
-  motion_s: number
-}
+/** Measurements of older servers lack some fields. */
+export type Inertia = Omit<InertiaAnswer, 'tool' | 'measurements' | 'place_periods_rev'>
 
 export interface NotchShape {
   center_hz: number

@@ -15,6 +15,7 @@ import { useMeasurements } from '../response/useMeasurements'
 import { useToolJob } from '../response/useToolJob'
 import { AutotunePanel } from './AutotunePanel'
 import { CandidatesPanel } from './CandidatesPanel'
+import { FrictionPanel } from './FrictionPanel'
 import { GainsPanel } from './GainsPanel'
 import { InertiaPanel } from './InertiaPanel'
 import { type Known, later, tunedAt } from './path'
@@ -40,7 +41,9 @@ export function TunePage({ drive }: { drive: string }) {
   const inertiaJob = useToolJob(drive, 'inertia').job
   const tuneJob = useToolJob(drive, 'autotune').job
   const stepJob = useToolJob(drive, 'step').job
+  const frictionJob = useToolJob(drive, 'friction').job
   useJobEnd(inertiaJob?.id ?? null, () => void measured.refresh())
+  useJobEnd(frictionJob?.id ?? null, () => void measured.refresh())
   useJobEnd(stepJob?.id ?? null, () => void measured.refresh())
   useJobEnd(tuneJob?.id ?? null, () => {
     void measured.refresh()
@@ -145,6 +148,14 @@ export function TunePage({ drive }: { drive: string }) {
               obstacle={obstacle}
               cycleMs={cycleMs}
               stored={ours.filter((each) => each.kind === 'step')}
+            />
+          )}
+          {possible && (
+            <FrictionPanel
+              drive={drive}
+              limits={limits.agreed ? limits.limits : null}
+              obstacle={obstacle}
+              cycleMs={cycleMs}
             />
           )}
           <div id="step-report">

@@ -1,0 +1,164 @@
+"""Load, Coulomb, viscous and Stribeck friction from torques at constant speeds.
+
+T(v) = Tg + sign(v)·(Tc + Ts·exp(-(|v|/vs)^δ)) + b·v (Armstrong-Hélouvry, Dupont, Canudas de Wit,
+"A survey of models, analysis tools and compensation methods for the control of machines with
+friction", 1994). For each vs and δ of a grid it is linear; the interval of a value spans all
+pairs that the data do not tell from the best one. Any units: torque and speed as given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import f as f_distribution
+from scipy.stats import t as student_t
+
+from backend.analysis.signals.arrays import FloatArray
+
+_EXPONENTS = (0.5, 1.0, 1.5, 2.0)
+_GRID = 48
+#: Fewer speeds say nothing of a Stribeck curve; of its height only what is this near to it.
+_FEWEST, _NEAR = 5, 0.6
+#: Rise of the weighted squares within which a pair is as good as the best (chi-squared, 95 %).
+_ALIKE = 3.84
+#: A point differs from the model beyond its interval times this, and this share of its torque.
+_BEYOND, _SHARE = 2.0, 0.03
+_CURVE = 60
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Load, Coulomb, viscous and, where ``speed`` (vs) is not None, Stribeck torque; deviations."""
+
+    values: FloatArray
+    deviations: FloatArray
+    squares: float
+    speed: float | None = None
+    exponent: float = 1.0
+
+    def at(self, speed: FloatArray) -> FloatArray:
+        """Torque [n] at signed speeds."""
+        return np.asarray(_columns(speed, self.speed, self.exponent) @ self.values)
+
+
+@dataclass(frozen=True)
+class SpeedModel:
+    """Points [n] with half their intervals, the best fit, and those that are as good."""
+
+    speed: FloatArray
+    torque: FloatArray
+    half: FloatArray
+    best: Fit
+    alike: tuple[Fit, ...]
+    speeds: int
+
+    @property
+    def enough(self) -> bool:
+        """Whether there are speeds enough to look for a Stribeck curve."""
+        return self.speeds >= _FEWEST
+
+    @property
+    def reached(self) -> bool:
+        """Whether speeds were slow enough to say how high the Stribeck curve goes."""
+        if self.best.speed is None:
+            return False
+        least = float(np.min(np.abs(self.speed)))
+        return bool(np.exp(-((least / self.best.speed) ** self.best.exponent)) >= _NEAR)
+
+    def value(self, index: int) -> tuple[float, float, float]:
+        """Load, Coulomb, viscous or Stribeck torque (0 to 3) with its 95 % interval."""
+        freedom = max(self.speed.size - self.best.values.size, 1)
+        times = float(student_t.ppf(0.975, freedom))
+        values = np.array([each.values[index] for each in self.alike])
+        spread = times * np.array([each.deviations[index] for each in self.alike])
+        return (
+            float(self.best.values[index]), float(np.min(values - spread)),
+            float(np.max(values + spread)),
+        )  # fmt: skip
+
+    def stribeck_speed(self) -> tuple[float, float, float]:
+        """Where the Stribeck curve has fallen to 1/e, with its 95 % interval.
+
+        Raises:
+            ValueError: there is none.
+        """
+        if self.best.speed is None:
+            raise ValueError("no Stribeck curve was found")
+        speeds = [each.speed for each in self.alike if each.speed is not None]
+        # Half a step of the grid is not told apart.
+        size = np.abs(self.speed)
+        half = (size.max() / size.min()) ** (0.5 / (_GRID - 1))
+        return self.best.speed, float(min(speeds) / half), float(max(speeds) * half)
+
+    def misfit(self) -> float:
+        """Largest share of its torque by which a point differs; 0 where none does beyond chance."""
+        off = np.abs(self.torque - self.best.at(self.speed))
+        size = np.abs(self.torque)
+        beyond = off > np.maximum(_BEYOND * self.half, _SHARE * size)
+        return float(np.max(off[beyond] / np.maximum(size[beyond], 1e-12))) if beyond.any() else 0.0
+
+    def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Signed speeds and torques of a curve through all points, over the speeds measured only.
+
+        Between two points it goes as the model does.
+        """
+        left, speeds, values = self.torque - self.best.at(self.speed), [], []
+        for sign in (-1.0, 1.0):
+            side = np.sign(self.speed) == sign
+            size = np.abs(self.speed[side])
+            order = np.argsort(size)
+            at = np.geomspace(size.min(), size.max(), _CURVE)
+            beside = np.interp(np.log(at), np.log(size[order]), left[side][order])
+            back = slice(None, None, -1 if sign < 0 else 1)
+            speeds += (sign * at)[back].tolist()
+            values += (self.best.at(sign * at) + beside)[back].tolist()
+        return tuple(speeds), tuple(values)
+
+
+def speed_model(speed: FloatArray, torque: FloatArray, half: FloatArray) -> SpeedModel:
+    """The model of torques [n] at signed speeds [n], ``half`` [n] half their 95 % intervals.
+
+    A Stribeck curve is part of it only where the points say so (F test, 99 %).
+    """
+    weight = 1.96 / half
+    plain, speeds = _fit(speed, torque, weight, None, 1.0), speed.size // 2
+    without = SpeedModel(speed, torque, half, plain, (plain,), speeds)
+    freedom = speed.size - 6
+    if speeds < _FEWEST or freedom < 1:
+        return without
+    size = np.abs(speed)
+    grid = np.geomspace(0.5 * size.min(), 0.5 * size.max(), _GRID)
+    fits = [_fit(speed, torque, weight, vs, exponent) for vs in grid for exponent in _EXPONENTS]
+    fits = [each for each in fits if each.values[3] > 0.0]
+    if not fits:
+        return without
+    best = min(fits, key=lambda each: each.squares)
+    gained = (plain.squares - best.squares) / 3.0 / max(best.squares / freedom, 1e-12)
+    if gained < float(f_distribution.ppf(0.99, 3, freedom)):
+        return without
+    limit = best.squares + _ALIKE * max(1.0, best.squares / freedom)
+    alike = tuple(each for each in fits if each.squares <= limit)
+    return SpeedModel(speed, torque, half, best, alike, speeds)
+
+
+def _columns(speed: FloatArray, stribeck: float | None, exponent: float) -> FloatArray:
+    sign = np.sign(speed)
+    columns = [np.ones(speed.size), sign, speed]
+    if stribeck is not None:
+        columns.append(sign * np.exp(-((np.abs(speed) / stribeck) ** exponent)))
+    return np.column_stack(columns)
+
+
+def _fit(
+    speed: FloatArray, torque: FloatArray, weight: FloatArray, stribeck: float | None,
+    exponent: float,
+) -> Fit:  # fmt: skip
+    columns = _columns(speed, stribeck, exponent) * weight[:, None]
+    scale = np.max(np.abs(columns), axis=0)
+    values = np.linalg.lstsq(columns / scale, torque * weight, rcond=None)[0]
+    left = torque * weight - columns / scale @ values
+    squares = float(left @ left)
+    freedom = max(speed.size - values.size, 1)
+    spread = np.linalg.pinv((columns / scale).T @ (columns / scale)) * max(1.0, squares / freedom)
+    return Fit(values / scale, np.sqrt(np.diag(spread)) / scale, squares, stribeck, exponent)

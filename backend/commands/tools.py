@@ -1,0 +1,135 @@
+"""Commands of the tools that have a descriptor: on a bus of one's own, or by a running server."""
+
+from __future__ import annotations
+
+import inspect
+import types
+import typing
+from collections.abc import Callable, Iterator
+from enum import StrEnum
+from typing import Annotated, Any, Literal
+
+import typer
+from pydantic import ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from backend.commands import measure
+from backend.commands.options import Json, Server
+from backend.commands.session import progress
+from backend.tools.registry import BY_KIND
+from backend.tools.tool import AnyTool, Option, Row, Run, ToolResult
+
+_WHERE: dict[str, tuple[Any, object]] = {
+    "url": (measure.Url, None), "station": (measure.Station, 1), "profile": (measure.Profile, None),
+    "server": (Server, None), "axis": (measure.AxisName, None),
+}  # fmt: skip
+_OUTPUT: dict[str, tuple[Any, object]] = {"out": (measure.Out, None), "as_json": (Json, False)}
+
+
+def command_of(tool: AnyTool) -> Callable[..., None]:
+    """The command of a tool: where the drive is, an option for each setting, and the output."""
+    own = {**_WHERE, **dict(_options(tool)), **_OUTPUT}
+
+    def command(**given: Any) -> None:
+        settings = _settings(tool, given)
+        where = measure.Where(*(given[name] for name in _WHERE))
+
+        async def here() -> dict[str, object]:
+            async with measure.exchanging(
+                where.url, where.station, where.profile, settings.cycle_ms, settings.envelope,
+                settings.consent,
+            ) as (axis, session):  # fmt: skip
+                found = await tool.run(Run(axis, session, progress()), settings)
+            return dict(found.model_dump(mode="json"))
+
+        measure.measure(
+            where, tool.kind, here, settings.model_dump(mode="json"), given["out"],
+            lambda answer: lines_of(tool, tool.result.model_validate(answer)),
+            as_json=given["as_json"],
+        )  # fmt: skip
+
+    command.__name__, command.__doc__ = tool.kind, tool.text("help")
+    # What typer reads options from; the settings are written down once, in the tool.
+    only = inspect.Parameter.KEYWORD_ONLY
+    command.__dict__["__signature__"] = inspect.Signature(
+        [
+            inspect.Parameter(name, only, default=default, annotation=kind)
+            for name, (kind, default) in own.items()
+        ]
+    )
+    command.__annotations__ = {name: kind for name, (kind, _) in own.items()} | {"return": None}
+    return command
+
+
+def lines_of(tool: AnyTool, result: ToolResult) -> list[str]:
+    """What a person is shown of a result."""
+    section = tool.report(result)
+    lines = [tool.text(note.name, values=note.values) for note in section.notes]
+    return lines + [
+        f"{tool.text(row.name, values=row.values)}: {_shown(row)}" for row in section.rows
+    ]
+
+
+def _shown(row: Row) -> str:
+    if row.value is None:
+        return "cannot be known"
+    text = f"{row.value:.4g} {row.unit}".rstrip()
+    if row.ci95 is None or None in row.ci95:
+        return text
+    return f"{text} ({row.ci95[0]:.4g} to {row.ci95[1]:.4g})"
+
+
+def _options(tool: AnyTool) -> Iterator[tuple[str, tuple[Any, object]]]:
+    """Each setting as an option; a pair as two of them."""
+    for name, field in tool.settings.model_fields.items():
+        option = next((each for each in field.metadata if isinstance(each, Option)), Option())
+        names = option.names or (f"--{name.replace('_', '-')}",)
+        text = field.description or tool.text(f"field.{name}")
+        default = field.default if field.default is not PydanticUndefined else option.default
+        kind = _kind(tool, name, field, pair=len(names) > 1)
+        for number, flag in enumerate(names):
+            key = name if len(names) == 1 else f"{name}_{number}"
+            declared = f"{flag}/--no-{flag[2:]}" if kind is bool and default else flag
+            yield key, (Annotated[kind, typer.Option(declared, help=text)], default)
+
+
+def _kind(tool: AnyTool, name: str, field: FieldInfo, *, pair: bool) -> Any:
+    """The type of an option: text of a choice, a number, or a switch."""
+    kind = field.annotation
+    if pair:
+        return float | None
+    if typing.get_origin(kind) is Literal:
+        values = typing.get_args(kind)
+        return StrEnum(f"{tool.kind}_{name}", {value: value for value in values})
+    assert typing.get_origin(kind) in (None, types.UnionType), f"{tool.kind}: {name} has no option"
+    return kind
+
+
+def _settings(tool: AnyTool, given: dict[str, Any]) -> Any:
+    """The settings of these options.
+
+    Raises:
+        typer.BadParameter: a value is outside what it may be, or half of a pair is missing.
+    """
+    values: dict[str, object] = {}
+    for name, field in tool.settings.model_fields.items():
+        option = next((each for each in field.metadata if isinstance(each, Option)), Option())
+        if len(option.names) < 2:
+            values[name] = given[name]
+            continue
+        ends = [given[f"{name}_{number}"] for number in range(len(option.names))]
+        if None in ends and ends != [None, None]:
+            both = " and ".join(option.names)
+            raise typer.BadParameter(f"give both {both}, or none of them")
+        values[name] = None if None in ends else tuple(ends)
+    try:
+        return tool.settings.model_validate(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"])) or tool.kind
+        raise typer.BadParameter(f"{where}: {first['msg']}") from error
+
+
+inertia = command_of(BY_KIND["inertia"])
+friction = command_of(BY_KIND["friction"])

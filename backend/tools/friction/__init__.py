@@ -1,0 +1,1 @@
+"""Friction map: torque over speed and over position, both directions."""

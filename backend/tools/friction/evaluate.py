@@ -1,0 +1,390 @@
+"""From recordings of constant speeds to a friction map. Pure: also works on kept raw data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import t as student_t
+
+from backend.analysis.mechanics.stribeck import SpeedModel, speed_model
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.friction.result import (
+    Estimate,
+    Finding,
+    FrictionPoint,
+    FrictionResult,
+    Harmonic,
+)
+from backend.tools.friction.settings import FrictionSettings
+from backend.tools.measuring.recording import Recording
+from backend.tools.tool import Arrays, Meta
+from drivers.errors import NotAllowed
+
+FloatArray = npt.NDArray[np.float64]
+_TURN = 2 * np.pi
+_RPM = 60.0 / _TURN
+#: Blocks that a mean is taken over; a speed that is not held in one of them is uneven.
+_BLOCKS, _EVEN = 8, (0.3, 1.7)
+#: A plateau of which less arrived is not used. What a revolution may lack to be one.
+_ARRIVED, _NEARLY = 0.8, 0.03
+#: The speed loop's torque shows ripple up to this frequency.
+_FOLLOWED_HZ = 25.0
+#: An order stands out so many deviations above the others; and this share of 6077h's step.
+_STANDS_OUT, _OF_STEP = 4.5, 0.25
+_BINS = 360
+#: Torque is not known better than this share of it, whatever the scatter.
+_SHARE = 0.005
+
+
+@dataclass(frozen=True)
+class Map:
+    """Raw data [n]: ``plateau`` numbers constant speeds, negative backwards, 0 is between them."""
+
+    sample_rate_hz: float
+    position_rad: FloatArray
+    torque_nm: FloatArray
+    valid: npt.NDArray[np.bool_]
+    plateau: npt.NDArray[np.int64]
+    torque_step_nm: float
+    inertia_kgm2: float
+    ripple_rpm: float | None
+    by_travel: bool
+    by_time: bool
+
+    @classmethod
+    def of(
+        cls, recordings: Sequence[Recording], numbers: Sequence[FloatArray], *,
+        torque_step_nm: float, inertia_kgm2: float, ripple_rpm: float | None, by_travel: bool,
+        by_time: bool,
+    ) -> Map:  # fmt: skip
+        """One recording for each speed, with the signed number of each sample's plateau."""
+        plateau = [
+            np.sign(n) * (100 * index * (n != 0) + np.abs(n)) for index, n in enumerate(numbers)
+        ]
+        return cls(
+            recordings[0].sample_rate_hz,
+            np.concatenate([each.position_rad for each in recordings]),
+            np.concatenate([each.torque_nm for each in recordings]),
+            np.concatenate([each.valid for each in recordings]),
+            np.concatenate(plateau).astype(np.int64),
+            torque_step_nm, inertia_kgm2, ripple_rpm, by_travel, by_time,
+        )  # fmt: skip
+
+    def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
+        """For storage."""
+        return {
+            "position_rad": self.position_rad, "torque_nm": self.torque_nm, "valid": self.valid,
+            "plateau": self.plateau,
+        }  # fmt: skip
+
+    def facts(self) -> dict[str, object]:
+        """For storage, beside the arrays."""
+        return {
+            "sample_rate_hz": self.sample_rate_hz, "torque_step_nm": self.torque_step_nm,
+            "inertia_kgm2": self.inertia_kgm2, "ripple_rpm": self.ripple_rpm,
+            "by_travel": self.by_travel, "by_time": self.by_time,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Plateau:
+    """One constant speed: rad [n], % of rated [n], signed rpm; ``even`` where it was held."""
+
+    speed: int
+    angle: FloatArray
+    torque: FloatArray
+    rpm: float
+    even: bool
+
+    @property
+    def revolutions(self) -> float:
+        return float(abs(self.angle[-1] - self.angle[0])) / _TURN
+
+
+@dataclass(frozen=True)
+class _Ripple:
+    """Complex amplitudes of orders 1…K in % (torque = Re(c·exp(jkθ))), and their deviation."""
+
+    orders: npt.NDArray[np.int64]
+    amplitude: npt.NDArray[np.complex128]
+    deviation: FloatArray
+    stands_out: npt.NDArray[np.bool_]
+
+    def at(self, angle: FloatArray, rpm: float) -> FloatArray:
+        """What the torque shows of it at this speed, [n] in %."""
+        shown = self.stands_out & (self.orders * abs(rpm) / 60.0 <= _FOLLOWED_HZ)
+        total = np.zeros(angle.size)
+        for order, amplitude in zip(self.orders[shown], self.amplitude[shown], strict=True):
+            total += np.real(amplitude * np.exp(1j * order * angle))
+        return total
+
+
+def evaluate(data: Map, settings: FrictionSettings, facts: AxisFacts) -> FrictionResult:
+    """The map of what was recorded.
+
+    Raises:
+        NotAllowed: no speed was held in both directions.
+    """
+    found = _plateaus(data, facts.rated_torque_nm)
+    even = [each for each in found if each.even]
+    uneven = sorted({abs(each.rpm) for each in found if not each.even})
+    step = data.torque_step_nm / facts.rated_torque_nm * 100.0
+    findings: list[Finding] = []
+    slow = [
+        each for each in even
+        if data.ripple_rpm is not None and abs(abs(each.rpm) / data.ripple_rpm - 1.0) < 0.1
+    ]  # fmt: skip
+    inertia = data.inertia_kgm2 / facts.rated_torque_nm * 100.0
+    ripple = _ripple(slow, settings.orders, data.sample_rate_hz, inertia, step)
+    if not settings.ripple:
+        findings.append(Finding(code="ripple_not_asked"))
+    elif ripple is None:
+        findings.append(Finding(code="ripple_needs_revolution"))
+    elif not np.any(ripple.stands_out):
+        smallest = float(_STANDS_OUT * np.max(ripple.deviation))
+        findings.append(Finding(code="ripple_not_seen", value=smallest, unit="%"))
+    points = _points(even, ripple, data.sample_rate_hz, inertia, step)
+    if not any(p.speed_rpm > 0 for p in points) or not any(p.speed_rpm < 0 for p in points):
+        raise NotAllowed(
+            "no speed was held evenly in both directions, so that there is no friction to map",
+            value=round(max(uneven, default=0.0), 4),
+            remedy="tune the speed loop first, or permit higher speeds",
+        )
+    if uneven:
+        findings.append(Finding(code="uneven_speeds", value=uneven[-1], unit="rpm"))
+    fastest = max(abs(p.speed_rpm) for p in points)
+    slowest = min(abs(p.speed_rpm) for p in points)
+    if data.by_travel:
+        findings.append(Finding(code="fastest_by_travel", value=fastest, unit="rpm"))
+    if data.by_time:
+        findings.append(Finding(code="slowest_by_time", value=slowest, unit="rpm"))
+    model = _model(points, step)
+    findings += _findings(model)
+    findings.append(Finding(code="standstill_not_measured", value=slowest, unit="rpm"))
+    speeds, curve = model.curve()
+    angle, forward, backward = _by_angle(slow if ripple is not None else [])
+    return FrictionResult(
+        rated_torque_nm=facts.rated_torque_nm if facts.torque_known else None,
+        points=tuple(points), curve_speed_rpm=speeds, curve_percent=curve,
+        coulomb_percent=_estimate(model.value(1)),
+        viscous_percent_per_rpm=_estimate(model.value(2)),
+        stribeck_percent=_estimate(model.value(3)) if model.reached else None,
+        stribeck_speed_rpm=_estimate(model.stribeck_speed()) if model.reached else None,
+        load_percent=_estimate(model.value(0)), harmonics=_harmonics(ripple),
+        ripple_speed_rpm=data.ripple_rpm if ripple is not None else None,
+        ripple_angle_deg=angle, ripple_forward_percent=forward, ripple_backward_percent=backward,
+        findings=(Finding(code="mapped", value=float(len(points))), *findings),
+        motion_s=data.position_rad.size / data.sample_rate_hz,
+    )  # fmt: skip
+
+
+def reevaluate(arrays: Arrays, meta: Meta) -> FrictionResult:
+    """The map again, from kept raw data.
+
+    Raises:
+        ValueError: not the raw data of a friction map.
+    """
+    given, facts = meta.get("settings"), meta.get("facts")
+    if not isinstance(given, dict) or not isinstance(facts, dict) or "plateau" not in arrays:
+        raise ValueError("not the raw data of a friction map")
+    ripple = meta["ripple_rpm"]
+    data = Map(
+        float(str(meta["sample_rate_hz"])),
+        np.asarray(arrays["position_rad"], np.float64), np.asarray(arrays["torque_nm"], np.float64),
+        np.asarray(arrays["valid"], np.bool_), np.asarray(arrays["plateau"], np.int64),
+        float(str(meta["torque_step_nm"])), float(str(meta["inertia_kgm2"])),
+        None if ripple is None else float(str(ripple)), bool(meta["by_travel"]),
+        bool(meta["by_time"]),
+    )  # fmt: skip
+    return evaluate(data, FrictionSettings.model_validate(given), AxisFacts(**facts))
+
+
+# --- plateaus --------------------------------------------------------------------------------
+
+
+def _plateaus(data: Map, rated_nm: float) -> list[_Plateau]:
+    found = []
+    for number in np.unique(data.plateau[data.plateau != 0]):
+        at = np.flatnonzero(data.plateau == number)
+        if at.size < 4 * _BLOCKS or float(np.mean(data.valid[at])) < _ARRIVED:
+            continue
+        angle, torque = data.position_rad[at], data.torque_nm[at] / rated_nm * 100.0
+        edges = np.linspace(0, at.size - 1, _BLOCKS + 1).astype(int)
+        blocks = np.diff(angle[edges]) / np.diff(edges) * data.sample_rate_hz * _RPM
+        rpm = float((angle[-1] - angle[0]) / (at.size - 1) * data.sample_rate_hz * _RPM)
+        shares = blocks / rpm if rpm else np.zeros(_BLOCKS)
+        right = rpm * number > 0
+        even = bool(right and np.all((shares > _EVEN[0]) & (shares < _EVEN[1])))
+        found.append(_Plateau(int(abs(number)) // 100, angle, torque, rpm, even))
+    return found
+
+
+def _points(
+    plateaus: Sequence[_Plateau], ripple: _Ripple | None, rate: float, inertia: float, step: float
+) -> list[FrictionPoint]:
+    """Mean torque of every speed and direction, slowest backwards first to fastest forwards."""
+    points = []
+    for speed, sign in sorted({(each.speed, np.sign(each.rpm)) for each in plateaus}):
+        same = [e for e in plateaus if e.speed == speed and np.sign(e.rpm) == sign]
+        means, blocks, turns = [], [], 0.0
+        for each in same:
+            mean, parts, revolutions = _level(each, ripple, rate, inertia)
+            means.append(mean)
+            blocks.append(parts)
+            turns += revolutions
+        torque, every = float(np.mean(means)), np.concatenate(blocks)
+        scatter = float(np.std(every, ddof=1)) / np.sqrt(every.size)
+        half = float(student_t.ppf(0.975, every.size - 1)) * scatter
+        half = float(np.hypot(np.hypot(half, step / np.sqrt(12.0)), 1.96 * _SHARE * torque))
+        points.append(
+            FrictionPoint(
+                speed_rpm=float(np.mean([each.rpm for each in same])), torque_percent=torque,
+                torque_ci95_percent=(torque - half, torque + half), revolutions=turns,
+            )
+        )  # fmt: skip
+    return sorted(points, key=lambda point: point.speed_rpm)
+
+
+def _level(
+    plateau: _Plateau, ripple: _Ripple | None, rate: float, inertia: float
+) -> tuple[float, FloatArray, float]:
+    """Mean torque over whole revolutions where there is one, the means of its blocks, and over
+    how many revolutions; without what goes into acceleration."""
+    angle, torque = plateau.angle, plateau.torque
+    whole = np.floor(plateau.revolutions + _NEARLY)
+    revolutions = plateau.revolutions
+    if whole >= 1.0:
+        within = np.abs(angle - angle[0]) <= whole * _TURN
+        angle, torque, revolutions = angle[within], torque[within], float(whole)
+    if ripple is not None:
+        torque = torque - ripple.at(angle, plateau.rpm)
+    count = int(whole) if whole >= 4.0 else _BLOCKS
+    parts = np.array([np.mean(part) for part in np.array_split(torque, count)])
+    lost = inertia * _acceleration(angle, int(whole), rate)
+    return float(np.mean(torque)) - lost, parts - lost, revolutions
+
+
+def _acceleration(angle: FloatArray, whole: int, rate: float) -> float:
+    """Mean in rad/s², from the times of the first and the last revolution; 0 with fewer than two.
+
+    Within one revolution the ripple of the speed cannot be told from an acceleration.
+    """
+    if whole < 2:
+        return 0.0
+    gone = np.abs(angle - angle[0])
+    marks = np.interp([0.0, _TURN, (whole - 1) * _TURN, whole * _TURN], gone, np.arange(gone.size))
+    first, last = (marks[1] - marks[0]) / rate, (marks[3] - marks[2]) / rate
+    if min(first, last) <= 0.0:
+        return 0.0
+    apart = 0.5 * (marks[2] + marks[3] - marks[0] - marks[1]) / rate
+    change = _TURN / last - _TURN / first
+    return float(np.sign(angle[-1] - angle[0]) * change / apart)
+
+
+# --- ripple ----------------------------------------------------------------------------------
+
+
+def _ripple(
+    plateaus: Sequence[_Plateau], orders: int, rate: float, inertia: float, step: float
+) -> _Ripple | None:
+    """Orders of the torque over a slow revolution each way; None without one."""
+    ways = [
+        next((e for e in plateaus if np.sign(e.rpm) == sign and e.revolutions >= 1.0), None)
+        for sign in (1.0, -1.0)
+    ]
+    if any(way is None for way in ways):
+        return None
+    k = np.arange(1, orders + 1)
+    forward, backward = (_orders(way, k, rate, inertia) for way in ways if way is not None)
+    # What the loop's delay shifts, it shifts to the other side in the other direction.
+    mean, half_difference = 0.5 * (forward + backward), 0.5 * np.abs(forward - backward)
+    chance = float(np.median(np.abs(mean))) / np.sqrt(2.0 * np.log(2.0))
+    stands_out = (np.abs(mean) > _STANDS_OUT * chance) & (np.abs(mean) > _OF_STEP * step)
+    stands_out &= half_difference < np.abs(mean)
+    deviation = np.hypot(chance, half_difference / np.sqrt(2.0))
+    return _Ripple(k, mean, np.where(stands_out, deviation, chance), stands_out)
+
+
+def _orders(
+    plateau: _Plateau, k: npt.NDArray[np.int64], rate: float, inertia: float
+) -> npt.NDArray[np.complex128]:
+    """Complex amplitudes by least squares, without what the motor's own swinging takes."""
+    angle, torque = plateau.angle, plateau.torque
+    time = np.arange(angle.size) / rate
+    trend = np.column_stack([np.ones(angle.size), time - time.mean()])
+    turning = np.outer(angle, k)
+    columns = np.hstack([trend, np.cos(turning), -np.sin(turning)])
+    both = np.linalg.lstsq(columns, np.column_stack([torque, angle]), rcond=None)[0]
+    amplitude = both[2 : 2 + k.size] + 1j * both[2 + k.size :]
+    speed = plateau.rpm / _RPM
+    found = amplitude[:, 0] + inertia * (k * speed) ** 2 * amplitude[:, 1]
+    return np.asarray(found, dtype=np.complex128)
+
+
+def _harmonics(ripple: _Ripple | None) -> tuple[Harmonic, ...]:
+    if ripple is None:
+        return ()
+    found = []
+    for index in np.flatnonzero(ripple.stands_out):
+        # Re(c·exp(jkθ)) = |c|·sin(kθ + arg c + 90°).
+        size, half = float(np.abs(ripple.amplitude[index])), 1.96 * float(ripple.deviation[index])
+        phase = float(np.degrees(np.angle(ripple.amplitude[index]))) + 90.0
+        found.append(
+            Harmonic(
+                order_per_rev=int(ripple.orders[index]), amplitude_percent=size,
+                amplitude_ci95_percent=(max(size - half, 0.0), size + half),
+                phase_deg=(phase + 180.0) % 360.0 - 180.0,
+            )
+        )  # fmt: skip
+    return tuple(sorted(found, key=lambda each: -each.amplitude_percent))
+
+
+def _by_angle(
+    plateaus: Sequence[_Plateau],
+) -> tuple[tuple[float, ...], tuple[float | None, ...], tuple[float | None, ...]]:
+    """Torque about its mean over one revolution, forwards and backwards; None where none is."""
+    if not plateaus:
+        return (), (), ()
+    curves = []
+    for sign in (1.0, -1.0):
+        way = [e for e in plateaus if np.sign(e.rpm) == sign]
+        angle = np.concatenate([e.angle for e in way])
+        torque = np.concatenate([e.torque - np.mean(e.torque) for e in way])
+        place = np.floor(np.mod(angle, _TURN) / _TURN * _BINS).astype(int) % _BINS
+        count = np.bincount(place, minlength=_BINS)
+        total = np.bincount(place, torque, minlength=_BINS)
+        curves.append(tuple(float(s / n) if n else None for s, n in zip(total, count, strict=True)))
+    return tuple((np.arange(_BINS) + 0.5) * 360.0 / _BINS), curves[0], curves[1]
+
+
+# --- over speed ------------------------------------------------------------------------------
+
+
+def _model(points: Sequence[FrictionPoint], step: float) -> SpeedModel:
+    ends = np.array([p.torque_ci95_percent for p in points])
+    half = np.maximum(0.5 * (ends[:, 1] - ends[:, 0]), step / np.sqrt(12.0))
+    return speed_model(
+        np.array([p.speed_rpm for p in points]), np.array([p.torque_percent for p in points]), half
+    )
+
+
+def _estimate(found: tuple[float, float, float]) -> Estimate:
+    return Estimate(value=found[0], ci95=found[1:])
+
+
+def _findings(model: SpeedModel) -> list[Finding]:
+    """What the speeds cannot say."""
+    least = float(np.min(np.abs(model.speed)))
+    if not model.enough:
+        return [Finding(code="few_speeds", value=float(model.speeds))]
+    found = []
+    if model.best.speed is None:
+        found.append(Finding(code="stribeck_not_seen", value=least, unit="rpm"))
+    elif not model.reached:
+        found.append(Finding(code="stribeck_not_reached", value=least, unit="rpm"))
+    if (misfit := model.misfit()) > 0.0:
+        found.append(Finding(code="model_misfit", value=100.0 * misfit, unit="%"))
+    return found

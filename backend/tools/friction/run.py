@@ -1,0 +1,289 @@
+"""The moves of a friction map: constant speeds both ways, to and fro about one place."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.axis.axis import Envelope
+from backend.scales.units import AxisUnits
+from backend.tools.autotune.axis_facts import AxisFacts, read_facts
+from backend.tools.friction.evaluate import Map, evaluate, reevaluate
+from backend.tools.friction.result import FrictionResult
+from backend.tools.friction.settings import FrictionSettings
+from backend.tools.friction.texts import TEXTS, report
+from backend.tools.inertia.evaluation import InertiaSettings
+from backend.tools.inertia.moves import first_look, speed_move
+from backend.tools.inertia.probe import RoughFit
+from backend.tools.measuring.computing import meanwhile
+from backend.tools.measuring.recording import Recording, cycle_s, require_signals, share
+from backend.tools.moves.go_back import go_back
+from backend.tools.tool import Run, Tool
+from drivers.cia402 import Mode
+from drivers.errors import NotAllowed, OutOfRange
+
+FloatArray = npt.NDArray[np.float64]
+_TURN = 2 * np.pi
+#: Share of the permitted travel to each side that is used, and of the permitted speed.
+_USED, _FAST = 0.8, 0.9
+#: Time of a ramp at least, and before a plateau counts; standstill between two strokes.
+_RAMP_S, _SETTLE_S, _DWELL_S = 0.15, 0.2, 0.15
+#: Share of the torque beyond friction that ramps take.
+_RAMP_SHARE = 0.35
+#: A plateau lasts so long at least, and no longer for the sake of a whole revolution.
+_LEAST_S, _LONGEST_S = 0.3, 4.0
+#: Plateaus too slow for a whole revolution, in order of preference.
+_SLOW_S = (3.0, 2.0, 1.2)
+#: Without a whole revolution (short travel) a plateau lasts at least this long.
+_SHORT_S = 0.15
+_SLOWEST_RPM = 2.0
+#: The ripple's revolution: with some more on both sides, in this share of the time, at no more
+#: than this frequency of its highest order.
+_RIPPLE_REV, _RIPPLE_SHARE, _RIPPLE_HZ = 1.25, 0.25, 25.0
+_ALIKE = 0.15
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """One speed: ``strokes`` plateaus, in turn forwards and backwards."""
+
+    speed_rps: float
+    ramp_s: float
+    plateau_s: float
+    strokes: int
+
+    @property
+    def length_rev(self) -> float:
+        """Way of one stroke."""
+        return self.speed_rps * (self.ramp_s + _SETTLE_S + self.plateau_s)
+
+    @property
+    def duration_s(self) -> float:
+        """About, with the ways to where it begins and back."""
+        one = 2 * self.ramp_s + _SETTLE_S + self.plateau_s + _DWELL_S
+        return self.strokes * one + 2 * _DWELL_S + 1.0
+
+
+@dataclass(frozen=True)
+class Room:
+    """What the plan may use: rev to each side, rev/s, s, and the time of a ramp per rev/s."""
+
+    travel_rev: float
+    speed_rps: float
+    time_s: float
+    ramp_s_per_rps: float
+
+    def stroke(self, speed_rps: float, slow_s: float) -> Stroke | None:
+        """Plateaus of this speed; None where the travel has no room for them."""
+        ramp_s = max(_RAMP_S, self.ramp_s_per_rps * speed_rps)
+        left_rev = 2 * self.travel_rev - speed_rps * (ramp_s + _SETTLE_S)
+        wanted = max(1.0, np.ceil(_LEAST_S * speed_rps))
+        whole = min(wanted, np.floor(left_rev))
+        if whole >= 1.0 and whole / speed_rps <= _LONGEST_S:
+            plateau_s = whole / speed_rps
+        elif whole >= 1.0:
+            plateau_s = slow_s
+        else:
+            plateau_s = min(left_rev / speed_rps, slow_s)
+            # With room for a whole revolution, less would be a worse mean: not so fast then.
+            if plateau_s < _SHORT_S or (2 * self.travel_rev >= 1.5 and speed_rps > 0.5):
+                return None
+        return Stroke(speed_rps, ramp_s, float(plateau_s), 2 if plateau_s >= _LEAST_S else 4)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Strokes, slowest first. ``ripple_rps`` is the speed of the slow revolution, if any.
+
+    ``by_travel`` and ``by_time``: what limited the fastest and the slowest speed.
+    """
+
+    strokes: tuple[Stroke, ...]
+    ripple_rps: float | None
+    by_travel: bool
+    by_time: bool
+
+
+def planned(settings: FrictionSettings, room: Room, units: AxisUnits) -> Plan:
+    """Speeds spread evenly on a logarithmic scale, as slow as the time allows.
+
+    Raises:
+        OutOfRange: the limits leave no speed to measure.
+    """
+    fastest = room.speed_rps
+    while room.stroke(fastest, _SLOW_S[0]) is None and fastest > 1e-3:
+        fastest *= 0.97
+    slowest = (settings.slowest_rpm or min(_SLOWEST_RPM, 0.05 * settings.speed_limit)) / 60.0
+    if slowest >= 0.5 * fastest:
+        raise OutOfRange(
+            f"between {slowest * 60.0:.3g} rpm and {fastest * 60.0:.3g} rpm, the fastest speed "
+            "that the limits of travel and speed leave, there is nothing to map",
+            value=round(slowest * 60.0, 4), limit=f"{fastest * 60.0:.3g} rpm",
+            remedy="permit more travel or speed, or ask for a lower slowest speed",
+        )  # fmt: skip
+    ripple = _ripple_stroke(settings, room, slowest)
+    lowest, count = slowest, settings.speeds
+    while True:
+        speeds = _representable(np.geomspace(lowest, fastest, count), units)
+        if ripple is not None:
+            near = ripple.speed_rps * np.array([1.0 - _ALIKE, 1.0 + _ALIKE])
+            speeds = [v for v in speeds if not near[0] < v < near[1]]
+        for slow_s in _SLOW_S:
+            found = [stroke for v in speeds if (stroke := room.stroke(v, slow_s)) is not None]
+            whole = sorted([*found, *([ripple] if ripple else [])], key=lambda s: s.speed_rps)
+            if whole and sum(stroke.duration_s for stroke in whole) <= room.time_s:
+                return Plan(
+                    tuple(whole), ripple.speed_rps if ripple else None,
+                    fastest < 0.95 * room.speed_rps, lowest > slowest,
+                )  # fmt: skip
+        lowest *= 1.3
+        if lowest >= 0.5 * fastest:
+            raise OutOfRange(
+                f"the speeds of a friction map take longer than {room.time_s:g} s",
+                value=settings.speeds, limit=f"{room.time_s:g} s",
+                remedy="allow more time, or ask for fewer speeds",
+            )  # fmt: skip
+
+
+def _ripple_stroke(settings: FrictionSettings, room: Room, slowest_rps: float) -> Stroke | None:
+    """One slow revolution each way; None where it is not asked for or there is no room."""
+    if not settings.ripple or 2 * room.travel_rev < _RIPPLE_REV + 0.1:
+        return None
+    speed = 2 * _RIPPLE_REV / (_RIPPLE_SHARE * room.time_s)
+    speed = min(max(speed, slowest_rps), _RIPPLE_HZ / settings.orders)
+    ramp_s = max(_RAMP_S, room.ramp_s_per_rps * speed)
+    return Stroke(speed, ramp_s, _RIPPLE_REV / speed, 2)
+
+
+def _representable(speeds_rps: FloatArray, units: AxisUnits) -> list[float]:
+    """The same, as the drive can be given them."""
+    raws = sorted({int(units.velocity_raw(60.0 * v)) for v in speeds_rps} - {0})
+    return [float(units.velocity(raw)) / 60.0 for raw in raws]
+
+
+def speeds_of(stroke: Stroke, rate: float, slow_rps: float) -> tuple[FloatArray, FloatArray]:
+    """Speed [n] in rpm and, per sample, the signed number of the plateau that it counts for.
+
+    The axis goes half a stroke back from where it stands, and comes back there at the end.
+    """
+    half = _positioning(-0.5 * stroke.length_rev, slow_rps, rate)
+    still = np.zeros(round(_DWELL_S * rate))
+    n = max(2, round(stroke.ramp_s * rate))
+    rise = 0.5 * (1.0 - np.cos(np.pi * (np.arange(n) + 0.5) / n))
+    settle, plateau = round(_SETTLE_S * rate), round(stroke.plateau_s * rate)
+    one = np.concatenate([rise, np.ones(settle + plateau), rise[::-1], still])
+    counts = np.zeros(one.size)
+    counts[n + settle : n + settle + plateau] = 1.0
+    speed, number = [half, still], [np.zeros(half.size + still.size)]
+    for index in range(stroke.strokes):
+        sign = 1.0 if index % 2 == 0 else -1.0
+        speed.append(sign * one * stroke.speed_rps)
+        number.append(sign * (index + 1) * counts)
+    speed += [-half, still]
+    number.append(np.zeros(half.size + still.size))
+    return np.concatenate(speed) * 60.0, np.concatenate(number)
+
+
+def _positioning(distance_rev: float, peak_rps: float, rate: float) -> FloatArray:
+    n = round(max(2.0 * abs(distance_rev) / peak_rps, 0.4) * rate)
+    shape = 1.0 - np.cos(_TURN * (np.arange(n) + 0.5) / n)
+    return np.asarray(shape * distance_rev / (n / rate))
+
+
+async def run(run: Run, settings: FrictionSettings) -> FrictionResult:
+    """Measure; the axis ends where it began, with its settings as they were.
+
+    Raises:
+        OutOfRange: the limits leave nothing to measure; nothing has moved but a short first move.
+        NotAllowed: 6077h does not come with every cycle or does not change, or the envelope or a
+            fault ended a motion; says why.
+    """
+    axis, session, envelope = run.axis, run.session, settings.envelope
+    require_signals(axis, session, Mode.CSV, False)
+    units = await axis.require_certain_scales()
+    facts = await read_facts(axis, settings.rated_torque_nm)
+    home = await axis.position_raw()
+    run.progress(0.0, "a first short move")
+    look = await first_look(axis, session, InertiaSettings(envelope), facts, home, None)
+    await go_back(axis, session, home, envelope, facts)
+    plan = planned(settings, _room(envelope, facts, look.rough), units)
+    total_s = sum(stroke.duration_s for stroke in plan.strokes)
+    taken: list[tuple[Recording, FloatArray]] = []
+    done_s = 0.0
+    for stroke in plan.strokes:
+        low, high = (0.05 + 0.85 * s / total_s for s in (done_s, done_s + stroke.duration_s))
+        step = f"{stroke.speed_rps * 60.0:.3g} rpm, both directions"
+        taken.append(await _stroke(run, settings, facts, stroke, (low, high, step)))
+        _require_torque(run, taken[0][0], facts, units)
+        done_s += stroke.duration_s
+        if stroke is not plan.strokes[-1]:
+            await go_back(axis, session, home, envelope, facts)
+    run.progress(0.92, "going back and evaluating")
+    found = Map.of(
+        [recording for recording, _ in taken], [numbers for _, numbers in taken],
+        torque_step_nm=abs(units.torque(1.0)) / 100.0 * facts.rated_torque_nm,
+        inertia_kgm2=look.rough.inertia_kgm2, by_travel=plan.by_travel, by_time=plan.by_time,
+        ripple_rpm=None if plan.ripple_rps is None else plan.ripple_rps * 60.0,
+    )  # fmt: skip
+    if run.keep is not None:
+        meta = {"settings": settings.model_dump(mode="json"), "facts": asdict(facts)}
+        run.keep("friction", found.arrays(), {"tool": "friction", **meta, **found.facts()})
+    return await meanwhile(
+        lambda: evaluate(found, settings, facts), go_back(axis, session, home, envelope, facts)
+    )
+
+
+async def _stroke(
+    run: Run, settings: FrictionSettings, facts: AxisFacts, stroke: Stroke,
+    where: tuple[float, float, str],
+) -> tuple[Recording, FloatArray]:  # fmt: skip
+    """The recording of one speed, and the number of the plateau that each sample counts for."""
+    slow_rps = 0.25 * settings.speed_limit / 60.0
+    speed_rpm, numbers = speeds_of(stroke, 1.0 / cycle_s(run.session), slow_rps)
+    recording = await speed_move(
+        run.axis, run.session, speed_rpm, settings.envelope, facts, share(run.progress, *where)
+    )
+    return recording, numbers[: recording.velocity_rad_s.size]
+
+
+def _room(envelope: Envelope, facts: AxisFacts, rough: RoughFit) -> Room:
+    permitted_nm = envelope.torque_percent / 100.0 * facts.rated_torque_nm
+    free_nm = permitted_nm - rough.coulomb_nm - abs(rough.gravity_nm)
+    # The steepest place of a raised cosine is π/2 times its mean.
+    per_rps = np.pi / 2 * rough.inertia_kgm2 * _TURN / max(_RAMP_SHARE * free_nm, 1e-9)
+    return Room(
+        _USED * envelope.travel_rev, _FAST * envelope.speed_rpm / 60.0, envelope.time_s, per_rps
+    )
+
+
+def _require_torque(run: Run, first: Recording, facts: AxisFacts, units: AxisUnits) -> None:
+    """A motion forth and back takes torques of both signs, however little friction there is.
+
+    Raises:
+        NotAllowed: the torque that the drive reports does not change.
+    """
+    step_nm = abs(units.torque(1.0)) / 100.0 * facts.rated_torque_nm
+    seen = first.torque_nm[first.valid]
+    if seen.size and float(np.ptp(seen)) >= 0.5 * step_nm:
+        return
+    drive = run.axis.drive
+    key = drive.require("torque_actual")
+    raise NotAllowed(
+        f"{drive.name}: its actual torque ({key}) does not change while the axis moves forth and "
+        "back, so that friction cannot be known from it",
+        drive=drive.name, parameter=key,
+        remedy="use a drive or a bus that reports the actual torque with every cycle",
+    )  # fmt: skip
+
+
+TOOL = Tool(
+    kind="friction",
+    settings=FrictionSettings,
+    result=FrictionResult,
+    run=run,
+    reevaluate=reevaluate,
+    report=report,
+    texts=TEXTS,
+)

@@ -1,0 +1,10 @@
+"""Every tool that has a descriptor; what surrounds the tools is made from this list."""
+
+from __future__ import annotations
+
+from backend.tools.friction.run import TOOL as FRICTION
+from backend.tools.inertia.run import TOOL as INERTIA
+from backend.tools.tool import AnyTool
+
+TOOLS: tuple[AnyTool, ...] = (INERTIA, FRICTION)
+BY_KIND: dict[str, AnyTool] = {tool.kind: tool for tool in TOOLS}

@@ -1,0 +1,15 @@
+"""Results of all tools that have a descriptor, told apart by their field ``tool``.
+
+Apart from the tools themselves, so that who only reads results imports no analysis.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, TypeAlias
+
+from pydantic import Field
+
+from backend.tools.friction.result import FrictionResult
+from backend.tools.inertia.result import InertiaAnswer
+
+ToolOutcome: TypeAlias = Annotated[FrictionResult | InertiaAnswer, Field(discriminator="tool")]

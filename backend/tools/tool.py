@@ -1,0 +1,199 @@
+"""What a measuring tool is: one descriptor, from which everything around the tool derives.
+
+Routes, rights, audit, command line, evaluation of stored files, report section and the form of
+the page are made from a `Tool`; a tool itself is a package of settings, run, evaluation, result
+and texts.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeAlias, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from backend.people.rights import Right
+from backend.tools.measuring.repeats import Repeats
+from backend.work.jobs import Progress
+
+if TYPE_CHECKING:  # who only reads results or settings imports no analysis
+    import numpy as np
+    import numpy.typing as npt
+
+    from backend.axis.axis import Axis
+    from backend.axis.cyclic import CyclicSession
+    from backend.motion.envelope import Envelope
+
+Arrays: TypeAlias = "Mapping[str, npt.NDArray[np.generic]]"
+Meta = Mapping[str, object]
+Keep: TypeAlias = "Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]"
+Interval = tuple[float | None, float | None]
+"""Lower and upper end of a 95 % interval; None where an end is not known."""
+Texts = Mapping[str, tuple[str, str]]
+"""English and Chinese by name."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """How a setting is called on the command line, where not by its own name.
+
+    A pair has two names. ``default`` stands in where the interface asks for a value.
+    """
+
+    names: tuple[str, ...] = ()
+    default: float | None = None
+
+
+class ToolSettings(BaseModel):
+    """The motion envelope of every measurement: rev from the start, rpm, % of rated torque, s."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    travel_limit: Annotated[float, Option(("--travel-rev",), 3.0)] = Field(
+        gt=0, description="longest way from the start, in revolutions"
+    )
+    speed_limit: Annotated[float, Option(("--speed-rpm",), 1200.0)] = Field(
+        gt=0, description="highest speed, in rpm"
+    )
+    torque_limit: Annotated[float, Option(("--torque-percent",), 80.0)] = Field(
+        gt=0, le=400, description="highest torque, in % of rated"
+    )
+    time_limit_s: float = Field(
+        default=60.0, gt=0, le=300, description="longest time of a motion, in s"
+    )
+    rated_torque_nm: float | None = Field(
+        default=None, gt=0, description="overrides what the drive says"
+    )
+    cycle_ms: float = Field(
+        default=1.0, gt=0, le=10,
+        description="cycle of the exchange that is started where none runs, and ended afterwards",
+    )  # fmt: skip
+    consent: bool = Field(
+        default=False,
+        description="the user agreed that nothing in the drive ends a speed when this computer "
+        "falls silent; needed where the drive has no watchdog (DS_C)",
+    )
+
+    @property
+    def envelope(self) -> Envelope:
+        """The limits of the motion."""
+        from backend.motion.envelope import Envelope
+
+        return Envelope(self.travel_limit, self.speed_limit, self.torque_limit, self.time_limit_s)
+
+
+class ToolResult(BaseModel):
+    """What every result of a tool carries; its ``tool`` tells which result it is."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    measurements: tuple[str, ...] = Field(default=(), description="names of the stored raw data")
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a tool is given for one measurement.
+
+    ``session`` exchanges process data; ``keep`` stores raw data before they are evaluated;
+    ``repeats`` bounds what is measured again only to know it better.
+    """
+
+    axis: Axis
+    session: CyclicSession
+    progress: Progress
+    keep: Keep | None = None
+    repeats: Repeats = field(default_factory=Repeats)
+    begun_s: float = field(default_factory=time.monotonic)
+
+    @property
+    def passed_s(self) -> float:
+        """Seconds since the measurement began."""
+        return time.monotonic() - self.begun_s
+
+
+@dataclass(frozen=True)
+class Row:
+    """One quantity of a result; ``name`` is a text of the tool, None what is not known."""
+
+    name: str
+    value: float | None
+    unit: str
+    ci95: Interval | None = None
+    values: Mapping[str, str] = field(default_factory=dict)
+    """For the places in the text."""
+
+
+@dataclass(frozen=True)
+class Note:
+    """A verdict or finding; ``name`` is a text of the tool."""
+
+    name: str
+    tone: Literal["good", "warn", "plain"] = "plain"
+    values: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A curve [n] with half the width of its 95 % band, where it has one."""
+
+    name: str
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    spread: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Curves over a common quantity; names are texts of the tool."""
+
+    name: str
+    x_name: str
+    y_name: str
+    lines: tuple[Line, ...]
+
+
+@dataclass(frozen=True)
+class Section:
+    """What a report and the command line show of a result; the first note is the verdict."""
+
+    notes: tuple[Note, ...]
+    rows: tuple[Row, ...]
+    charts: tuple[Chart, ...] = ()
+
+
+S = TypeVar("S", bound=ToolSettings)
+R = TypeVar("R", bound=ToolResult)
+
+
+@dataclass(frozen=True)
+class Tool(Generic[S, R]):
+    """One measuring tool.
+
+    ``kind`` names it in routes, jobs, commands, files and results. ``texts`` hold at least
+    "title", "help" and "field.<name>" of every setting of its own. ``reevaluate`` makes the
+    result again from arrays and meta data as ``run`` kept them and raises ValueError where they
+    are not of this tool. ``right`` is what a person needs to start it; ``motion``: it moves.
+    """
+
+    kind: str
+    settings: type[S]
+    result: type[R]
+    run: Callable[[Run, S], Awaitable[R]]
+    reevaluate: Callable[[Arrays, Meta], R]
+    report: Callable[[R], Section]
+    texts: Texts
+    right: Right = Right.MEASURE
+    motion: bool = True
+
+    def text(
+        self, name: str, language: Literal["en", "zh"] = "en",
+        values: Mapping[str, str] | None = None,
+    ) -> str:  # fmt: skip
+        """A text of this tool with its places filled in."""
+        found = self.texts[name][1 if language == "zh" else 0]
+        return found.format(**values) if values else found
+
+
+AnyTool = Tool[Any, Any]

@@ -1,0 +1,234 @@
+"""The friction map of every family against the analytic friction of the virtual mechanics.
+
+Friction falls by 1 - tanh there, and by exp(-(v/vs)^δ) in the tool's model: neither is the other.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.tools.friction.result import FrictionResult
+from backend.tools.friction.run import TOOL
+from backend.tools.friction.settings import FrictionSettings
+from backend.tools.sweep import profile_speed
+from backend.tools.tool import Run
+from backend.work.jobs import Progress
+from drivers.cia402 import State
+from drivers.errors import NotAllowed, OutOfRange
+from drivers.link import ScopeBlock
+from drivers.virtual.mechanics import FrictionSpec, MechanicsSpec, RippleSpec, friction_nm
+from drivers.virtual.wires.netns import Namespace
+from tests.virtual.tools.can_rig import can_bench, incremental
+from tests.virtual.tools.direct import DirectBench, direct
+from tests.virtual.tools.rig import At, bench, mechanics, settings_of, silent
+
+RATED_NM = 1.27
+FRICTION = FrictionSpec(
+    viscous_nms=3e-4, coulomb_nm=0.04, static_nm=0.06, stribeck_rad_s=4.0, stribeck_law="tanh"
+)
+RIPPLE = RippleSpec(
+    revolution_nm=0.004, cogging_nm=0.012, cogging_second_nm=0.005, cogging_per_rev=24,
+    phase_rad=0.4,
+)  # fmt: skip
+SMOOTH = mechanics((1e-4, 60.0, 0.006)).model_copy(update={"friction": FRICTION})
+RIPPLED = SMOOTH.model_copy(update={"ripple": RIPPLE})
+ASKED = FrictionSettings(
+    travel_limit=3.0, speed_limit=1200.0, torque_limit=80.0, time_limit_s=50.0, speeds=6,
+    slowest_rpm=10.0, rated_torque_nm=RATED_NM,
+)  # fmt: skip
+
+
+async def mapped(
+    axis: Axis, session: CyclicSession, asked: FrictionSettings = ASKED,
+    progress: Progress | None = None,
+) -> FrictionResult:  # fmt: skip
+    """As a job or the command line does it."""
+    async with profile_speed.prepared(axis, session, asked.envelope, True):
+        found = await TOOL.run(Run(axis, session, progress or silent()), asked)
+    return FrictionResult.model_validate(found.model_dump(mode="json"))
+
+
+@asynccontextmanager
+async def under(drive: str, spec: MechanicsSpec) -> AsyncIterator[tuple[Axis, CyclicSession]]:
+    if drive == "ds_c":
+        async with can_bench(incremental(spec), pace=40.0) as b:
+            yield b.axis, b.session
+    else:
+        async with direct(spec, drive=drive) as d:
+            yield d.axis, d.session
+
+
+def true_percent(spec: MechanicsSpec, rpm: object) -> np.ndarray:
+    speed = np.asarray(rpm, float) * 2 * np.pi / 60.0
+    return friction_nm(spec, speed) / RATED_NM * 100.0
+
+
+def largest_error(found: FrictionResult, spec: MechanicsSpec) -> float:
+    truth = true_percent(spec, found.curve_speed_rpm)
+    return float(np.max(np.abs(np.array(found.curve_percent) / truth - 1.0)))
+
+
+def codes(found: FrictionResult) -> set[str]:
+    return {each.code for each in found.findings}
+
+
+@pytest.mark.parametrize("drive", ["mms7", "m6l", "r6l", "ep3e", "ds_c"])
+async def test_the_curve_of_every_family(drive: str) -> None:
+    async with under(drive, RIPPLED) as (axis, session):
+        found = await mapped(axis, session)
+    assert largest_error(found, RIPPLED) < 0.05
+    speeds = np.array([p.speed_rpm for p in found.points])
+    # Both directions, from slow to fast: a curve over the speeds measured and no others.
+    assert speeds.min() < -400.0 < 400.0 < speeds.max()
+    assert np.min(np.abs(speeds)) < 16.0
+    assert np.max(np.abs(found.curve_speed_rpm)) == pytest.approx(np.max(np.abs(speeds)))
+    truth = true_percent(RIPPLED, speeds)
+    inside = [
+        low <= true <= high
+        for (low, high), true in zip(
+            [p.torque_ci95_percent for p in found.points], truth, strict=True
+        )
+    ]
+    assert np.mean(inside) >= 0.85
+    orders = {each.order_per_rev: each for each in found.harmonics}
+    # The third, 0.4 % of rated torque, is near to what a soft loop and a coarse encoder show.
+    assert {1, 24} <= set(orders) <= {1, 24, 48}
+    assert orders[24].amplitude_percent == pytest.approx(100 * 0.012 / RATED_NM, rel=0.15)
+    low, high = orders[24].amplitude_ci95_percent
+    assert low < 100 * 0.012 / RATED_NM < high
+    # What was not measured is not known, and says so.
+    assert found.standstill_percent is None
+    assert "standstill_not_measured" in codes(found)
+    coulomb, viscous = found.coulomb_percent, found.viscous_percent_per_rpm
+    assert coulomb is not None
+    assert viscous is not None
+    assert coulomb.value == pytest.approx(100 * 0.04 / RATED_NM, rel=0.05)
+    assert found.load_percent is not None
+    assert found.load_percent.value == pytest.approx(0.0, abs=0.1)
+
+
+async def test_gravity_is_a_constant_pull_and_no_friction() -> None:
+    hanging = FRICTION.model_copy(update={"gravity_nm": 0.1})
+    spec = SMOOTH.model_copy(update={"friction": hanging})
+    async with direct(spec) as b:
+        found = await mapped(b.axis, b.session, ASKED.model_copy(update={"ripple": False}))
+    assert found.load_percent is not None
+    assert found.load_percent.value == pytest.approx(100 * 0.1 / RATED_NM, rel=0.03)
+    for point in found.points:
+        truth = true_percent(spec, point.speed_rpm) + 100 * 0.1 / RATED_NM
+        assert point.torque_percent == pytest.approx(float(truth), rel=0.05)
+    assert "ripple_not_asked" in codes(found)
+    assert found.harmonics == ()
+
+
+async def test_friction_without_stribeck_and_ripple_has_none() -> None:
+    plain = FrictionSpec(viscous_nms=3e-4, coulomb_nm=0.04)
+    async with direct(SMOOTH.model_copy(update={"friction": plain})) as b:
+        found = await mapped(b.axis, b.session)
+    assert found.stribeck_percent is None
+    assert {"stribeck_not_seen", "ripple_not_seen"} <= codes(found)
+    assert found.harmonics == ()
+    assert found.viscous_percent_per_rpm is not None
+    # 3e-4 Nm·s/rad in % of 1.27 Nm per rpm.
+    expected = 3e-4 * 2 * np.pi / 60.0 / RATED_NM * 100.0
+    low, high = found.viscous_percent_per_rpm.ci95
+    assert low is not None
+    assert high is not None
+    assert low < expected < high
+    assert found.viscous_percent_per_rpm.value == pytest.approx(expected, rel=0.05)
+
+
+async def test_short_travel_is_gone_to_and_fro_and_says_no_ripple() -> None:
+    asked = ASKED.model_copy(update={"travel_limit": 0.3, "speeds": 5})
+    async with direct(SMOOTH) as b:
+        home = await b.axis.position_raw()
+        b.link.highest.update(low=home, high=home)
+        found = await mapped(b.axis, b.session, asked)
+        units = await b.axis.units()
+        low, high = (units.position(b.link.highest[end] - home) for end in ("low", "high"))
+    assert largest_error(found, SMOOTH) < 0.05
+    assert {"ripple_needs_revolution", "fastest_by_travel"} <= codes(found)
+    assert found.ripple_angle_deg == ()
+    assert -0.3 <= low < -0.1 < 0.1 < high <= 0.3
+
+
+async def test_a_torque_that_does_not_change_is_refused() -> None:
+    async with direct(SMOOTH) as b:
+        blocks = b.link.blocks
+
+        def frozen(consumer):  # type: ignore[no-untyped-def]
+            def without(block: ScopeBlock) -> None:
+                column = next(i for i, n in enumerate(block.channels) if n.endswith("6077:00"))
+                samples = block.samples.copy()
+                samples[:, column] = 3.0
+                consumer(replace(block, samples=samples))
+
+            return blocks(without)
+
+        b.link.blocks = frozen  # type: ignore[method-assign]
+        with pytest.raises(NotAllowed, match="does not change while the axis moves"):
+            await mapped(b.axis, b.session)
+
+
+async def test_limits_that_leave_nothing_are_refused_before_the_map() -> None:
+    asked = ASKED.model_copy(update={"slowest_rpm": 1000.0})
+    async with direct(SMOOTH) as b:
+        with pytest.raises(OutOfRange, match="nothing to map"):
+            await mapped(b.axis, b.session, asked)
+
+
+@pytest.mark.parametrize("ending", ["cancelled", "fault"])
+async def test_everything_is_as_before_however_it_ends(ending: str) -> None:
+    async with direct(SMOOTH) as b:
+        before = await settings_of(b.axis.drive, "6060:00")
+        task = asyncio.current_task()
+        assert task is not None
+
+        def end() -> None:
+            if ending == "fault":
+                b.link.device.inject("over_temperature")  # type: ignore[attr-defined]
+            else:
+                running.cancel()
+
+        at = At("both directions", end, 0.3)
+        running = asyncio.ensure_future(mapped(b.axis, b.session, ASKED, at.progress))
+        with pytest.raises((asyncio.CancelledError, NotAllowed)):
+            await running
+        assert at.done
+        assert await settings_of(b.axis.drive, "6060:00") == before
+        assert await b.axis.state() is not State.OPERATION_ENABLED
+
+
+async def test_kept_raw_data_give_the_same_map() -> None:
+    kept: dict[str, object] = {}
+    async with direct(RIPPLED) as b:
+        found = await _kept(b, kept)
+    again = TOOL.reevaluate(kept["arrays"], kept["meta"])  # type: ignore[arg-type]
+    assert again == found
+    with pytest.raises(ValueError, match="not the raw data"):
+        TOOL.reevaluate({}, {})
+
+
+async def _kept(b: DirectBench, kept: dict[str, object]) -> FrictionResult:
+    def keep(_kind: str, arrays: object, meta: object) -> None:
+        kept.update(arrays=arrays, meta=meta)
+
+    asked = ASKED.model_copy(update={"speeds": 4})
+    found = await TOOL.run(Run(b.axis, b.session, silent(), keep), asked)
+    assert isinstance(found, FrictionResult)
+    return found
+
+
+async def test_over_ethercat_frames(namespace: Namespace) -> None:
+    async with bench(namespace, RIPPLED, drive="r6l") as b:
+        found = await mapped(b.axis, b.session, ASKED.model_copy(update={"speeds": 5}))
+    assert largest_error(found, RIPPLED) < 0.05
+    assert {1, 24} <= {each.order_per_rev for each in found.harmonics}

@@ -1,0 +1,18 @@
+import type { FrictionResult, InertiaAnswer, JobInfo } from './schema'
+
+/** What a tool concluded: told apart by its field `tool`. */
+type ToolOutcome = FrictionResult | InertiaAnswer
+
+const outcome = (result: unknown): ToolOutcome | null =>
+  typeof result === 'object' && result !== null && 'tool' in result ? (result as ToolOutcome) : null
+
+/** The result of a job that is no tool with a result of its own. */
+export function plainResult(result: JobInfo['result'] | undefined): Record<string, unknown> {
+  return outcome(result) || !result ? {} : (result as Record<string, unknown>)
+}
+
+/** The result of a friction map, or null where it is something else. */
+export function asFriction(result: unknown): FrictionResult | null {
+  const found = outcome(result)
+  return found?.tool === 'friction' ? found : null
+}
