@@ -161,8 +161,20 @@ def consequence(profile: Profile, parameter: Parameter) -> Consequence:
 
 
 def rank(profile: Profile, parameter: Parameter) -> int:
-    """Place in the order of writing: units, limits, what else, gains."""
-    return _RANK[consequence(profile, parameter)]
+    """Place in the order of writing: what unlocks the others, units, limits, what else, gains."""
+    return -1 if is_lock(profile, parameter) else _RANK[consequence(profile, parameter)]
+
+
+def is_lock(profile: Profile, parameter: Parameter) -> bool:
+    """Whether the parameter protects the others from being written."""
+    quirk = profile.quirk("write_protect")
+    return quirk is not None and quirk.key == parameter.key
+
+
+def locks(profile: Profile, parameter: Parameter, raw: Raw) -> bool:
+    """Whether this value makes the drive refuse what is written after it."""
+    quirk = profile.quirk("write_protect")
+    return quirk is not None and quirk.key == parameter.key and raw != (quirk.raw or 0)
 
 
 def hand_over(
@@ -204,6 +216,8 @@ def hand_over(
         why = _why_not(parameter, row.raw, motor_individual=motor_individual)
         if row.key in seen:
             why = "given twice in the set; the first one counts"
+        if parameter and row.raw is not None and locks(profile, parameter, row.raw):
+            why = "locks every other parameter: the drive would refuse the list at the next start"
         seen.add(row.key)
         if why or parameter is None or row.raw is None:
             left.append(LeftOut(row.key, row.problem or why))
