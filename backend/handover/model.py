@@ -9,6 +9,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
+from backend.handover.esi import SlaveController
 from backend.motion.classes import motion_of
 from backend.parameters.set_file import ParameterSet
 from drivers.codec import encode, size_of
@@ -103,6 +104,15 @@ class AxisHandover:
     cycle_us: int
     distributed_clock: bool
     notes: tuple[str, ...] = ()
+    controller: SlaveController | None = None
+    """Of the drive's ESI file, where one was given."""
+
+    @property
+    def assign_activate(self) -> int:
+        """Word that switches the clock on, of the ESI file or proposed; 0 for none."""
+        if self.controller is not None:
+            return self.controller.assign_activate
+        return ASSIGN_ACTIVATE if self.distributed_clock else 0
 
     def identity(self) -> tuple[int, int]:
         """Vendor and product, which a controller compares with the drive.
@@ -121,9 +131,12 @@ class AxisHandover:
 
 
 def gain_keys(profile: Profile) -> frozenset[str]:
-    """Keys that tuning changes: loop gains, filters, notches and the stiffness level."""
+    """Keys that tuning changes: the maker's group of loop gains, filters, notches and stiffness."""
     found: set[str] = set()
     if (gains := profile.gains) is not None:
+        speed = profile.by_key.get(gains.speed or "")
+        if speed is not None and speed.group:
+            found |= {p.key for p in profile.parameters if p.group == speed.group}
         found |= {
             key
             for key in (
@@ -287,6 +300,13 @@ def _axis(
         notes.append(f"act only after {when.replace('_', ' ')}: {', '.join(keys)}")
     ident = profile.identity
     pdo = profile.pdo
+    pdos = _pdos(profile)
+    mapped = {
+        f"{e.index:04X}:{e.subindex:02X}" for p in pdos if p.direction == "rx" for e in p.entries
+    }
+    cyclic = sorted({write.key for write in writes} & mapped)
+    if cyclic:
+        notes.append(f"process data overwrite in every cycle: {', '.join(cyclic)}")
     return AxisHandover(
         name=content.drive_name or profile.title,
         profile=profile,
@@ -297,7 +317,7 @@ def _axis(
         revision=content.revision,
         writes=tuple(writes),
         left_out=tuple(left),
-        pdos=_pdos(profile),
+        pdos=pdos,
         cycle_us=max(PROPOSED_CYCLE_US, (pdo.cycle_min_us or 0) if pdo else 0),
         distributed_clock=bool(pdo and "DC-synchronous" in pdo.sync_modes),
         notes=tuple(notes),

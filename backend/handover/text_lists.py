@@ -6,9 +6,11 @@ import csv
 import io
 import math
 import struct
+from collections.abc import Sequence
 from datetime import UTC, datetime
+from xml.sax.saxutils import escape
 
-from backend.handover.model import ASSIGN_ACTIVATE, AxisHandover, MappedEntry, StartupWrite
+from backend.handover.model import AxisHandover, MappedEntry, StartupWrite
 from profiles.importer import export_dcf
 
 #: Columns of CODESYS's page "Startup parameters" of an EtherCAT slave, in its order.
@@ -116,8 +118,9 @@ def ros2(axis: AxisHandover) -> bytes:
         f"vendor_id: 0x{vendor:08x}",
         f"product_id: 0x{product:08x}",
     ]
-    if axis.distributed_clock:
-        lines.append(f"assign_activate: 0x{ASSIGN_ACTIVATE:04x}  # check with the ESI file")
+    if axis.assign_activate:
+        known = "of the ESI file" if axis.controller is not None else "check with the ESI file"
+        lines.append(f"assign_activate: 0x{axis.assign_activate:04x}  # {known}")
     lines += ["auto_fault_reset: false", "sdo:"]
     lines += [
         f"  - {{index: 0x{w.index:04x}, sub_index: {w.subindex}, type: {number_type(w)}, "
@@ -165,30 +168,62 @@ def increments_per_radian(axis: AxisHandover) -> float | None:
     return units.counts_per_rev / (2 * math.pi) if units.counts_per_rev else None
 
 
-def bus_yml(axis: AxisHandover, dcf_name: str) -> bytes:
-    """`bus.yml` of ros2_canopen for one node, which names the DCF beside it."""
-    return "\n".join([
+def bus_yml(axes: Sequence[AxisHandover], dcf_names: Sequence[str]) -> bytes:
+    """`bus.yml` of ros2_canopen, which names the DCFs beside it; node numbers are proposed."""
+    cycle_us = max(axis.cycle_us for axis in axes)
+    lines = [
         "options:",
         '  dcf_path: "@BUS_CONFIG_PATH@"',
         "master:",
         "  node_id: 1",
         '  driver: "ros2_canopen::MasterDriver"',
         '  package: "canopen_master_driver"',
-        f"  sync_period: {axis.cycle_us}",
-        "drive:",
-        "  node_id: 2  # set the drive's own",
-        f'  dcf: "{dcf_name}"',
-        '  driver: "ros2_canopen::Cia402Driver"',
-        '  package: "canopen_402_driver"',
-        f"  period: {axis.cycle_us // 1000}",
-        "  sdo:",
-        *(
-            f"    - {{index: 0x{w.index:04x}, sub_index: {w.subindex}, value: {_number(w)}}}"
-            f"  # {_line(w.name)}"
-            for w in axis.writes
-        ),
-        "",
-    ]).encode()  # fmt: skip
+        f"  sync_period: {cycle_us}",
+    ]
+    for number, (axis, dcf_name) in enumerate(zip(axes, dcf_names, strict=True)):
+        lines += [
+            "drive:" if len(axes) == 1 else f"drive{number + 1}:",
+            f"  node_id: {number + 2}  # set the drive's own",
+            f'  dcf: "{dcf_name}"',
+            '  driver: "ros2_canopen::Cia402Driver"',
+            '  package: "canopen_402_driver"',
+            f"  period: {cycle_us // 1000}",
+            "  sdo:",
+            *(
+                f"    - {{index: 0x{w.index:04x}, sub_index: {w.subindex}, value: {_number(w)}}}"
+                f"  # {_line(w.name)}"
+                for w in axis.writes
+            ),
+        ]
+    return "\n".join([*lines, ""]).encode()
+
+
+def ros2_control(axes: Sequence[AxisHandover], slave_files: Sequence[str]) -> bytes:
+    """`ros2_control` of ethercat_driver_ros2 that names the slave files beside it."""
+    frequency = 1_000_000 // max(axis.cycle_us for axis in axes)
+    lines = [
+        '<ros2_control name="segment" type="system">',
+        "  <hardware>",
+        "    <plugin>ethercat_driver/EthercatDriver</plugin>",
+        '    <param name="master_id">0</param>',
+        f'    <param name="control_frequency">{frequency}</param>',
+        "  </hardware>",
+    ]
+    for position, file in enumerate(slave_files):
+        lines += [
+            f'  <joint name="joint_{position + 1}">',
+            '    <state_interface name="position"/>',
+            '    <command_interface name="position"/>',
+            f'    <ec_module name="drive{position + 1}">',
+            "      <plugin>ethercat_generic_plugins/EcCiA402Drive</plugin>",
+            '      <param name="alias">0</param>',
+            f'      <param name="position">{position}</param>',
+            '      <param name="mode_of_operation">8</param>',
+            f'      <param name="slave_config">{escape(file)}</param>',
+            "    </ec_module>",
+            "  </joint>",
+        ]
+    return "\n".join([*lines, "</ros2_control>", ""]).encode()
 
 
 def dcf(axis: AxisHandover, file_name: str, saved: datetime | None) -> bytes:
