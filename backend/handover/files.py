@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import datetime
 from typing import Literal, get_args
 
 from backend.handover import text_lists, xml_lists
 from backend.handover.eni import eni, is_complete
+from backend.handover.esi import controller_of
 from backend.handover.model import AxisHandover
+from backend.parameters.set_file import BadSet
 from drivers.errors import NotAllowed
 
 Format = Literal["twincat", "codesys", "eni", "lcec", "ros2", "igh", "dcf", "csv", "python"]
@@ -59,6 +62,28 @@ def remarks(axes: Sequence[AxisHandover], form: Format) -> tuple[str, ...]:
             "give each drive's ESI file",
         )
     return ()
+
+
+def with_controller(axis: AxisHandover, esi_files: Sequence[tuple[bytes, str]]) -> AxisHandover:
+    """The axis with the controller of its own ESI file, among files with their names.
+
+    Raises:
+        NotAllowed: no file has this drive. BadSet: a file is no ESI file.
+    """
+    vendor, product = axis.identity()
+    missing: NotAllowed | None = None
+    for data, name in esi_files:
+        try:
+            found = controller_of(data, name, vendor, product, axis.revision)
+        except BadSet:
+            raise
+        except NotAllowed as error:
+            missing = error
+            continue
+        return replace(axis, controller=found)
+    if missing is not None:
+        raise missing
+    return axis
 
 
 def digest(data: bytes) -> str:
