@@ -187,14 +187,17 @@ def _init_commands(
         within = _chosen(root.findall("./Config/Slave"), "slaves", name, slave)
     for number, command in enumerate(within.iterfind(".//CoE/InitCmds/InitCmd"), 1):
         place = f"InitCmd {number}"
+        if command.get("Disabled", "0").lower() in ("1", "true"):
+            continue
         ccs = command.findtext("Ccs")
-        if ccs is not None and _number(ccs, place) != _CCS_DOWNLOAD:
-            continue  # an upload reads
+        data = _hex(command.findtext("Data"), place)
+        # CiA 301: 1 is a download, 2 an upload; tools that count the other way give data with it.
+        if ccs is not None and _number(ccs, place) != _CCS_DOWNLOAD and not data:
+            continue
         transitions = [(each.text or "").strip() for each in command.findall("Transition")]
         upward = [each for each in transitions if each in _UPWARD] or transitions
         index = _number(command.findtext("Index"), place)
         subindex = _number(command.findtext("SubIndex"), place)
-        data = _hex(command.findtext("Data"), place)
         when = upward[0] if upward else ""
         if command.get("CompleteAccess", "0").lower() in ("1", "true"):
             yield from _parts(profile, index, subindex, data, when, place)

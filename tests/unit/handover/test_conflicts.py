@@ -207,3 +207,14 @@ def test_what_changed_since_the_hand_over() -> None:
     assert [(c.key, c.ours, c.drive, c.consequence) for c in changes] == [
         ("6072:00", 900, 300, "limit")
     ]
+
+
+def test_a_command_that_is_disabled_or_reads_writes_nothing() -> None:
+    kept = init_command("2005:01", little(40, 2))
+    text = init_command("6072:00", little(500, 2))
+    disabled = text.replace("<InitCmd>", '<InitCmd Disabled="1">')
+    reads = text.replace("<Ccs>1", "<Ccs>2").replace("<Data>f401</Data>", "<Data></Data>")
+    assert [w.key for w in twincat(kept, disabled, reads).writes] == ["2005:01"]
+    # One maker's tools count 2 as a write and give data with it: it must not be missed.
+    other = text.replace("<Ccs>1", "<Ccs>2")
+    assert [w.key for w in twincat(other).writes] == ["6072:00"]
