@@ -12,6 +12,7 @@ from xml.sax.saxutils import escape
 
 from backend.handover.model import AxisHandover, MappedEntry, StartupWrite
 from profiles.importer import export_dcf
+from profiles.schema import Parameter, Raw
 
 #: Columns of CODESYS's page "Startup parameters" of an EtherCAT slave, in its order.
 CODESYS_COLUMNS = (
@@ -45,8 +46,8 @@ def _number(write: StartupWrite) -> int:
 
 
 def _line(text: str) -> str:
-    """One line of it: no value of a file may begin a line of its own."""
-    return " ".join(text.split())
+    """One line of it without control characters: no value of a file may begin a line of its own."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def _cell(text: str) -> str:
@@ -291,10 +292,23 @@ if __name__ == "__main__":
 '''.encode()
 
 
+_SHEET = (
+    ("direction (polarity)", "607E:00"), ("encoder increments", "608F:01"),
+    ("encoder motor revolutions", "608F:02"), ("software limit minimum", "607D:01"),
+    ("software limit maximum", "607D:02"), ("maximum profile velocity", "607F:00"),
+    ("maximum speed", "6080:00"), ("maximum torque", "6072:00"),
+    ("positive torque limit", "60E0:00"), ("negative torque limit", "60E1:00"),
+    ("following error window", "6065:00"), ("following error time", "6066:00"),
+)  # fmt: skip
+
+
 def sheet(axis: AxisHandover) -> bytes:
-    """Scaling of the controller's axis, what was left out, and what must be heeded."""
-    profile, units = axis.profile, axis.profile.units
-    lines = [f"Hand-over of {_line(axis.name)} ({profile.title})", "", "Scaling"]
+    """Scaling of the controller's axis, what was left out, and what must be heeded.
+
+    Only what the list itself writes is stated as a value: what it leaves is as the drive keeps it.
+    """
+    units = axis.profile.units
+    lines = [f"Hand-over of {_line(axis.name)} ({axis.profile.title})", "", "Scaling"]
     lines.append(
         f"  position unit {units.position}, velocity {units.velocity}, acceleration "
         f"{units.acceleration}, torque {units.torque}"
@@ -303,21 +317,53 @@ def sheet(axis: AxisHandover) -> bytes:
     lines.append(
         f"  increments per motor revolution with default gearing: {known or 'not in the manual'}"
     )
+    lines.append(f"  increments per feed unit: {_increments_per_unit(axis)}")
     lines.append(
         f"  encoder counts per revolution: {units.encoder_counts_per_rev or 'read 608Fh of drive'}"
     )
-    by_key = {write.key: write for write in axis.writes}
-    for words, key in (
+    gearing = (
         ("gear numerator", units.gear_numerator), ("gear denominator", units.gear_denominator),
         ("feed", units.feed), ("feed revolutions", units.feed_revolutions),
-        ("direction (polarity)", "607E:00"), ("software limit minimum", "607D:01"),
-        ("software limit maximum", "607D:02"), ("maximum speed", "6080:00"),
-        ("maximum torque", "6072:00"), ("following error window", "6065:00"),
-    ):  # fmt: skip
-        if key:
+    )  # fmt: skip
+    by_key = {write.key: write for write in axis.writes}
+    for words, key in (*gearing, *_SHEET):
+        parameter = axis.profile.by_key.get(key or "")
+        if key and parameter is not None:
             write = by_key.get(key)
-            lines.append(f"  {words} {key}: {write.raw if write else 'not handed over'}")
+            text = _with_unit(parameter, write.raw) if write else "not handed over"
+            lines.append(f"  {words} {key}: {text}")
     lines += ["", f"Cycle {axis.cycle_us} µs (proposed), values written in P→S unless stated"]
+    lines += ["", "Process data"]
+    lines += [
+        f"  {pdo.index:04X}h {'to' if pdo.direction == 'rx' else 'from'} the drive: "
+        + ", ".join(f"{_line(e.name)} ({e.bits} bits)" for e in pdo.entries)
+        for pdo in axis.pdos
+    ]
     lines += ["", "To heed", *(f"  {_line(note)}" for note in axis.notes or ("nothing",))]
     lines += ["", "Left out", *(f"  {e.key}: {_line(e.reason)}" for e in axis.left_out)]
     return "\n".join([*lines, ""]).encode()
+
+
+def _with_unit(parameter: Parameter, raw: Raw) -> str:
+    value = parameter.to_value(raw)
+    unit = f" {parameter.unit}" if parameter.unit else ""
+    return f"{value}{unit}" + (f" (raw {raw})" if value != raw else "")
+
+
+def _increments_per_unit(axis: AxisHandover) -> str:
+    """Encoder increments per unit of the drive's positions, from the gearing that is handed over.
+
+    CiA 402-2 clause 9: the gear ratio is motor revolutions per shaft revolution (6091h), the feed
+    is units per shaft revolution (6092h).
+    """
+    units = axis.profile.units
+    keys = (units.gear_numerator, units.gear_denominator, units.feed, units.feed_revolutions)
+    written = {write.key: write.raw for write in axis.writes}
+    encoder = units.encoder_counts_per_rev
+    standard = keys == ("6091:01", "6091:02", "6092:01", "6092:02")
+    values = [written.get(key or "") for key in keys]
+    whole = [value for value in values if isinstance(value, int) and value]
+    if not standard or encoder is None or len(whole) != 4:
+        return "not certain from this list: compute it from the gearing in the drive"
+    gear, shaft, feed, turns = whole
+    return f"{encoder * gear * turns / (shaft * feed):.9g}"
