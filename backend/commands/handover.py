@@ -17,8 +17,15 @@ from backend.commands.session import run
 from backend.commands.values import bytes_of
 from backend.handover.conflicts import Verdict, changed_since
 from backend.handover.conflicts import compare as compared
-from backend.handover.files import FORMATS, Format, files_of
-from backend.handover.model import Choice, hand_over
+from backend.handover.files import (
+    FORMATS,
+    Format,
+    digest,
+    files_of,
+    remarks,
+    with_controller,
+)
+from backend.handover.model import AxisHandover, Choice, hand_over
 from backend.handover.read import read_list
 from backend.parameters.set_file import ParameterSet, parse
 from backend.store.files import write_atomically
@@ -42,7 +49,10 @@ def set_of(file: Path) -> ParameterSet:
 
 @app.command("export")
 def export(
-    file: Annotated[Path, typer.Argument(metavar="SET", help="parameter set")],
+    sets: Annotated[
+        list[Path],
+        typer.Argument(metavar="SET...", help="parameter set; several are a segment, by cable"),
+    ],
     form: Annotated[str, typer.Option("--format", help="|".join(get_args(Format)))],
     out: Annotated[Path, typer.Option(help="file to write; what belongs to it lies beside it")],
     only: Annotated[str, typer.Option(help="keys, separated by commas")] = "",
@@ -53,34 +63,65 @@ def export(
     motor_individual: Annotated[
         bool, typer.Option(help="include values that belong to one motor")
     ] = False,
+    esi: Annotated[
+        list[Path] | None,
+        typer.Option(help="the drives' ESI files, for an ENI that a master can run"),
+    ] = None,
 ) -> None:
     """Write a start-up list, with a sheet of the scaling beside it."""
 
     async def work() -> None:
-        if form not in FORMATS:
-            raise NotAllowed("command.no-format", value=form, formats=", ".join(FORMATS))
+        chosen = _format(form)
         if bool(only) + tuned + not_default > 1:
-            raise NotAllowed("command.tuned-not-default-exclude")
-        content = set_of(file)
+            raise NotAllowed(
+                "--only, --tuned and --not-default exclude each other", remedy="give one of them"
+            )
         choice: Choice = "tuned" if tuned else "not_default" if not_default else "all"
         keys = [key.strip().upper() for key in only.split(",") if key.strip()]
-        axis = hand_over(
-            content, load_profile(content.profile), choice=choice, only=keys,
-            motor_individual=motor_individual,
-        )  # fmt: skip
-        chosen: Format = next(each for each in get_args(Format) if each == form)
-        files = files_of(axis, chosen, out.name, content.saved)
+        contents = [set_of(file) for file in sets]
+        axes = [
+            hand_over(
+                content, load_profile(content.profile), choice=choice, only=keys,
+                motor_individual=motor_individual,
+            )
+            for content in contents
+        ]  # fmt: skip
+        sources = [(bytes_of(file), file.name) for file in esi or []]
+        if sources:
+            axes = [with_controller(axis, sources) for axis in axes]
+        files = files_of(axes, chosen, out.name, contents[0].saved)
         for name, data in files.items():
             write_atomically(out.with_name(name), data)
-        print(f"{out}: {len(axis.writes)} writes, {len(axis.left_out)} rows left out")
-        for name in list(files)[1:]:
-            print(f"beside it: {name}")
-        for each in axis.left_out:
-            print(f"left out: {each.key}: {each.reason}")
-        for note in axis.notes:
-            print(f"note: {note}")
+        _show_export(out, axes, chosen, files)
 
     run(work)
+
+
+def _format(form: str) -> Format:
+    if form not in FORMATS:
+        raise NotAllowed(
+            f"{form!r} is no format", value=form, remedy=f"choose one of {', '.join(FORMATS)}"
+        )
+    return next(each for each in get_args(Format) if each == form)
+
+
+def _show_export(
+    out: Path, axes: list[AxisHandover], form: Format, files: dict[str, bytes]
+) -> None:
+    writes = sum(len(axis.writes) for axis in axes)
+    left = sum(len(axis.left_out) for axis in axes)
+    print(f"{out}: {writes} writes, {left} rows left out")
+    for name in list(files)[1:]:
+        print(f"beside it: {name}")
+    for axis in axes:
+        place = f"{axis.name}: " if len(axes) > 1 else ""
+        for each in axis.left_out:
+            print(f"left out: {place}{each.key}: {each.reason}")
+        for note in axis.notes:
+            print(f"note: {place}{note}")
+    for remark in remarks(axes, form):
+        print(f"note: {remark}")
+    print(f"sha256: {digest(files[out.name])}")
 
 
 @app.command("compare")
@@ -89,6 +130,9 @@ def compare(
     url: Annotated[str | None, typer.Argument(metavar="[BUS_URL]")] = None,
     set_file: Annotated[Path | None, typer.Option("--set", help="our parameter set")] = None,
     station: Station = 1,
+    slave: Annotated[
+        int | None, typer.Option(help="of a file with several slaves, counted from 1")
+    ] = None,
     profile: Profile = None,
     server: Server = None,
     as_json: Json = False,
@@ -104,14 +148,14 @@ def compare(
         if url is None:
             assert content is not None
             known = load_profile(content.profile)
-            listed = read_list(data, known, file.name)
+            listed = read_list(data, known, file.name, slave)
         else:
             family = profile or (content.profile if content is not None else None)
             where = place(url, station, family, server)
             now = await values_now(where)
             known = now.profile
             _same_family(content, now)
-            listed = read_list(data, known, file.name)
+            listed = read_list(data, known, file.name, slave)
             now = await values_now(where, {write.key for write in listed.writes})
         verdict = compared(
             known, listed, None if content is None else _raws(content), now and now.raws
@@ -140,8 +184,11 @@ def _show(verdict: Verdict, form: str, *, as_json: bool) -> None:
         print(f"{conflict.consequence}: {conflict.sentence}{both}")
     for finding in verdict.findings:
         print(f"{finding.kind}: {finding.text}")
+    for key in verdict.unknown_here:
+        print(f"not compared: {key}: neither set nor drive gives a value")
     print(
         f"{form}: {len(verdict.conflicts)} conflicts, {verdict.same} equal, "
+        f"{len(verdict.restored)} changed in the drive and restored by the controller, "
         f"{len(verdict.findings)} defects of the list, {len(verdict.not_written)} values of the "
         "set that the controller does not write"
     )
@@ -171,12 +218,12 @@ def watch(
             return
         for each in changes:
             print(f"{each.consequence}: {each.sentence}")
-        _tell_unread(unread)
+        _show_unread(unread)
         print(f"{now.name}: {len(changes)} of {len(ours)} values changed since the hand-over")
 
     run(work)
 
 
-def _tell_unread(keys: Iterable[str]) -> None:
+def _show_unread(keys: Iterable[str]) -> None:
     for key in keys:
         print(f"{key}: not read", file=sys.stderr)

@@ -11,6 +11,7 @@ from backend.handover.model import (
     StartupWrite,
     Transition,
     consequence,
+    locks,
     rank,
     write_of,
 )
@@ -20,16 +21,19 @@ from drivers.codec import decode, encode, size_of
 from drivers.errors import DriveError
 from profiles.schema import Parameter, Profile, Raw
 
-Defect = Literal["unknown", "read_only", "size", "range", "twice", "order", "state", "energises"]
+Defect = Literal[
+    "unknown", "read_only", "size", "range", "twice", "order", "state", "energises", "locks"
+]
 #: On the way up, with the mailbox working (ETG.1000.6); empty where the format states none.
 _STATES = ("IP", "PS", "SO", "")
 
 
 @dataclass(frozen=True, slots=True)
 class Conflict:
-    """A value that the controller writes and that is another one in the set or in the drive.
+    """A value that the controller writes and that is another one than ours.
 
-    ``ours`` and ``drive`` are None where they are not known or have no such value.
+    Raw values: ``ours`` of the set, ``drive`` of the drive as it is; None where they are not known.
+    Where the set has no such value, that of the drive counts.
     """
 
     key: str
@@ -59,6 +63,10 @@ class Verdict:
     findings: tuple[Finding, ...]
     not_written: tuple[str, ...]
     """Keys of our set that the controller does not write: these stay as the drive keeps them."""
+    restored: tuple[str, ...]
+    """Keys whose value in the drive is another one now; the controller writes that of our set."""
+    unknown_here: tuple[str, ...]
+    """Keys that the controller writes and of which neither set nor drive gives a value."""
     same: int
 
 
@@ -92,6 +100,8 @@ def compare(
     The last write of an object counts, as it does in the drive.
     """
     conflicts: list[Conflict] = []
+    restored: list[str] = []
+    alone: list[str] = []
     same = 0
     last = {write.key: write for write in listed.writes}
     for key, write in last.items():
@@ -101,26 +111,33 @@ def compare(
         parameter = profile.by_key[key]
         set_raw = ours.get(key) if ours else None
         drive_raw = drive.get(key) if drive else None
-        known = [value for value in (set_raw, drive_raw) if value is not None]
-        if all(_equal(parameter, raw, value) for value in known):
-            same += bool(known)
-            continue
-        conflicts.append(_conflict(profile, parameter, raw, set_raw, drive_raw))
+        before = set_raw if set_raw is not None else drive_raw
+        if before is None:
+            alone.append(key)
+        elif not _equal(parameter, raw, before):
+            conflicts.append(_conflict(profile, parameter, raw, set_raw, drive_raw))
+        elif drive_raw is not None and not _equal(parameter, raw, drive_raw):
+            restored.append(key)
+        else:
+            same += 1
     missing = tuple(key for key in ours or () if key not in last)
-    return Verdict(tuple(conflicts), diagnose(profile, listed), missing, same)
+    return Verdict(
+        tuple(conflicts), diagnose(profile, listed), missing, tuple(restored), tuple(alone), same
+    )
 
 
 def changed_since(
     profile: Profile, ours: Mapping[str, Raw], drive: Mapping[str, Raw | None]
 ) -> tuple[Conflict, ...]:
-    """Values of a set that the drive no longer holds; what could not be read is not told."""
+    """Values of a set that the drive no longer holds; what could not be read is left out."""
     found = []
     for key, raw in ours.items():
         parameter, now = profile.by_key.get(key), drive.get(key)
         if parameter is None or now is None or _equal(parameter, raw, now):
             continue
         name = " ".join(parameter.name.split())
-        sentence = f"{name} ({key}) was handed over as {raw} and is {now} now (raw)"
+        before, after = shown(parameter, raw), shown(parameter, now)
+        sentence = f"{name} ({key}) was handed over as {before} and is {after} now"
         kind = consequence(profile, parameter)
         found.append(Conflict(key, name, now, raw, now, kind, sentence))
     return tuple(found)
@@ -134,13 +151,21 @@ def _equal(parameter: Parameter, one: Raw, other: Raw) -> bool:
         return one == other
 
 
+def shown(parameter: Parameter, raw: Raw) -> str:
+    """A raw value in the parameter's unit; raw where the unit or the scale changes nothing."""
+    value = parameter.to_value(raw)
+    unit = f" {parameter.unit}" if parameter.unit else ""
+    return f"{value}{unit}" + (f" (raw {raw})" if value != raw else "")
+
+
 def _conflict(
     profile: Profile, parameter: Parameter, raw: Raw, ours: Raw | None, drive: Raw | None
 ) -> Conflict:
     kind = consequence(profile, parameter)
     before = ours if ours is not None else drive
+    assert before is not None
     name = " ".join(parameter.name.split())
-    change = f"{before} becomes {raw} (raw)"
+    change = f"{shown(parameter, before)} becomes {shown(parameter, raw)}"
     sentences: dict[Consequence, str] = {
         "gain": f"the controller will undo your tuning of {name} ({parameter.key}): {change}",
         "limit": f"the controller will change the limit {name} ({parameter.key}): {change}",
@@ -157,51 +182,53 @@ def diagnose(profile: Profile, listed: ControllerList) -> tuple[Finding, ...]:
     """Defects of a list by the family's profile."""
     found: list[Finding] = []
     seen: dict[str, str] = {}
-    highest, before = -1, ""
+    highest, before = -2, ""
     for write in listed.writes:
         parameter = profile.by_key.get(write.key)
 
-        def tell(kind: Defect, text: str, at: Listed = write) -> None:
+        def note(kind: Defect, text: str, at: Listed = write) -> None:
             found.append(Finding(kind, at.key, at.place, f"{at.place}: {at.key}: {text}"))
 
         if write.key in seen:
-            tell("twice", f"written before at {seen[write.key]}; the last value counts")
+            note("twice", f"written before at {seen[write.key]}; the last value counts")
         seen.setdefault(write.key, write.place)
         if write.transition not in _STATES:
-            tell("state", f"written at {write.transition[:10]}, which is not on the way up")
+            note("state", f"written at {write.transition[:10]}, which is not on the way up")
         if parameter is None:
-            tell("unknown", f"{profile.title} has no such object")
+            note("unknown", f"{profile.title} has no such object")
             continue
-        _check(parameter, write, tell)
+        _check(profile, parameter, write, note)
         place = rank(profile, parameter)
-        if listed.ordered and place == 0 < highest:
-            tell("order", f"units or gearing are written after {before}, which depends on them")
+        if listed.ordered and place <= 0 < highest:
+            note("order", f"units or gearing are written after {before}, which depends on them")
         if place > highest:
             highest, before = place, write.key
     return tuple(found)
 
 
-class _Tell(Protocol):
+class _Note(Protocol):
     """The function that notes a finding."""
 
     def __call__(self, kind: Defect, text: str) -> None: ...
 
 
-def _check(parameter: Parameter, write: Listed, tell: _Tell) -> None:
+def _check(profile: Profile, parameter: Parameter, write: Listed, note: _Note) -> None:
     if parameter.access == "ro":
-        tell("read_only", "it is read only; the drive refuses and the controller stays in Pre-Op")
+        note("read_only", "it is read only; the drive refuses and the controller stays in Pre-Op")
         return
     if motion_of(parameter) == "energises":
-        tell("energises", "writing it can move the motor; it has no place in a start-up list")
+        note("energises", "writing it can move the motor; it has no place in a start-up list")
     size = size_of(parameter.type)
     if size is None:
         return
     if size != len(write.data):
-        tell("size", f"{len(write.data)} bytes for a {parameter.type} of {size}")
+        note("size", f"{len(write.data)} bytes for a {parameter.type} of {size}")
         return
     raw = decode(parameter.type, write.data)
+    if locks(profile, parameter, raw):
+        note("locks", "it locks every other parameter; the drive refuses what follows")
     low, high = parameter.raw_limits
     if not isinstance(raw, str) and (
         (low is not None and raw < low) or (high is not None and raw > high)
     ):
-        tell("range", f"{raw} is outside {low} to {high}")
+        note("range", f"{raw} is outside {low} to {high}")

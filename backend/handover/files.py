@@ -2,48 +2,119 @@
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Sequence
+from dataclasses import replace
 from datetime import datetime
 from typing import Literal, get_args
 
 from backend.handover import text_lists, xml_lists
+from backend.handover.eni import eni, is_complete
+from backend.handover.esi import controller_of
 from backend.handover.model import AxisHandover
+from backend.parameters.set_file import BadSet
 from drivers.errors import NotAllowed
 
 Format = Literal["twincat", "codesys", "eni", "lcec", "ros2", "igh", "dcf", "csv", "python"]
 FORMATS: tuple[str, ...] = get_args(Format)
+#: Formats that hold a whole segment.
+SEGMENT_FORMATS: tuple[Format, ...] = ("eni", "lcec", "ros2")
+#: What a file of the format is usually called, for who gives no name.
+SUFFIXES: dict[Format, str] = {
+    "twincat": ".xml", "codesys": ".csv", "eni": ".xml", "lcec": ".xml", "ros2": ".yaml",
+    "igh": ".sh", "dcf": ".dcf", "csv": ".csv", "python": ".py",
+}  # fmt: skip
 _ETHERCAT_ONLY = ("twincat", "codesys", "eni", "lcec", "igh")
 
 
 def files_of(
-    axis: AxisHandover, form: Format, name: str, saved: datetime | None
+    what: AxisHandover | Sequence[AxisHandover], form: Format, name: str, saved: datetime | None
 ) -> dict[str, bytes]:
-    """File names and contents; the first one is the list, the last one the scaling sheet.
+    """File names and contents; the first one is the list, the last ones are the scaling sheets.
+
+    Several drives are a segment in the order of the cable.
 
     Raises:
-        NotAllowed: the drive is not on such a bus, or the format needs an identity that is unknown.
+        NotAllowed: the drive is not on such a bus, the format needs an identity that is unknown,
+            or holds one drive alone.
     """
+    axes = [what] if isinstance(what, AxisHandover) else list(what)
+    if not axes or (len(axes) > 1 and form not in SEGMENT_FORMATS):
+        raise NotAllowed(
+            f"{form} holds one drive, not {len(axes)}",
+            value=form,
+            remedy=f"export each drive by itself, or choose {', '.join(SEGMENT_FORMATS)}",
+        )
+    for axis in axes:
+        _require_bus(axis, form)
+    files = _list(axes, form, name, saved)
+    for number, axis in enumerate(axes, 1):
+        place = "" if len(axes) == 1 else f".{number}"
+        files[f"{name}{place}.scaling.txt"] = text_lists.sheet(axis)
+    return files
+
+
+def remarks(axes: Sequence[AxisHandover], form: Format) -> tuple[str, ...]:
+    """What a person must know of this very format before the file is used."""
+    if form == "eni" and not is_complete(axes):
+        return (
+            "no master can run this ENI: it has no mailbox addresses, registers and frames; "
+            "give each drive's ESI file",
+        )
+    return ()
+
+
+def with_controller(axis: AxisHandover, esi_files: Sequence[tuple[bytes, str]]) -> AxisHandover:
+    """The axis with the controller of its own ESI file, among files with their names.
+
+    Raises:
+        NotAllowed: no file has this drive. BadSet: a file is no ESI file.
+    """
+    vendor, product = axis.identity()
+    missing: NotAllowed | None = None
+    for data, name in esi_files:
+        try:
+            found = controller_of(data, name, vendor, product, axis.revision)
+        except BadSet:
+            raise
+        except NotAllowed as error:
+            missing = error
+            continue
+        return replace(axis, controller=found)
+    if missing is not None:
+        raise missing
+    return axis
+
+
+def digest(data: bytes) -> str:
+    """SHA-256 of a file, by which a report names it."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def _require_bus(axis: AxisHandover, form: Format) -> None:
     on_ethercat = axis.profile.link("ethercat") is not None
     if form in _ETHERCAT_ONLY and not on_ethercat:
         raise NotAllowed("handover.no-ethercat-drive", profile_title=axis.profile.title, form=form)
     if form == "ros2" and not on_ethercat and axis.profile.link("canopen") is None:
-        raise NotAllowed("handover.neither-ethercat-nor-canopen", profile_title=axis.profile.title)
-    files = _list(axis, form, name, saved, on_ethercat=on_ethercat)
-    files[f"{name}.scaling.txt"] = text_lists.sheet(axis)
-    return files
+        raise NotAllowed(
+            f"{axis.profile.title} is on neither EtherCAT nor CANopen, which ros2 is for",
+            remedy="choose csv or python",
+        )
 
 
 def _list(
-    axis: AxisHandover, form: Format, name: str, saved: datetime | None, *, on_ethercat: bool
+    axes: list[AxisHandover], form: Format, name: str, saved: datetime | None
 ) -> dict[str, bytes]:
+    axis = axes[0]
     match form:
         case "twincat":
             return {name: xml_lists.twincat(axis)}
         case "codesys":
             return {name: text_lists.codesys(axis)}
         case "eni":
-            return {name: xml_lists.eni(axis)}
+            return {name: eni(axes)}
         case "lcec":
-            return {name: xml_lists.lcec(axis), f"{name}.hal": xml_lists.hal_stub(axis, name)}
+            return {name: xml_lists.lcec(axes), f"{name}.hal": xml_lists.hal_stub(axes, name)}
         case "igh":
             return {name: text_lists.igh(axis)}
         case "csv":
@@ -55,11 +126,30 @@ def _list(
                 name: text_lists.dcf(axis, name, saved),
                 f"{name}.1f22.bin": text_lists.concise_dcf(axis),
             }
-        case "ros2" if on_ethercat:
-            return {name: text_lists.ros2(axis)}
         case "ros2":
-            other = f"{name}.dcf"
-            return {
-                name: text_lists.bus_yml(axis, other),
-                other: text_lists.dcf(axis, other, saved),
-            }
+            return _ros2(axes, name, saved)
+
+
+def _ros2(axes: list[AxisHandover], name: str, saved: datetime | None) -> dict[str, bytes]:
+    wired = [axis.profile.link("ethercat") is not None for axis in axes]
+    if any(wired) and not all(wired):
+        raise NotAllowed(
+            "drives on EtherCAT and on CANopen are no one segment",
+            remedy="export each bus by itself",
+        )
+    if len(axes) == 1 and all(wired):
+        return {name: text_lists.ros2(axes[0])}
+    suffix = "yaml" if all(wired) else "dcf"
+    others = [
+        f"{name}.{suffix}" if len(axes) == 1 else f"{name}.{number}.{suffix}"
+        for number in range(1, len(axes) + 1)
+    ]
+    if all(wired):
+        files = {name: text_lists.ros2_control(axes, others)}
+        return files | {
+            other: text_lists.ros2(axis) for other, axis in zip(others, axes, strict=True)
+        }
+    files = {name: text_lists.bus_yml(axes, others)}
+    return files | {
+        other: text_lists.dcf(axis, other, saved) for other, axis in zip(others, axes, strict=True)
+    }

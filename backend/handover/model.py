@@ -9,6 +9,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
+from backend.handover.esi import SlaveController
 from backend.motion.classes import motion_of
 from backend.parameters.set_file import ParameterSet
 from drivers.codec import encode, size_of
@@ -103,6 +104,15 @@ class AxisHandover:
     cycle_us: int
     distributed_clock: bool
     notes: tuple[str, ...] = ()
+    controller: SlaveController | None = None
+    """Of the drive's ESI file, where one was given."""
+
+    @property
+    def assign_activate(self) -> int:
+        """Word that switches the clock on, of the ESI file or proposed; 0 for none."""
+        if self.controller is not None:
+            return self.controller.assign_activate
+        return ASSIGN_ACTIVATE if self.distributed_clock else 0
 
     def identity(self) -> tuple[int, int]:
         """Vendor and product, which a controller compares with the drive.
@@ -116,9 +126,12 @@ class AxisHandover:
 
 
 def gain_keys(profile: Profile) -> frozenset[str]:
-    """Keys that tuning changes: loop gains, filters, notches and the stiffness level."""
+    """Keys that tuning changes: the maker's group of loop gains, filters, notches and stiffness."""
     found: set[str] = set()
     if (gains := profile.gains) is not None:
+        speed = profile.by_key.get(gains.speed or "")
+        if speed is not None and speed.group:
+            found |= {p.key for p in profile.parameters if p.group == speed.group}
         found |= {
             key
             for key in (
@@ -156,8 +169,20 @@ def consequence(profile: Profile, parameter: Parameter) -> Consequence:
 
 
 def rank(profile: Profile, parameter: Parameter) -> int:
-    """Place in the order of writing: units, limits, what else, gains."""
-    return _RANK[consequence(profile, parameter)]
+    """Place in the order of writing: what unlocks the others, units, limits, what else, gains."""
+    return -1 if is_lock(profile, parameter) else _RANK[consequence(profile, parameter)]
+
+
+def is_lock(profile: Profile, parameter: Parameter) -> bool:
+    """Whether the parameter protects the others from being written."""
+    quirk = profile.quirk("write_protect")
+    return quirk is not None and quirk.key == parameter.key
+
+
+def locks(profile: Profile, parameter: Parameter, raw: Raw) -> bool:
+    """Whether this value makes the drive refuse what is written after it."""
+    quirk = profile.quirk("write_protect")
+    return quirk is not None and quirk.key == parameter.key and raw != (quirk.raw or 0)
 
 
 def hand_over(
@@ -196,6 +221,8 @@ def hand_over(
         why = _why_not(parameter, row.raw, motor_individual=motor_individual)
         if row.key in seen:
             why = "given twice in the set; the first one counts"
+        if parameter and row.raw is not None and locks(profile, parameter, row.raw):
+            why = "locks every other parameter: the drive would refuse the list at the next start"
         seen.add(row.key)
         if why or parameter is None or row.raw is None:
             left.append(LeftOut(row.key, row.problem or why))
@@ -265,6 +292,13 @@ def _axis(
         notes.append(f"act only after {when.replace('_', ' ')}: {', '.join(keys)}")
     ident = profile.identity
     pdo = profile.pdo
+    pdos = _pdos(profile)
+    mapped = {
+        f"{e.index:04X}:{e.subindex:02X}" for p in pdos if p.direction == "rx" for e in p.entries
+    }
+    cyclic = sorted({write.key for write in writes} & mapped)
+    if cyclic:
+        notes.append(f"process data overwrite in every cycle: {', '.join(cyclic)}")
     return AxisHandover(
         name=content.drive_name or profile.title,
         profile=profile,
@@ -275,7 +309,7 @@ def _axis(
         revision=content.revision,
         writes=tuple(writes),
         left_out=tuple(left),
-        pdos=_pdos(profile),
+        pdos=pdos,
         cycle_us=max(PROPOSED_CYCLE_US, (pdo.cycle_min_us or 0) if pdo else 0),
         distributed_clock=bool(pdo and "DC-synchronous" in pdo.sync_modes),
         notes=tuple(notes),

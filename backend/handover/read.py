@@ -20,14 +20,16 @@ from defusedxml.common import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
 from backend.parameters.set_file import BadSet
-from drivers.codec import encode
+from drivers.codec import encode, size_of
 from drivers.errors import DriveError
 from profiles.importer import ImportFailed, ImportReport, is_dcf, read_dcf_values
 from profiles.importer.values import default_value
-from profiles.schema import INTEGER_RANGE, DataType, Profile
+from profiles.schema import INTEGER_RANGE, DataType, Parameter, Profile
 
 MAX_BYTES = 8_000_000
 _MAX_WRITES = 20_000
+_CCS_DOWNLOAD = 1
+_UPWARD = ("IP", "PS", "SO")
 #: What the parsers raise; LookupError is an encoding that nobody knows.
 _DAMAGED = (
     ParseError, ImportFailed, ValueError, LookupError, yaml.YAMLError, csv.Error, RecursionError,
@@ -67,8 +69,12 @@ class _Bad(ValueError):
     """A row that cannot be read; the message has its place."""
 
 
-def read_list(data: bytes, profile: Profile, name: str = "the file") -> ControllerList:
+def read_list(
+    data: bytes, profile: Profile, name: str = "the file", slave: int | None = None
+) -> ControllerList:
     """A controller's list in any of the formats that are exported, but the Python script.
+
+    ``slave`` counts from 1 in the order of the file, where that has several.
 
     Raises:
         BadSet: too large, of no such format, damaged, or without a single write.
@@ -76,7 +82,7 @@ def read_list(data: bytes, profile: Profile, name: str = "the file") -> Controll
     if len(data) > MAX_BYTES:
         raise BadSet("handover.larger-bytes", name=name, max_bytes=MAX_BYTES)
     try:
-        found = _by_contents(data, profile, name)
+        found = _by_contents(data, profile, name, slave)
     except DefusedXmlException as error:
         raise BadSet("handover.defines-xml-entities-no", name=name) from error
     except _DAMAGED as e:
@@ -88,10 +94,10 @@ def read_list(data: bytes, profile: Profile, name: str = "the file") -> Controll
     return found
 
 
-def _by_contents(data: bytes, profile: Profile, name: str) -> ControllerList:
+def _by_contents(data: bytes, profile: Profile, name: str, slave: int | None) -> ControllerList:
     head = data[:4096].lstrip(b"\xef\xbb\xbf \t\r\n")
     if head.startswith((b"<", b"\xff\xfe", b"\xfe\xff")):
-        return _xml(data, name)
+        return _xml(data, profile, name, slave)
     if is_dcf(data):
         return _dcf(data, profile, name)
     text = data.decode("utf-8-sig")
@@ -102,8 +108,11 @@ def _by_contents(data: bytes, profile: Profile, name: str) -> ControllerList:
     if any(_DOWNLOAD.match(line) for line in text.splitlines()):
         return ControllerList("igh", tuple(_igh(text)))
     if re.search(r"^\s*(sdo|vendor_id)\s*:", text, re.M):
-        return ControllerList("ros2", tuple(_ros2(text, profile)))
-    raise BadSet("handover.no-start-up-list", name=name)
+        return ControllerList("ros2", tuple(_ros2(text, profile, slave)))
+    raise BadSet(
+        f"{name} is no start-up list that is known here",
+        remedy="give TwinCAT, CODESYS or ENI, lcec XML, ROS 2 YAML, an ethercat script, DCF or CSV",
+    )
 
 
 def _number(text: str | None, place: str, *, base: int = 0) -> int:
@@ -140,50 +149,96 @@ def _sized(value: int, size: int, place: str) -> bytes:
     return (value % (1 << (8 * size))).to_bytes(size, "little")
 
 
-def _xml(data: bytes, name: str) -> ControllerList:
+def _xml(data: bytes, profile: Profile, name: str, slave: int | None) -> ControllerList:
     root = fromstring(data, forbid_dtd=True)
     if root.tag == "masters":
-        return ControllerList("lcec", tuple(_lcec(root, name)))
+        return ControllerList("lcec", tuple(_lcec(root, profile, name, slave)))
     if root.tag in ("EtherCATMailbox", "EtherCATConfig", "TreeItem"):
         form = "eni" if root.tag == "EtherCATConfig" else "twincat"
-        return ControllerList(form, tuple(_init_commands(root, name)))
-    raise BadSet("handover.xml-another-kind-root", name=name, tag=str(root.tag)[:60])
+        return ControllerList(form, tuple(_init_commands(root, profile, name, slave)))
+    raise BadSet(
+        f"{name} is XML of another kind: its root is {str(root.tag)[:60]}",
+        remedy="give an EtherCATMailbox, EtherCATConfig or lcec masters file",
+    )
 
 
-def _one(elements: list[Element], what: str, name: str) -> Element:
-    if len(elements) != 1:
-        raise BadSet("handover.drive-compared-time", name=name, elements=len(elements), what=what)
-    return elements[0]
+def _chosen(elements: list[Element], what: str, name: str, slave: int | None) -> Element:
+    """The one, or the one that was asked for."""
+    if slave is None and len(elements) == 1:
+        return elements[0]
+    if slave is not None and 1 <= slave <= len(elements):
+        return elements[slave - 1]
+    raise BadSet(
+        f"{name} has {len(elements)} {what}; one drive is compared at a time",
+        remedy="say which with --slave, counted from 1" if elements else "give another file",
+    )
 
 
-def _init_commands(root: Element, name: str) -> Iterator[Listed]:
-    slave = root
+def _init_commands(
+    root: Element, profile: Profile, name: str, slave: int | None
+) -> Iterator[Listed]:
+    within = root
     if root.tag == "EtherCATConfig":
-        slave = _one(root.findall("./Config/Slave"), "slaves", name)
-    for number, command in enumerate(slave.iterfind(".//CoE/InitCmds/InitCmd"), 1):
+        within = _chosen(root.findall("./Config/Slave"), "slaves", name, slave)
+    for number, command in enumerate(within.iterfind(".//CoE/InitCmds/InitCmd"), 1):
         place = f"InitCmd {number}"
-        if command.get("CompleteAccess", "0").lower() in ("1", "true"):
-            raise _Bad(f"{place}: complete access is not read: write its subindexes singly")
+        if command.get("Disabled", "0").lower() in ("1", "true"):
+            continue
         ccs = command.findtext("Ccs")
-        if ccs is not None and _number(ccs, place) != 1:
-            continue  # an upload reads
-        transitions = [each.text or "" for each in command.findall("Transition")]
-        yield _listed(
-            _number(command.findtext("Index"), place), _number(command.findtext("SubIndex"), place),
-            _hex(command.findtext("Data"), place), transitions[0] if transitions else "", place,
-        )  # fmt: skip
+        data = _hex(command.findtext("Data"), place)
+        # CiA 301: 1 is a download, 2 an upload; tools that count the other way give data with it.
+        if ccs is not None and _number(ccs, place) != _CCS_DOWNLOAD and not data:
+            continue
+        transitions = [(each.text or "").strip() for each in command.findall("Transition")]
+        upward = [each for each in transitions if each in _UPWARD] or transitions
+        index = _number(command.findtext("Index"), place)
+        subindex = _number(command.findtext("SubIndex"), place)
+        when = upward[0] if upward else ""
+        if command.get("CompleteAccess", "0").lower() in ("1", "true"):
+            yield from _parts(profile, index, subindex, data, when, place)
+        else:
+            yield _listed(index, subindex, data, when, place)
 
 
-def _lcec(root: Element, name: str) -> Iterator[Listed]:
-    slave = _one(root.findall("./master/slave"), "slaves", name)
-    for number, config in enumerate(slave.findall("sdoConfig"), 1):
+def _parts(
+    profile: Profile, index: int, first: int, data: bytes, transition: str, place: str
+) -> Iterator[Listed]:
+    """Subindexes of a complete access (ETG.1000.6 clause 5.6.2): from 0 or 1 on, subindex 0 filled
+    up to 16 bits, the others as long as their types and without a gap."""
+    entries = sorted(
+        (p for p in profile.parameters if p.index == index and p.subindex), key=_by_subindex
+    )
+    if first not in (0, 1) or not entries:
+        raise _Bad(f"{place}: {profile.title} knows no complete access to {index:04X}h:{first}")
+    at = 2 if first == 0 else 0
+    for wanted, entry in enumerate(entries, 1):
+        size = size_of(entry.type)
+        if entry.subindex != wanted or size is None:
+            raise _Bad(f"{place}: where {index:04X}h:{wanted} lies in the data is not known")
+        part = data[at : at + size]
+        at += size
+        if len(part) == size:
+            yield _listed(index, wanted, part, transition, place)
+        if at >= len(data):
+            break
+    if at != len(data):
+        raise _Bad(f"{place}: {len(data)} bytes do not fit the entries of {index:04X}h")
+
+
+def _by_subindex(parameter: Parameter) -> int:
+    return parameter.subindex or 0
+
+
+def _lcec(root: Element, profile: Profile, name: str, slave: int | None) -> Iterator[Listed]:
+    within = _chosen(root.findall("./master/slave"), "slaves", name, slave)
+    for number, config in enumerate(within.findall("sdoConfig"), 1):
         place = f"sdoConfig {number}"
-        if config.get("subIdx") == "complete":
-            raise _Bad(f"{place}: complete access is not read: write its subindexes singly")
         index = _number(config.get("idx"), place, base=16)
+        data = b"".join(_hex(each.get("data"), place) for each in config.findall("sdoDataRaw"))
+        if config.get("subIdx") == "complete":
+            yield from _parts(profile, index, 0, data, "PS", place)
+            continue
         subindex = _number(config.get("subIdx"), place, base=16)
-        raw = config.findall("sdoDataRaw")
-        data = b"".join(_hex(each.get("data"), place) for each in raw)
         yield _listed(index, subindex, data, "PS", place)
 
 
@@ -235,7 +290,7 @@ def _download_words(words: list[str]) -> tuple[str, list[str]]:
     return kind, plain
 
 
-def _ros2(text: str, profile: Profile) -> Iterator[Listed]:
+def _ros2(text: str, profile: Profile, slave: int | None) -> Iterator[Listed]:
     # Aliases make a small file as large as a bomb, and no slave file has them.
     for event in yaml.parse(text, yaml.SafeLoader):
         if isinstance(event, yaml.AliasEvent):
@@ -244,7 +299,9 @@ def _ros2(text: str, profile: Profile) -> Iterator[Listed]:
     rows = content.get("sdo") if isinstance(content, dict) else None
     if rows is None and isinstance(content, dict):
         nodes = [n for n in content.values() if isinstance(n, dict) and "sdo" in n]
-        rows = nodes[0]["sdo"] if len(nodes) == 1 else None
+        chosen = (slave or 1) - 1
+        known = chosen < len(nodes) and (slave is not None or len(nodes) == 1)
+        rows = nodes[chosen]["sdo"] if known else None
     for number, row in enumerate(rows if isinstance(rows, list) else [], 1):
         place = f"sdo {number}"
         if not isinstance(row, dict):

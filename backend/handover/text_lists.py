@@ -6,10 +6,13 @@ import csv
 import io
 import math
 import struct
+from collections.abc import Sequence
 from datetime import UTC, datetime
+from xml.sax.saxutils import escape
 
-from backend.handover.model import ASSIGN_ACTIVATE, AxisHandover, MappedEntry, StartupWrite
+from backend.handover.model import AxisHandover, MappedEntry, StartupWrite
 from profiles.importer import export_dcf
+from profiles.schema import Parameter, Raw
 
 #: Columns of CODESYS's page "Startup parameters" of an EtherCAT slave, in its order.
 CODESYS_COLUMNS = (
@@ -43,8 +46,8 @@ def _number(write: StartupWrite) -> int:
 
 
 def _line(text: str) -> str:
-    """One line of it: no value of a file may begin a line of its own."""
-    return " ".join(text.split())
+    """One line of it without control characters: no value of a file may begin a line of its own."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def _cell(text: str) -> str:
@@ -116,8 +119,9 @@ def ros2(axis: AxisHandover) -> bytes:
         f"vendor_id: 0x{vendor:08x}",
         f"product_id: 0x{product:08x}",
     ]
-    if axis.distributed_clock:
-        lines.append(f"assign_activate: 0x{ASSIGN_ACTIVATE:04x}  # check with the ESI file")
+    if axis.assign_activate:
+        known = "of the ESI file" if axis.controller is not None else "check with the ESI file"
+        lines.append(f"assign_activate: 0x{axis.assign_activate:04x}  # {known}")
     lines += ["auto_fault_reset: false", "sdo:"]
     lines += [
         f"  - {{index: 0x{w.index:04x}, sub_index: {w.subindex}, type: {number_type(w)}, "
@@ -165,30 +169,62 @@ def increments_per_radian(axis: AxisHandover) -> float | None:
     return units.counts_per_rev / (2 * math.pi) if units.counts_per_rev else None
 
 
-def bus_yml(axis: AxisHandover, dcf_name: str) -> bytes:
-    """`bus.yml` of ros2_canopen for one node, which names the DCF beside it."""
-    return "\n".join([
+def bus_yml(axes: Sequence[AxisHandover], dcf_names: Sequence[str]) -> bytes:
+    """`bus.yml` of ros2_canopen, which names the DCFs beside it; node numbers are proposed."""
+    cycle_us = max(axis.cycle_us for axis in axes)
+    lines = [
         "options:",
         '  dcf_path: "@BUS_CONFIG_PATH@"',
         "master:",
         "  node_id: 1",
         '  driver: "ros2_canopen::MasterDriver"',
         '  package: "canopen_master_driver"',
-        f"  sync_period: {axis.cycle_us}",
-        "drive:",
-        "  node_id: 2  # set the drive's own",
-        f'  dcf: "{dcf_name}"',
-        '  driver: "ros2_canopen::Cia402Driver"',
-        '  package: "canopen_402_driver"',
-        f"  period: {axis.cycle_us // 1000}",
-        "  sdo:",
-        *(
-            f"    - {{index: 0x{w.index:04x}, sub_index: {w.subindex}, value: {_number(w)}}}"
-            f"  # {_line(w.name)}"
-            for w in axis.writes
-        ),
-        "",
-    ]).encode()  # fmt: skip
+        f"  sync_period: {cycle_us}",
+    ]
+    for number, (axis, dcf_name) in enumerate(zip(axes, dcf_names, strict=True)):
+        lines += [
+            "drive:" if len(axes) == 1 else f"drive{number + 1}:",
+            f"  node_id: {number + 2}  # set the drive's own",
+            f'  dcf: "{dcf_name}"',
+            '  driver: "ros2_canopen::Cia402Driver"',
+            '  package: "canopen_402_driver"',
+            f"  period: {cycle_us // 1000}",
+            "  sdo:",
+            *(
+                f"    - {{index: 0x{w.index:04x}, sub_index: {w.subindex}, value: {_number(w)}}}"
+                f"  # {_line(w.name)}"
+                for w in axis.writes
+            ),
+        ]
+    return "\n".join([*lines, ""]).encode()
+
+
+def ros2_control(axes: Sequence[AxisHandover], slave_files: Sequence[str]) -> bytes:
+    """`ros2_control` of ethercat_driver_ros2 that names the slave files beside it."""
+    frequency = 1_000_000 // max(axis.cycle_us for axis in axes)
+    lines = [
+        '<ros2_control name="segment" type="system">',
+        "  <hardware>",
+        "    <plugin>ethercat_driver/EthercatDriver</plugin>",
+        '    <param name="master_id">0</param>',
+        f'    <param name="control_frequency">{frequency}</param>',
+        "  </hardware>",
+    ]
+    for position, file in enumerate(slave_files):
+        lines += [
+            f'  <joint name="joint_{position + 1}">',
+            '    <state_interface name="position"/>',
+            '    <command_interface name="position"/>',
+            f'    <ec_module name="drive{position + 1}">',
+            "      <plugin>ethercat_generic_plugins/EcCiA402Drive</plugin>",
+            '      <param name="alias">0</param>',
+            f'      <param name="position">{position}</param>',
+            '      <param name="mode_of_operation">8</param>',
+            f'      <param name="slave_config">{escape(file)}</param>',
+            "    </ec_module>",
+            "  </joint>",
+        ]
+    return "\n".join([*lines, "</ros2_control>", ""]).encode()
 
 
 def dcf(axis: AxisHandover, file_name: str, saved: datetime | None) -> bytes:
@@ -256,10 +292,23 @@ if __name__ == "__main__":
 '''.encode()
 
 
+_SHEET = (
+    ("direction (polarity)", "607E:00"), ("encoder increments", "608F:01"),
+    ("encoder motor revolutions", "608F:02"), ("software limit minimum", "607D:01"),
+    ("software limit maximum", "607D:02"), ("maximum profile velocity", "607F:00"),
+    ("maximum speed", "6080:00"), ("maximum torque", "6072:00"),
+    ("positive torque limit", "60E0:00"), ("negative torque limit", "60E1:00"),
+    ("following error window", "6065:00"), ("following error time", "6066:00"),
+)  # fmt: skip
+
+
 def sheet(axis: AxisHandover) -> bytes:
-    """Scaling of the controller's axis, what was left out, and what must be heeded."""
-    profile, units = axis.profile, axis.profile.units
-    lines = [f"Hand-over of {_line(axis.name)} ({profile.title})", "", "Scaling"]
+    """Scaling of the controller's axis, what was left out, and what must be heeded.
+
+    Only what the list itself writes is stated as a value: what it leaves is as the drive keeps it.
+    """
+    units = axis.profile.units
+    lines = [f"Hand-over of {_line(axis.name)} ({axis.profile.title})", "", "Scaling"]
     lines.append(
         f"  position unit {units.position}, velocity {units.velocity}, acceleration "
         f"{units.acceleration}, torque {units.torque}"
@@ -268,21 +317,53 @@ def sheet(axis: AxisHandover) -> bytes:
     lines.append(
         f"  increments per motor revolution with default gearing: {known or 'not in the manual'}"
     )
+    lines.append(f"  increments per feed unit: {_increments_per_unit(axis)}")
     lines.append(
         f"  encoder counts per revolution: {units.encoder_counts_per_rev or 'read 608Fh of drive'}"
     )
-    by_key = {write.key: write for write in axis.writes}
-    for words, key in (
+    gearing = (
         ("gear numerator", units.gear_numerator), ("gear denominator", units.gear_denominator),
         ("feed", units.feed), ("feed revolutions", units.feed_revolutions),
-        ("direction (polarity)", "607E:00"), ("software limit minimum", "607D:01"),
-        ("software limit maximum", "607D:02"), ("maximum speed", "6080:00"),
-        ("maximum torque", "6072:00"), ("following error window", "6065:00"),
-    ):  # fmt: skip
-        if key:
+    )  # fmt: skip
+    by_key = {write.key: write for write in axis.writes}
+    for words, key in (*gearing, *_SHEET):
+        parameter = axis.profile.by_key.get(key or "")
+        if key and parameter is not None:
             write = by_key.get(key)
-            lines.append(f"  {words} {key}: {write.raw if write else 'not handed over'}")
+            text = _with_unit(parameter, write.raw) if write else "not handed over"
+            lines.append(f"  {words} {key}: {text}")
     lines += ["", f"Cycle {axis.cycle_us} µs (proposed), values written in P→S unless stated"]
+    lines += ["", "Process data"]
+    lines += [
+        f"  {pdo.index:04X}h {'to' if pdo.direction == 'rx' else 'from'} the drive: "
+        + ", ".join(f"{_line(e.name)} ({e.bits} bits)" for e in pdo.entries)
+        for pdo in axis.pdos
+    ]
     lines += ["", "To heed", *(f"  {_line(note)}" for note in axis.notes or ("nothing",))]
     lines += ["", "Left out", *(f"  {e.key}: {_line(e.reason)}" for e in axis.left_out)]
     return "\n".join([*lines, ""]).encode()
+
+
+def _with_unit(parameter: Parameter, raw: Raw) -> str:
+    value = parameter.to_value(raw)
+    unit = f" {parameter.unit}" if parameter.unit else ""
+    return f"{value}{unit}" + (f" (raw {raw})" if value != raw else "")
+
+
+def _increments_per_unit(axis: AxisHandover) -> str:
+    """Encoder increments per unit of the drive's positions, from the gearing that is handed over.
+
+    CiA 402-2 clause 9: the gear ratio is motor revolutions per shaft revolution (6091h), the feed
+    is units per shaft revolution (6092h).
+    """
+    units = axis.profile.units
+    keys = (units.gear_numerator, units.gear_denominator, units.feed, units.feed_revolutions)
+    written = {write.key: write.raw for write in axis.writes}
+    encoder = units.encoder_counts_per_rev
+    standard = keys == ("6091:01", "6091:02", "6092:01", "6092:02")
+    values = [written.get(key or "") for key in keys]
+    whole = [value for value in values if isinstance(value, int) and value]
+    if not standard or encoder is None or len(whole) != 4:
+        return "not certain from this list: compute it from the gearing in the drive"
+    gear, shaft, feed, turns = whole
+    return f"{encoder * gear * turns / (shaft * feed):.9g}"

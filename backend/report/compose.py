@@ -16,6 +16,7 @@ from backend.report.document import (
     Tone,
 )
 from backend.report.facts import Facts, Measured
+from backend.report.handed_over import handed_over
 from backend.report.numbers import NONE, fixed, hertz, margin, milliseconds, moment, significant
 from backend.report.texts import Words
 from backend.report.tools import kind_title, tool_verdict
@@ -41,6 +42,8 @@ def compose(facts: Facts, language: Language) -> Document:
         blocks.append(Note(words("measurements.none")))
     for measured in facts.measured:
         blocks += chapter(measured, words)
+    if facts.handed_over:
+        blocks += [Heading(words("handover")), *handed_over(facts.handed_over, words)]
     if facts.notes:
         blocks += [Heading(words("notes")), *(Note(line) for line in facts.notes.splitlines())]
     blocks += [

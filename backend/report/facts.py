@@ -41,6 +41,24 @@ class ChangedSetting:
 
 
 @dataclass(frozen=True)
+class HandedOverFile:
+    """A start-up list that was made for the machine's controller.
+
+    ``values`` are key, name and value with unit; ``changed`` those of them that the drive holds
+    otherwise now, with what it holds.
+    """
+
+    time: datetime
+    person: str
+    format: str
+    file: str
+    sha256: str
+    set_file: str
+    values: tuple[tuple[str, str, str], ...]
+    changed: tuple[tuple[str, str, str, str], ...] = ()
+
+
+@dataclass(frozen=True)
 class Measured:
     """A measurement evaluated anew. ``earlier`` is the same kind before the first change.
 
@@ -77,5 +95,6 @@ class Facts:
     unsaved: tuple[str, ...] = ()
     pending: tuple[str, ...] = ()
     trouble: tuple[str, ...] = ()
+    handed_over: tuple[HandedOverFile, ...] = ()
     #: Whether the drive was asked; a report of files alone knows nothing of its settings.
     live: bool = True

@@ -8,16 +8,18 @@ from datetime import UTC, datetime
 
 import backend
 from backend.drive.drive import Drive
+from backend.handover.conflicts import changed_since
+from backend.handover.record import HandedOver
 from backend.library.measurements import BadMeasurement, Head, MeasurementStore, profile_version
 from backend.report.changes import Change, net
-from backend.report.facts import ChangedSetting, Facts, Identity, Measured
+from backend.report.facts import ChangedSetting, Facts, HandedOverFile, Identity, Measured
 from backend.report.views import view_of
 from backend.station.bench import Bench
 from backend.station.connected_drive import Member
 from backend.station.evaluation import evaluate
 from backend.tools.registry import TOOLS
 from drivers.errors import DriveError, NotAllowed
-from profiles.schema import Parameter
+from profiles.schema import Parameter, Raw
 
 #: The order in which an axis is commissioned, and a report is read.
 _ORDER = (
@@ -188,6 +190,39 @@ def shown(parameter: Parameter, raw: int) -> str:
         return f"{raw}: {parameter.enum[raw]}"
     value = parameter.to_value(raw)
     return f"{value} {parameter.unit}".rstrip()
+
+
+async def handed_over_facts(drive: Drive, made: Sequence[HandedOver]) -> tuple[HandedOverFile, ...]:
+    """The newest hand-over of each format; what the drive holds otherwise now is read."""
+    newest = {each.format: each for each in made}
+    found = []
+    for each in sorted(newest.values(), key=lambda one: one.time):
+        known = {key: raw for key, raw in each.values.items() if key in drive.profile.by_key}
+        keys = [key for key in known if not drive.unreachable_why(drive.parameter(key))]
+        readings = await drive.read_many(keys) if keys else {}
+        now = {key: reading.raw for key, reading in readings.items()}
+        found.append(
+            HandedOverFile(
+                each.time, each.person, each.format, each.file, each.sha256, each.set_file,
+                tuple(
+                    (key, drive.parameter(key).name, _text_of(drive.parameter(key), raw))
+                    for key, raw in known.items()
+                ),
+                tuple(
+                    (
+                        change.key, change.name,
+                        _text_of(drive.parameter(change.key), known[change.key]),
+                        _text_of(drive.parameter(change.key), change.controller),
+                    )
+                    for change in changed_since(drive.profile, known, now)
+                ),
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def _text_of(parameter: Parameter, raw: Raw) -> str:
+    return shown(parameter, raw) if isinstance(raw, int) else str(raw)
 
 
 # --- files alone -----------------------------------------------------------------------

@@ -150,8 +150,19 @@ def _entry(parameter: Parameter, name: str, values: Mapping[str, Raw]) -> list[s
     return lines
 
 
+#: COB-IDs of the first four PDOs (CiA 301 clause 7.3.3, pre-defined connection set), which depend
+#: on the node number and so are no default of a profile. Without them clients take no PDO.
+_COB_IDS = {
+    f"{first + number:04X}:01": f"$NODEID+0x{base + 0x100 * number:X}"
+    for first, base in ((0x1400, 0x200), (0x1800, 0x180))
+    for number in range(4)
+}
+
+
 def _value(parameter: Parameter) -> str:
     default = parameter.default_raw
+    if default is None and parameter.key in _COB_IDS:
+        return _COB_IDS[parameter.key]
     if default is None or parameter.type == "OCTETS":
         return ""
     return _text(str(default))

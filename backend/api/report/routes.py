@@ -11,10 +11,19 @@ from fastapi import APIRouter, Response
 from backend.api.context import TheBench, TheMember
 from backend.api.disposition import disposition
 from backend.api.errors import NotFound
+from backend.api.handover.routes import handover_log
 from backend.api.report.models import ReportInfo, ReportRequest
 from backend.api.tuning.measurements import change_log, measurement_head
 from backend.library.measurements import BadMeasurement, Head
-from backend.report.gather import About, belongs, choose, kind_of, live_facts, measured_from
+from backend.report.gather import (
+    About,
+    belongs,
+    choose,
+    handed_over_facts,
+    kind_of,
+    live_facts,
+    measured_from,
+)
 from backend.report.store import Format, ReportStore, render
 from backend.station.bench import Bench
 from backend.station.connected_drive import Member
@@ -38,7 +47,9 @@ async def make_report(bench: TheBench, member: TheMember, request: ReportRequest
         bench, member, changes, About(request.person, request.machine, request.notes)
     )
     measured, unusable = await asyncio.to_thread(measured_from, bench.measurements, chosen)
-    whole = replace(facts, measured=measured, unusable=unusable)
+    made = await asyncio.to_thread(handover_log(bench).read, member.drive.id)
+    handed = await handed_over_facts(member.drive, made)
+    whole = replace(facts, measured=measured, unusable=unusable, handed_over=handed)
     data = await asyncio.to_thread(render, whole, request.language, request.format)
     file = await asyncio.to_thread(_store(bench).save, member.drive.name, request.format, data)
     bench.journal.add(f"{member.drive.name}: report {file}", drive=member.drive.id)

@@ -187,6 +187,11 @@ _API: dict[str, Need] = {
     "POST /drives/{drive_id}/sets": Need(Right.FILES, "drive"),
     "GET /drives/{drive_id}/diff": _LOOK,
     "GET /drives/{drive_id}/three-way": _LOOK,
+    # Lists for the machine's controller: made of stored sets, noted in the report; comparing reads.
+    "POST /drives/{drive_id}/handover": _FILES_UPLOAD,
+    "POST /drives/{drive_id}/handover/compare": Need(Right.LOOK, body_bytes=9 << 20),
+    "GET /drives/{drive_id}/handovers": _LOOK,
+    "GET /drives/{drive_id}/handovers/{number}/changes": _LOOK,
     "GET /library": _LOOK,
     "GET /library/tags": _LOOK,
     "GET /library/{entry_id}": _LOOK,

@@ -20,7 +20,7 @@ from backend.handover.conflicts import resolved
 from backend.handover.files import FORMATS, Format, files_of
 from backend.handover.model import AxisHandover, hand_over
 from backend.handover.read import read_list
-from backend.parameters.set_file import ParameterSet, dump, parse, storable
+from backend.parameters.set_file import BadSet, ParameterSet, dump, parse, storable
 from drivers.errors import NotAllowed
 from drivers.link import Found
 from profiles import load_profile
@@ -287,3 +287,55 @@ def test_a_format_that_compares_identity_needs_it() -> None:
     for form in ("eni", "lcec", "ros2"):
         with pytest.raises(NotAllowed, match="vendor"):
             files_of(axis, form, "list", None)
+
+
+def test_the_sheet_has_scaling_resolution_direction_and_limits() -> None:
+    profile = profile_of("mms7")
+    content = set_of(profile)
+    # 5:1 gear, 10 mm lead in µm: 65536 increments of the encoder × 5 / 10000 per µm.
+    wanted = {"6091:01": 5, "6091:02": 1, "6092:01": 10000, "6092:02": 1, "6072:00": 1500}
+    rows = tuple(replace(row, raw=wanted.get(row.key, row.raw)) for row in content.rows)
+    axis = hand_over(replace(content, rows=rows), profile)
+    text = files_of(axis, "csv", "list", None)["list.scaling.txt"].decode()
+    encoder = profile.units.encoder_counts_per_rev
+    assert encoder is not None
+    assert f"increments per feed unit: {encoder * 5 / 10000:.9g}" in text
+    assert f"encoder counts per revolution: {encoder}" in text
+    assert "direction (polarity) 607E:00" in text
+    assert "maximum torque 6072:00: 150" in text
+    assert "gear numerator 6091:01: 5" in text
+    # A list that leaves the gearing out states no scaling.
+    some = hand_over(content, profile, only=["6072:00"])
+    text = files_of(some, "csv", "list", None)["list.scaling.txt"].decode()
+    assert "increments per feed unit: not certain" in text
+    assert "gear numerator 6091:01: not handed over" in text
+
+
+def test_a_segment_is_one_file_or_one_for_each_drive() -> None:
+    axes = [axis_of("mms7"), axis_of("m6l")]
+    files = files_of(axes, "lcec", "list", None)
+    root = fromstring(files["list"])
+    check_lcec(root)
+    assert [e.get("idx") for e in root.iterfind("master/slave")] == ["0", "1"]
+    assert "lcec.0.drive2." in files["list.hal"].decode()
+    first = read_list(files["list"], axes[0].profile, slave=1)
+    assert [(w.index, w.subindex, w.data) for w in first.writes] == wire(axes[0])
+    with pytest.raises(BadSet, match="2 slaves"):
+        read_list(files["list"], axes[0].profile)
+    second = read_list(files_of(axes, "eni", "list", None)["list"], axes[1].profile, slave=2)
+    assert [(w.index, w.subindex, w.data) for w in second.writes] == wire(axes[1])
+    files = files_of(axes, "ros2", "list", None)
+    control = fromstring(files["list"])
+    assert [e.text for e in control.iterfind(".//param[@name='slave_config']")] == [
+        "list.1.yaml", "list.2.yaml",
+    ]  # fmt: skip
+    assert yaml.safe_load(files["list.2.yaml"])["sdo"]
+    with pytest.raises(NotAllowed, match="one drive"):
+        files_of(axes, "twincat", "list", None)
+
+
+def test_a_name_with_control_characters_makes_no_broken_file() -> None:
+    axis = replace(axis_of("mms7"), name="axis \x01\x0b <one> -- \n two")
+    for form in ("eni", "lcec", "ros2", "igh"):
+        files = files_of(axis, form, "list", None)  # type: ignore[arg-type]
+        assert read_list(files["list"], axis.profile).writes

@@ -606,6 +606,88 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/handover": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Export Handover
+         * @description Make the files for the machine's controller and note it for the report.
+         *
+         *     Nothing is written to the drive.
+         */
+        post: operations["export_handover"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/handover/compare": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Compare Handover
+         * @description What the controller will write: drive now, our set and its list. Nothing is changed.
+         */
+        post: operations["compare_handover"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/handovers": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Handovers
+         * @description Earlier hand-overs of a drive, newest first.
+         */
+        get: operations["list_handovers"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/handovers/{number}/changes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Changes Since
+         * @description What the drive holds other than it was handed over; it is read now.
+         */
+        get: operations["changes_since"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/homing-methods": {
         parameters: {
             query?: never;
@@ -4767,24 +4849,197 @@ export interface components {
             title: string;
         };
         /**
-         * Harmonic
-         * @description Torque that repeats ``order_per_rev`` times per motor revolution.
-         *
-         *     Torque = ``amplitude_percent`` · sin(order · angle + ``phase_deg``), by the angle that the
-         *     drive reports (6064h).
+         * HandedOverInfo
+         * @description An earlier hand-over of a drive.
          */
-        Harmonic: {
-            /** Amplitude Ci95 Percent */
-            amplitude_ci95_percent: [
-                number,
-                number
-            ];
-            /** Amplitude Percent */
-            amplitude_percent: number;
-            /** Order Per Rev */
-            order_per_rev: number;
-            /** Phase Deg */
-            phase_deg: number;
+        HandedOverInfo: {
+            /** File */
+            file: string;
+            /** Format */
+            format: string;
+            /** Number */
+            number: number;
+            /** Person */
+            person: string;
+            /** Set File */
+            set_file: string;
+            /** Sha256 */
+            sha256: string;
+            /**
+             * Time
+             * Format: date-time
+             */
+            time: string;
+            /**
+             * Values
+             * @description how many
+             */
+            values: number;
+        };
+        /**
+         * HandoverChanges
+         * @description What the drive holds other than it was handed over; it was read now.
+         */
+        HandoverChanges: {
+            /** Changed */
+            changed: components["schemas"]["HandoverConflict"][];
+            /** Not Read */
+            not_read: string[];
+            /** Values */
+            values: number;
+        };
+        /**
+         * HandoverComparison
+         * @description Drive now, our set and the controller's list.
+         */
+        HandoverComparison: {
+            /** Conflicts */
+            conflicts: components["schemas"]["HandoverConflict"][];
+            /** Defects */
+            defects: components["schemas"]["HandoverDefect"][];
+            /** Format */
+            format: string;
+            /**
+             * Not Written
+             * @description of our set, not written by the controller
+             */
+            not_written: string[];
+            /**
+             * Restored
+             * @description changed in the drive; the controller writes ours
+             */
+            restored: string[];
+            /** Same */
+            same: number;
+            /**
+             * Unknown Here
+             * @description neither set nor drive gives a value
+             */
+            unknown_here: string[];
+        };
+        /**
+         * HandoverConflict
+         * @description A value that the controller writes, or that the drive has, other than ours; raw values.
+         */
+        HandoverConflict: {
+            /**
+             * Consequence
+             * @enum {string}
+             */
+            consequence: "motion" | "unit" | "limit" | "gain" | "other";
+            /** Controller */
+            controller: number | string | null;
+            /** Controller Value */
+            controller_value: number | string | null;
+            /** Drive */
+            drive: number | string | null;
+            /** Drive Value */
+            drive_value: number | string | null;
+            /** Key */
+            key: string;
+            /** Name */
+            name: string;
+            /** Ours */
+            ours: number | string | null;
+            /** Ours Value */
+            ours_value: number | string | null;
+            /** Sentence */
+            sentence: string;
+            /** Unit */
+            unit: string;
+        };
+        /**
+         * HandoverDefect
+         * @description A defect of a controller's list.
+         */
+        HandoverDefect: {
+            /** Key */
+            key: string;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "unknown" | "read_only" | "size" | "range" | "twice" | "order" | "state" | "energises" | "locks";
+            /** Place */
+            place: string;
+            /** Text */
+            text: string;
+        };
+        /**
+         * HandoverFile
+         * @description One file of a hand-over.
+         */
+        HandoverFile: {
+            /**
+             * Content
+             * @description base64
+             */
+            content: string;
+            /** Name */
+            name: string;
+            /** Sha256 */
+            sha256: string;
+        };
+        /**
+         * HandoverRequest
+         * @description Which values of a parameter set go into which controller's format.
+         */
+        HandoverRequest: {
+            /**
+             * Choice
+             * @default all
+             * @enum {string}
+             */
+            choice: "all" | "tuned" | "not_default";
+            /**
+             * Esi
+             * @description the drive's ESI file (base64), for an ENI that a master can run
+             */
+            esi?: string | null;
+            /**
+             * File
+             * @description name of the list to make
+             */
+            file: string;
+            /**
+             * Format
+             * @enum {string}
+             */
+            format: "twincat" | "codesys" | "eni" | "lcec" | "ros2" | "igh" | "dcf" | "csv" | "python";
+            /**
+             * Include Motor Individual
+             * @default false
+             */
+            include_motor_individual: boolean;
+            /**
+             * Only
+             * @default []
+             */
+            only: string[];
+            /**
+             * Set File
+             * @description parameter set of the library
+             */
+            set_file: string;
+            /**
+             * Version
+             * @description of the set; the latest if null
+             */
+            version?: number | null;
+        };
+        /**
+         * HandoverResult
+         * @description The files of a hand-over; the first one is the list.
+         */
+        HandoverResult: {
+            /** Files */
+            files: components["schemas"]["HandoverFile"][];
+            /** Left Out */
+            left_out: components["schemas"]["LeftOutRow"][];
+            /** Notes */
+            notes: string[];
+            /** Writes */
+            writes: number;
         };
         /**
          * Health
@@ -5619,6 +5874,16 @@ export interface components {
              * @constant
              */
             type: "lease";
+        };
+        /**
+         * LeftOutRow
+         * @description A row of the set that is not handed over, and why.
+         */
+        LeftOutRow: {
+            /** Key */
+            key: string;
+            /** Reason */
+            reason: string;
         };
         /**
          * LibraryChange
@@ -8976,7 +9241,14 @@ export type GenerateRequest = components['schemas']['GenerateRequest'];
 export type GrantView = components['schemas']['GrantView'];
 export type Guide = components['schemas']['Guide'];
 export type GuideStep = components['schemas']['GuideStep'];
-export type Harmonic = components['schemas']['Harmonic'];
+export type HandedOverInfo = components['schemas']['HandedOverInfo'];
+export type HandoverChanges = components['schemas']['HandoverChanges'];
+export type HandoverComparison = components['schemas']['HandoverComparison'];
+export type HandoverConflict = components['schemas']['HandoverConflict'];
+export type HandoverDefect = components['schemas']['HandoverDefect'];
+export type HandoverFile = components['schemas']['HandoverFile'];
+export type HandoverRequest = components['schemas']['HandoverRequest'];
+export type HandoverResult = components['schemas']['HandoverResult'];
 export type Health = components['schemas']['Health'];
 export type Hello = components['schemas']['Hello'];
 export type HistorySlot = components['schemas']['HistorySlot'];
@@ -9008,6 +9280,7 @@ export type LeaseHand = components['schemas']['LeaseHand'];
 export type LeaseNotice = components['schemas']['LeaseNotice'];
 export type LeaseOverride = components['schemas']['LeaseOverride'];
 export type LeaseTake = components['schemas']['LeaseTake'];
+export type LeftOutRow = components['schemas']['LeftOutRow'];
 export type LibraryChange = components['schemas']['LibraryChange'];
 export type LibraryEntry = components['schemas']['LibraryEntry'];
 export type LibraryPage = components['schemas']['LibraryPage'];
@@ -14369,6 +14642,580 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["GearWritten"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    export_handover: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["HandoverRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HandoverResult"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    compare_handover: {
+        parameters: {
+            query: {
+                /** @description name of the controller's list */
+                file: string;
+                /** @description our set */
+                set_file?: string | null;
+                /** @description of the set */
+                version?: number | null;
+                /** @description of several */
+                slave?: number | null;
+            };
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HandoverComparison"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    list_handovers: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HandedOverInfo"][];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    changes_since: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                number: number;
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HandoverChanges"];
                 };
             };
             /** @description Not a request of this interface */

@@ -3,6 +3,7 @@ import { bench } from './texts/bench'
 import { drive } from './texts/drive'
 import { frame } from './texts/frame'
 import { functions } from './texts/functions'
+import { handover } from './texts/handover'
 import { library } from './texts/library'
 import { notListed } from './texts/notlisted'
 import { motionClass } from './texts/motion-class'
@@ -27,6 +28,7 @@ export const catalogue = {
   ...axis,
   ...drive,
   ...functions,
+  ...handover,
   ...motionClass,
   ...parameters,
   ...people,

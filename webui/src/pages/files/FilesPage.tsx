@@ -8,6 +8,7 @@ import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import './files.css'
 import { type Filters, NO_FILTERS } from './filters'
+import { HandOver } from './HandOver'
 import { LibraryFilters } from './LibraryFilters'
 import { LibraryRow } from './LibraryRow'
 import { SaveSet, UploadSet } from './SetActions'
@@ -24,10 +25,14 @@ export function FilesPage() {
   const drive = useDrive(chosen ?? drives[0]?.id ?? null)
   const [comparing, setComparing] = useState<Side | null>(null)
   const changed = () => void refresh()
+  const [handing, setHanding] = useState<LibraryEntry | null>(null)
+  const handOver = (entry: LibraryEntry) => {
+    setHanding(entry)
+    toTop()
+  }
   const compare = (entry: LibraryEntry, version?: number) => {
     setComparing({ entry, version: version ?? null })
-    window.scrollTo({ top: 0 })
-    document.getElementById('main')?.scrollTo({ top: 0 })
+    toTop()
   }
   return (
     <div className="page">
@@ -40,6 +45,7 @@ export function FilesPage() {
           onChanged={changed}
         />
       )}
+      {handing && <HandOver key={handing.id} entry={handing} onClose={() => setHanding(null)} />}
       <Panel
         title={t('library.title')}
         tools={
@@ -70,6 +76,7 @@ export function FilesPage() {
             entry={entry}
             shared={shared}
             onCompare={compare}
+            onHandOver={handOver}
             onChanged={changed}
           />
         ))}
@@ -82,4 +89,9 @@ export function FilesPage() {
       </Panel>
     </div>
   )
+}
+
+function toTop(): void {
+  window.scrollTo({ top: 0 })
+  document.getElementById('main')?.scrollTo({ top: 0 })
 }

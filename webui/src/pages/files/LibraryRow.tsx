@@ -46,12 +46,14 @@ export function LibraryRow({
   entry,
   shared,
   onCompare,
+  onHandOver,
   onChanged,
 }: {
   entry: LibraryEntry
   /** Other stations may have the same library. */
   shared: boolean
   onCompare: (entry: LibraryEntry, version?: number) => void
+  onHandOver: (entry: LibraryEntry) => void
   onChanged: () => void
 }) {
   const t = useT()
@@ -126,6 +128,14 @@ export function LibraryRow({
                   onClick={() => onCompare(entry)}
                 >
                   {t('library.compare')}
+                </Button>
+              )}
+              {entry.kind === 'set' && (
+                <Button
+                  aria-label={t('handover.openNamed', { name })}
+                  onClick={() => onHandOver(entry)}
+                >
+                  {t('handover.open')}
                 </Button>
               )}
               {shared && entry.kind !== 'set' && entry.here && entry.station && (

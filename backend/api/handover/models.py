@@ -1,0 +1,115 @@
+"""Messages of the hand-over to a machine's controller."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from backend.api.models import Message, Raw
+
+FormatName = Literal["twincat", "codesys", "eni", "lcec", "ros2", "igh", "dcf", "csv", "python"]
+ConsequenceName = Literal["motion", "unit", "limit", "gain", "other"]
+DefectName = Literal[
+    "unknown", "read_only", "size", "range", "twice", "order", "state", "energises", "locks"
+]
+_MEGABYTES = 1 << 20
+
+
+class HandoverRequest(Message):
+    """Which values of a parameter set go into which controller's format."""
+
+    set_file: str = Field(max_length=200, description="parameter set of the library")
+    version: int | None = Field(default=None, ge=1, description="of the set; the latest if null")
+    format: FormatName
+    file: str = Field(pattern=r"^[\w][\w .\-]{0,100}$", description="name of the list to make")
+    choice: Literal["all", "tuned", "not_default"] = "all"
+    only: list[Annotated[str, Field(max_length=40)]] = Field(default=[], max_length=5000)
+    include_motor_individual: bool = False
+    esi: str | None = Field(
+        default=None, max_length=60 * _MEGABYTES,
+        description="the drive's ESI file (base64), for an ENI that a master can run",
+    )  # fmt: skip
+
+
+class HandoverFile(Message):
+    """One file of a hand-over."""
+
+    name: str
+    sha256: str
+    content: str = Field(description="base64")
+
+
+class LeftOutRow(Message):
+    """A row of the set that is not handed over, and why."""
+
+    key: str
+    reason: str
+
+
+class HandoverResult(Message):
+    """The files of a hand-over; the first one is the list."""
+
+    files: list[HandoverFile]
+    writes: int
+    left_out: list[LeftOutRow]
+    notes: list[str]
+
+
+class HandoverConflict(Message):
+    """A value that the controller writes, or that the drive has, other than ours; raw values."""
+
+    key: str
+    name: str
+    unit: str
+    controller: Raw | None
+    ours: Raw | None
+    drive: Raw | None
+    controller_value: Raw | None
+    ours_value: Raw | None
+    drive_value: Raw | None
+    consequence: ConsequenceName
+    sentence: str
+
+
+class HandoverDefect(Message):
+    """A defect of a controller's list."""
+
+    kind: DefectName
+    key: str
+    place: str
+    text: str
+
+
+class HandoverComparison(Message):
+    """Drive now, our set and the controller's list."""
+
+    format: str
+    conflicts: list[HandoverConflict]
+    defects: list[HandoverDefect]
+    not_written: list[str] = Field(description="of our set, not written by the controller")
+    restored: list[str] = Field(description="changed in the drive; the controller writes ours")
+    unknown_here: list[str] = Field(description="neither set nor drive gives a value")
+    same: int
+
+
+class HandedOverInfo(Message):
+    """An earlier hand-over of a drive."""
+
+    number: int
+    time: datetime
+    person: str
+    format: str
+    file: str
+    sha256: str
+    set_file: str
+    values: int = Field(description="how many")
+
+
+class HandoverChanges(Message):
+    """What the drive holds other than it was handed over; it was read now."""
+
+    changed: list[HandoverConflict]
+    not_read: list[str]
+    values: int

@@ -1,0 +1,222 @@
+"""Routes of the hand-over: export, comparison with a controller's list, what changed since."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import binascii
+from collections.abc import Collection, Mapping
+from datetime import UTC, datetime
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request
+
+from backend.api.context import TheBench, TheMember
+from backend.api.errors import NotFound
+from backend.api.handover.models import (
+    HandedOverInfo,
+    HandoverChanges,
+    HandoverComparison,
+    HandoverConflict,
+    HandoverDefect,
+    HandoverFile,
+    HandoverRequest,
+    HandoverResult,
+    LeftOutRow,
+)
+from backend.drive.drive import Drive
+from backend.handover.conflicts import Conflict, changed_since, compare
+from backend.handover.files import digest, files_of, remarks, with_controller
+from backend.handover.model import AxisHandover, hand_over
+from backend.handover.read import MAX_BYTES, read_list
+from backend.handover.record import HandedOver, HandoverLog
+from backend.parameters import set_file as parameter_set
+from backend.parameters.set_file import BadSet, ParameterSet
+from backend.people.identity import acting_person
+from backend.station.bench import Bench
+from drivers.errors import NotAllowed
+from profiles.schema import Profile, Raw
+
+router = APIRouter()
+
+
+def handover_log(bench: Bench) -> HandoverLog:
+    """What was handed over, drive by drive."""
+    return HandoverLog(bench.state_folder / "handovers")
+
+
+async def _set(bench: Bench, drive: Drive, file: str, version: int | None) -> ParameterSet:
+    """A set of the library that is of the drive's family."""
+    try:
+        data = await bench.records.store.call(bench.sets.read, file, version)
+    except BadSet:
+        raise
+    except NotAllowed as error:
+        if error.kind not in ("not-allowed", "not-found"):
+            raise
+        raise NotFound(error.message, value=file, remedy=error.remedy) from error
+    content = parameter_set.parse(data, file)
+    if content.profile != drive.profile.drive:
+        raise NotAllowed(
+            f"{file} is of a {content.profile} drive, {drive.name} is a {drive.profile.drive}",
+            drive=drive.name, value=file, remedy="choose a set of the same drive family",
+        )  # fmt: skip
+    return content
+
+
+@router.post("/drives/{drive_id}/handover", status_code=201)
+async def export_handover(
+    bench: TheBench, member: TheMember, request: HandoverRequest
+) -> HandoverResult:
+    """Make the files for the machine's controller and note it for the report.
+
+    Nothing is written to the drive.
+    """
+    drive = member.drive
+    content = await _set(bench, drive, request.set_file, request.version)
+    axis, files = await asyncio.to_thread(_made, content, drive.profile, request)
+    name = next(iter(files))
+    made = HandedOver(
+        datetime.now(UTC), acting_person(), request.format, name, digest(files[name]),
+        request.set_file, {write.key: write.raw for write in axis.writes},
+    )  # fmt: skip
+    await asyncio.to_thread(handover_log(bench).add, drive.id, made)
+    bench.journal.add(
+        f"{drive.name}: handed over {request.set_file} as {request.format}, {name}", drive=drive.id
+    )
+    return HandoverResult(
+        files=[
+            HandoverFile(
+                name=each, sha256=digest(data), content=base64.b64encode(data).decode("ascii")
+            )
+            for each, data in files.items()
+        ],
+        writes=len(axis.writes),
+        left_out=[LeftOutRow(key=each.key, reason=each.reason) for each in axis.left_out],
+        notes=[*axis.notes, *remarks([axis], request.format)],
+    )
+
+
+def _made(
+    content: ParameterSet, profile: Profile, request: HandoverRequest
+) -> tuple[AxisHandover, dict[str, bytes]]:
+    axis = hand_over(
+        content, profile, choice=request.choice, only=request.only,
+        motor_individual=request.include_motor_individual,
+    )  # fmt: skip
+    if request.esi is not None:
+        try:
+            data = base64.b64decode(request.esi, validate=True)
+        except binascii.Error as error:
+            raise BadSet("the ESI file is not base64", remedy="send it again") from error
+        axis = with_controller(axis, [(data, "the ESI file")])
+    return axis, files_of(axis, request.format, request.file, content.saved)
+
+
+@router.post(
+    "/drives/{drive_id}/handover/compare",
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {
+                "application/octet-stream": {"schema": {"type": "string", "format": "binary"}}
+            },
+        }
+    },
+)
+async def compare_handover(
+    bench: TheBench,
+    member: TheMember,
+    request: Request,
+    file: Annotated[str, Query(max_length=200, description="name of the controller's list")],
+    set_file: Annotated[str | None, Query(max_length=200, description="our set")] = None,
+    version: Annotated[int | None, Query(ge=1, description="of the set")] = None,
+    slave: Annotated[int | None, Query(ge=1, le=65535, description="of several")] = None,
+) -> HandoverComparison:
+    """What the controller will write: drive now, our set and its list. Nothing is changed."""
+    drive = member.drive
+    data = bytearray()
+    async for chunk in request.stream():
+        data += chunk
+        if len(data) > MAX_BYTES:
+            raise BadSet(f"{file} is larger than {MAX_BYTES} bytes", remedy="choose another file")
+    listed = await asyncio.to_thread(read_list, bytes(data), drive.profile, file, slave)
+    content = None if set_file is None else await _set(bench, drive, set_file, version)
+    ours = None if content is None else _raws(content)
+    now = await _now(drive, {write.key for write in listed.writes})
+    verdict = compare(drive.profile, listed, ours, now)
+    return HandoverComparison(
+        format=listed.format,
+        conflicts=[_conflict(drive.profile, each) for each in verdict.conflicts],
+        defects=[
+            HandoverDefect(kind=each.kind, key=each.key, place=each.place, text=each.text)
+            for each in verdict.findings
+        ],
+        not_written=list(verdict.not_written),
+        restored=list(verdict.restored),
+        unknown_here=list(verdict.unknown_here),
+        same=verdict.same,
+    )
+
+
+@router.get("/drives/{drive_id}/handovers")
+async def list_handovers(bench: TheBench, member: TheMember) -> list[HandedOverInfo]:
+    """Earlier hand-overs of a drive, newest first."""
+    made = await asyncio.to_thread(handover_log(bench).read, member.drive.id)
+    found = [
+        HandedOverInfo(
+            number=number, time=each.time, person=each.person, format=each.format,
+            file=each.file, sha256=each.sha256, set_file=each.set_file, values=len(each.values),
+        )
+        for number, each in enumerate(made, 1)
+    ]  # fmt: skip
+    return found[::-1]
+
+
+@router.get("/drives/{drive_id}/handovers/{number}/changes")
+async def changes_since(bench: TheBench, member: TheMember, number: int) -> HandoverChanges:
+    """What the drive holds other than it was handed over; it is read now."""
+    drive = member.drive
+    made = await asyncio.to_thread(handover_log(bench).read, drive.id)
+    if not 1 <= number <= len(made):
+        raise NotFound(f"{drive.name} has no hand-over {number}", value=number,
+                       remedy="choose one of the list")  # fmt: skip
+    ours = made[number - 1].values
+    now = await _now(drive, ours)
+    changed = changed_since(drive.profile, ours, now)
+    return HandoverChanges(
+        changed=[_conflict(drive.profile, each) for each in changed],
+        not_read=sorted(key for key in ours if now.get(key) is None),
+        values=len(ours),
+    )
+
+
+def _raws(content: ParameterSet) -> dict[str, Raw]:
+    return {row.key: row.raw for row in content.rows if row.raw is not None}
+
+
+async def _now(drive: Drive, keys: Collection[str]) -> Mapping[str, Raw | None]:
+    """What the drive holds of these; what it does not have is left out."""
+    known = [
+        key
+        for key in sorted(keys)
+        if (parameter := drive.profile.by_key.get(key)) is not None
+        and parameter.access != "wo"
+        and not drive.unreachable_why(parameter)
+    ]
+    read = await drive.read_many(known) if known else {}
+    return {key: reading.raw for key, reading in read.items()}
+
+
+def _conflict(profile: Profile, each: Conflict) -> HandoverConflict:
+    parameter = profile.by_key[each.key]
+
+    def value(raw: Raw | None) -> Raw | None:
+        return None if raw is None else parameter.to_value(raw)
+
+    return HandoverConflict(
+        key=each.key, name=each.name, unit=parameter.unit, controller=each.controller,
+        ours=each.ours, drive=each.drive, controller_value=value(each.controller),
+        ours_value=value(each.ours), drive_value=value(each.drive),
+        consequence=each.consequence, sentence=each.sentence,
+    )  # fmt: skip
