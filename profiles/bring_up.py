@@ -154,5 +154,7 @@ class BringUp(Frozen):
     def mode_pdos(self, sync_manager: int) -> tuple[int, ...]:
         """PDOs that `clock_mode` assigns to a sync manager; empty where it says nothing."""
         mode = self.clock_mode
-        found = (each.pdos for each in mode.pdos if each.sync_manager == sync_manager) if mode else ()
+        found = (
+            (each.pdos for each in mode.pdos if each.sync_manager == sync_manager) if mode else ()
+        )
         return next(iter(found), ())

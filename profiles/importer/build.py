@@ -368,9 +368,10 @@ def _contents_locked(description: Description) -> bool:
 
 
 def _sync_modes(description: Description) -> tuple[str, ...]:
-    """The operation modes of the file: those with an AssignActivate use distributed clocks."""
+    """As the operation modes of the file say: an AssignActivate means distributed clocks."""
     modes = description.bring_up.clock_modes if description.bring_up is not None else ()
-    return tuple(f"DC {m.name}" if m.assign_activate else f"SM {m.name}" for m in modes)
+    kinds = {"DC-synchronous" if mode.assign_activate else "SM-synchronous" for mode in modes}
+    return tuple(sorted(kinds))
 
 
 def _default(sets: list[PdoSet], direction: Literal["rx", "tx"]) -> int | None:

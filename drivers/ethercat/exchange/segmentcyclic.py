@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, motion_halted
-from drivers.ethercat.exchange.mapping import Pdo, StationPlan, plan_station
+from drivers.ethercat.exchange.bring_up import station_bring_up, to_wire
+from drivers.ethercat.exchange.mapping import Assigned, Entry, StationPlan, plan_station
 from drivers.ethercat.exchange.recovery import Recovery
 from drivers.ethercat.exchange.ring import VALID, RingReader, lost_flag
 from drivers.ethercat.exchange.samples import contiguous, fields_of
@@ -104,7 +105,7 @@ class EthercatCyclic:
             "cycle_ns": round(cycle_s * 1e9),
             "dc": True,
             "watchdog_ms": self._watchdog_ms,
-            "stations": {p.station: {"rx": _wire(p.rx), "tx": _wire(p.tx)} for p in plans},
+            "stations": {p.station: self._station_wire(p, round(cycle_s * 1e9)) for p in plans},
         }
         answer: Message = await self._host.call(message, _CONFIGURE_S)
         self._setup = message | {"identities": answer["identities"]}
@@ -112,6 +113,10 @@ class EthercatCyclic:
         self._fields = fields_of(plans)
         self.left_over = tuple(item for plan in plans for item in plan.left_over)
         return tuple(signal for plan in plans for signal in plan.mapped)
+
+    def _station_wire(self, plan: StationPlan, cycle_ns: int) -> Message:
+        rules = station_bring_up(self._profiles.get(plan.station), cycle_ns)
+        return {"rx": _wire(plan.rx), "tx": _wire(plan.tx), "bring_up": to_wire(rules)}
 
     async def start(self) -> None:
         """Go to Operational and exchange process data.
@@ -292,7 +297,14 @@ class EthercatCyclic:
     # Parts ---------------------------------------------------------------------------------
 
     async def _start(self) -> None:
-        await self._host.call({"op": "start"}, _START_S)
+        slowest_ms = max(
+            (
+                each["bring_up"]["safeop_op_ms"] or 0
+                for each in self._setup.get("stations", {}).values()
+            ),
+            default=0,
+        )
+        await self._host.call({"op": "start"}, max(_START_S, slowest_ms / 1000 + _ANSWER_S))
         ring = self._host.ring
         if ring is None:
             raise LinkLost("the EtherCAT process ended")
@@ -432,6 +444,13 @@ class EthercatCyclic:
             consumer.sequence += 1
 
 
-def _wire(pdo: Pdo) -> Message:
-    entries = [[e.index, e.subindex, e.size, e.code] for e in pdo.entries]
-    return {"index": pdo.index, "entries": entries, "write": pdo.write, "words": pdo.words}
+def _wire(assigned: Assigned) -> Message:
+    pdos = [
+        {"index": p.index, "entries": _listed(p.entries), "write": p.write, "words": p.words}
+        for p in assigned.pdos
+    ]
+    return {"pdos": pdos, "entries": _listed(assigned.entries), "assign": assigned.assign}
+
+
+def _listed(entries: tuple[Entry, ...]) -> list[list[object]]:
+    return [[e.index, e.subindex, e.size, e.code] for e in entries]
