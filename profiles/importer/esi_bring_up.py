@@ -167,9 +167,15 @@ class _Reader:
         if cycle is None and shift is None:
             return None
         length = whole_number(text_of(cycle) or "0", place, self._report) or 0
-        factor = whole_number(attribute_of(cycle, "Factor") or "1", place, self._report)
-        shift_ns = whole_number(text_of(shift) or "0", place, self._report) or 0
+        factor = self._signed(attribute_of(cycle, "Factor") or "1", place)
+        shift_ns = self._signed(text_of(shift) or "0", place) or 0
         return SyncSignal(cycle_ns=max(length, 0), factor=factor or 1, shift_ns=shift_ns)
+
+    def _signed(self, text: str, place: str) -> int | None:
+        """Factors and shifts may be negative (ETG.2000 table 38)."""
+        bare = text.strip()
+        number = whole_number(bare.removeprefix("-"), place, self._report)
+        return -number if number is not None and bare.startswith("-") else number
 
     def _timeouts(self) -> StateTimeouts:
         info = child(self._device, "Info")

@@ -18,6 +18,15 @@ def _scalar(index: int, name: str, kind: str, bits: int, access: str, mapping: s
     )
 
 
+RESOLUTION = (
+    "<DataType><Name>DT608F</Name><BitSize>80</BitSize>"
+    "<SubItem><SubIdx>0</SubIdx><Name>Number</Name><Type>USINT</Type><BitSize>8</BitSize>"
+    "<BitOffs>0</BitOffs></SubItem>"
+    "<SubItem><SubIdx>1</SubIdx><Name>Increments</Name><Type>UDINT</Type><BitSize>32</BitSize>"
+    "<BitOffs>16</BitOffs></SubItem>"
+    "<SubItem><SubIdx>2</SubIdx><Name>Revolutions</Name><Type>UDINT</Type><BitSize>32</BitSize>"
+    "<BitOffs>48</BitOffs></SubItem></DataType>"
+)
 OBJECTS = (
     _scalar(0x1000, "Device type", "UDINT", 32, "ro", default="92010200")
     + _scalar(0x2010, "Loop gain", "UINT", 16, "rw")
@@ -33,6 +42,13 @@ OBJECTS = (
     + _scalar(0x6071, "Target torque", "INT", 16, "rw", "R")
     + _scalar(0x6077, "Torque actual value", "INT", 16, "ro", "T")
     + _scalar(0x607A, "Target position", "DINT", 32, "rw", "R")
+    + "<Object><Index>#x608F</Index><Name>Encoder resolution</Name><Type>DT608F</Type>"
+    "<BitSize>80</BitSize><Info>"
+    "<SubItem><Name>Number</Name><Info><DefaultData>02</DefaultData></Info></SubItem>"
+    "<SubItem><Name>Increments</Name><Info><DefaultData>10270000</DefaultData></Info></SubItem>"
+    "<SubItem><Name>Revolutions</Name><Info><DefaultData>01000000</DefaultData></Info></SubItem>"
+    "</Info><Flags><Access>ro</Access></Flags></Object>"
+    + _scalar(0x6083, "Profile acceleration", "UDINT", 32, "rw")
     + _scalar(0x60A9, "SI unit velocity", "UDINT", 32, "rw", default="0047B400")
     + _scalar(0x60B1, "Velocity offset", "DINT", 32, "rw", "R")
     + _scalar(0x60C2, "Interpolation", "USINT", 8, "rw")
@@ -74,8 +90,14 @@ def command(transition: str, index: int, sub: int, data: str, comment: str = "")
     )
 
 
-def managers(out: str = "", into: str = "", *, box: int = 128, places: tuple[int, int] = (0x1200, 0x1500),
-             control: tuple[int, int] = (0x64, 0x20)) -> str:  # fmt: skip
+def managers(
+    out: str = "",
+    into: str = "",
+    *,
+    box: int = 128,
+    places: tuple[int, int] = (0x1200, 0x1500),
+    control: tuple[int, int] = (0x64, 0x20),
+) -> str:
     return (
         f'<Sm MinSize="64" MaxSize="256" DefaultSize="{box}" StartAddress="#x1000"'
         f' ControlByte="#x26" Enable="1">MBoxOut</Sm>'
@@ -111,7 +133,7 @@ def esi(
     return (
         '<?xml version="1.0"?><EtherCATInfo><Vendor><Id>#x00000A2B</Id><Name>Example</Name>'
         f"</Vendor><Descriptions><Devices><Device><Type ProductCode=\"#x190\" RevisionNo=\"#x2\">"
-        f"ES4</Type>{name}<Info>{info}</Info><Profile><Dictionary><DataTypes/><Objects>{OBJECTS}"
+        f"ES4</Type>{name}<Info>{info}</Info><Profile><Dictionary><DataTypes>{RESOLUTION}</DataTypes><Objects>{OBJECTS}"
         f"</Objects></Dictionary></Profile>{sms or managers()}{pdos}"
         f'<Mailbox DataLinkLayer="1"><CoE {coe}>{commands}</CoE>{box}</Mailbox>{dc}{chip}'
         "</Device></Devices></Descriptions></EtherCATInfo>"

@@ -21,7 +21,7 @@ from drivers.virtual.wires.ethercat.clock import WireClock
 from drivers.virtual.wires.ethercat.dictionary import CoeDictionary
 from drivers.virtual.wires.ethercat.registers import AlState
 from drivers.virtual.wires.ethercat.slave import Slave, SlaveIdentity
-from profiles.schema import PdoPart, PdoSet, PdoSpec, Profile
+from profiles.schema import Parameter, PdoPart, PdoSet, PdoSpec, Profile
 from tests.wire.ethercat_host.servo_device import ServoDevice, servo_profile
 from tests.wire.ethercat_slave.dictionary_device import _parameter
 from tests.wire.makers_files.samples import SAMPLES
@@ -197,6 +197,14 @@ class FileDevice(ServoDevice):
         self.file = file
         super().__init__(_profile(file))
 
+    def _put(self, index: int, value: float) -> None:
+        """Speeds in rpm (60A9h of the files), 10000 increments per revolution (608Fh)."""
+        super()._put(index, value * 60 / 10_000 if index == 0x606C else value)
+
+    def _get(self, index: int) -> int:
+        value = super()._get(index)
+        return value * 10_000 // 60 if index == 0x60FF else value
+
     def map_process_data(self, entries: Sequence[int], direction: str) -> _Image:  # type: ignore[override]
         for word in entries:
             if word >> 16 == 0:
@@ -205,6 +213,23 @@ class FileDevice(ServoDevice):
             if known.pdo not in (direction, "rxtx"):
                 raise SdoAbort(ABORT_NOT_MAPPABLE)
         return _Image(self, entries)
+
+
+def _record(file: File, item: Element) -> list[Parameter]:
+    """The entries of a record, by its data type."""
+    name = item.findtext("Type")
+    types = file.device.iterfind("Profile/Dictionary/DataTypes/DataType")
+    members = next(t for t in types if t.findtext("Name") == name).findall("SubItem")
+    values = [i.findtext("Info/DefaultData") or "" for i in item.iterfind("Info/SubItem")]
+    return [
+        _parameter(
+            f"{number(item.findtext('Index')):04X}:{number(member.findtext('SubIdx')):02X}",
+            _BASE[member.findtext("Type") or ""],  # type: ignore[arg-type]
+            item.findtext("Flags/Access") or "ro",
+            default=int.from_bytes(bytes.fromhex(value), "little"),
+        )
+        for member, value in zip(members, values, strict=True)
+    ]
 
 
 def _profile(file: File) -> Profile:
@@ -223,6 +248,9 @@ def _profile(file: File) -> Profile:
         for key, p in identity.items()
     ]
     for item in file.device.iterfind("Profile/Dictionary/Objects/Object"):
+        if (item.findtext("Type") or "").startswith("DT"):
+            parameters += _record(file, item)
+            continue
         mapping = (item.findtext("Flags/PdoMapping") or "").replace("R", "rx").replace("T", "tx")
         data = bytes.fromhex(item.findtext("Info/DefaultData") or "")
         parameters.append(
