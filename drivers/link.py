@@ -137,6 +137,18 @@ class NeedsProfile(Protocol):
 
 
 @runtime_checkable
+class RecordsFrames(Protocol):
+    """A link that keeps the last minute of its frames."""
+
+    async def flight(self, station: int | None = None) -> bytes:
+        """The frames as a pcapng file; of one station only what has to do with it.
+
+        Raises:
+            LinkLost: nothing is being recorded.
+        """
+
+
+@runtime_checkable
 class TellsUnreachable(Protocol):
     """A link that knows, without asking the drive, which objects it cannot carry."""
 

@@ -77,6 +77,7 @@ _PARTS = (
     routes_drive,
     routes_owed,
     routes_ethercat,
+    routes_flight,
     routes_lists,
     routes_sets,
     routes_description,

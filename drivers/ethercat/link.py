@@ -21,6 +21,7 @@ from drivers.ethercat.process.survey import ExchangeFigures, Survey, exchange_fr
 from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.information import EntryDescription, ObjectInfo
 from drivers.ethercat.wire.listing import Item, fitted, object_of, read_list
+from drivers.flight.segment import SegmentRecorder
 from drivers.link import Address, Cyclic, Found, LinkEvent, LinkQuality, Progress, Unsubscribe
 from profiles.schema import LinkKind, Profile
 
@@ -62,7 +63,10 @@ class EthercatLink:
         self._host = HostProcess(
             interface, launcher, self._received, self._restarted, _options(lockstep)
         )
-        self.process_data = EthercatCyclic(self._host, self._profiles, self._exchange_changed)
+        self.recorder = SegmentRecorder(interface, launcher)
+        self.process_data = EthercatCyclic(
+            self._host, self._profiles, self._exchange_changed, self.recorder.note
+        )
         self.cyclic: Cyclic | None = self.process_data
 
     # Link ----------------------------------------------------------------------------------
@@ -77,11 +81,13 @@ class EthercatLink:
         """
         require_ethercat(self.interface)
         await self._host.start()
+        await self.recorder.start()
 
     async def close(self) -> None:
         """Brake, leave OP, end the host. Calling again does nothing."""
         await self.process_data.close()
         await self._host.stop()
+        await self.recorder.stop()
 
     async def scan(self, progress: Progress, stations: Sequence[int] | None = None) -> list[Found]:
         """Search the segment: every drive is reset to PREOP and identified.
@@ -267,6 +273,10 @@ class EthercatLink:
         state: str = answer["state"]
         return state
 
+    async def flight(self, station: int | None = None) -> bytes:
+        """See `drivers.link.RecordsFrames`."""
+        return await self.recorder.file(station)
+
     def permissions(self) -> permissions.Permissions:
         """What is missing on the interface, with the commands that grant it."""
         return permissions.check(self.interface)
@@ -308,6 +318,7 @@ class EthercatLink:
             self._tell(LinkEvent("back", station, f"station {station} is in OP again, disabled"))
 
     def _tell(self, event: LinkEvent) -> None:
+        self.recorder.note(f"{event.kind}: {event.text}", event.station)
         for listener in tuple(self._listeners):
             listener(event)
 

@@ -87,6 +87,7 @@ _API: dict[str, Need] = {
     "POST /buses/cyclic": _STATION_BUS,
     "DELETE /buses/cyclic": _STATION_BUS,
     "DELETE /buses": _STATION,
+    "GET /buses/flight": _LOOK,
     "POST /scan": _STATION_BUS,
     "POST /search-line": _STATION,
     "POST /descriptions": Need(Right.STATION, body_bytes=_FILE),

@@ -51,8 +51,13 @@ class EthercatCyclic:
         host: HostProcess,
         profiles: Mapping[int, Profile],
         tell: Callable[[str, bool], None],
+        note: Callable[[str, int | None], None] = lambda _text, _station: None,
     ) -> None:
-        """``tell`` gets a sentence when the exchange breaks off (False) or runs again (True)."""
+        """``tell`` gets a sentence when the exchange breaks off (False) or runs again (True).
+
+        ``note`` gets what is commanded, with its station, for the record of the bus.
+        """
+        self._note = note
         self._host = host
         self._tell = tell
         self._setup: Message = {}
@@ -150,6 +155,9 @@ class EthercatCyclic:
         """
         messages = [message_of(trajectory) for trajectory in trajectories]
         generation = self._generation
+        for each in trajectories:
+            values = f"{len(each.values)} values" if len(each.values) != 1 else "1 value"
+            self._note(f"setpoints: {values} for {each.target}", each.station)
         number: int = await self._host.call({"op": "play", "trajectories": messages}, _ANSWER_S)
         self._played |= {trajectory.station: generation for trajectory in trajectories}
         return number
@@ -217,6 +225,7 @@ class EthercatCyclic:
             NotAllowed: the drive has a fault, or its control word is not mapped.
         """
         message = {"op": "drive_to", "station": station, "goal": goal.name, "mode": mode}
+        self._note(f"power state {goal.name} is commanded", station)
         await self._host.call(message, _ANSWER_S)
 
     async def reset_fault(self, station: int) -> None:
