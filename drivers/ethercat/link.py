@@ -12,7 +12,10 @@ from typing import Any
 
 from drivers import cia402
 from drivers.computer.sockets import require_ethercat
+from drivers.doctor.diagnosis import Cause, diagnose
+from drivers.doctor.evidence import Evidence
 from drivers.errors import DriveError, NotAllowed
+from drivers.ethercat.doctor import evidence_of
 from drivers.ethercat.exchange.segmentcyclic import EthercatCyclic
 from drivers.ethercat.process import firmware, permissions
 from drivers.ethercat.process.hostprocess import HostProcess
@@ -272,6 +275,25 @@ class EthercatLink:
         answer: Message = await self._call(message, _FOE_S, progress=progress)
         state: str = answer["state"]
         return state
+
+    async def diagnose(
+        self, station: int, refusal: DriveError | None = None
+    ) -> tuple[Evidence, tuple[Cause, ...]]:
+        """Facts of a station as it is now, and the causes that fit, the likeliest first.
+
+        ``refusal`` is what a start of the exchange raised. Reads registers and objects only.
+
+        Raises:
+            LinkLost: the host or the interface is gone, or there is no such station.
+        """
+        facts: Message = await self._call({"op": "examine", "station": station}, _SCAN_S)
+        stations = (await self.survey()).stations
+        aliases = [each.alias for each in stations if each.station != station]
+        figures = self.exchange
+        if figures is not None:
+            facts |= {"wkc": figures.last_wkc, "planned_wkc": figures.expected_wkc}
+        found = evidence_of(facts, self._profiles.get(station), refusal, aliases)
+        return found, diagnose(found)
 
     async def flight(self, station: int | None = None) -> bytes:
         """See `drivers.link.RecordsFrames`."""

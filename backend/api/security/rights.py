@@ -94,6 +94,7 @@ _API: dict[str, Need] = {
     "POST /descriptions/devices": Need(Right.STATION, body_bytes=_FILE),
     "POST /descriptions/from-drive": _STATION,
     "GET /ethercat/segment": _LOOK,
+    "GET /ethercat/doctor": _LOOK,
     "GET /ethercat/permissions": _LOOK,
     "POST /ethercat/counters/clear": _STATION_BUS,
     "POST /ethercat/alias": _STATION_BUS,

@@ -80,6 +80,10 @@ class Exchange:
             ],
         }
 
+    def planned(self, number: int) -> StationSetup | None:
+        """What was last to be set up at a station, also where that was refused."""
+        return self._preparation.planned(number)
+
     # Start and stop ------------------------------------------------------------------------
 
     def start(self, done: Done) -> None:

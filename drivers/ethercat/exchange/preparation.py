@@ -56,6 +56,10 @@ class Preparation:
         self._cycle_ns = 1_000_000
         self._dc = False
 
+    def planned(self, number: int) -> StationSetup | None:
+        """What was last to be set up at a station."""
+        return self._setups.get(number)
+
     def identify(self, stations: Sequence[Station]) -> None:
         """Identify all stations after a search, which leaves those that can in PREOP."""
         jobs = {s.number: identify(s, time.monotonic) for s in stations}
