@@ -10,7 +10,7 @@ import typer
 
 from backend.commands.options import Json, Profile, Server, Url, server_for
 from backend.commands.session import opened, run, show_progress
-from backend.station.matching import profile_for
+from backend.station.matching import match_profiles
 from drivers.doctor.diagnosis import Cause
 from drivers.errors import DriveError, NotAllowed
 from drivers.ethercat.link import EthercatLink
@@ -70,8 +70,9 @@ async def _here(
     for each in found:
         if station not in (None, each.station):
             continue
-        known = load_profile(profile) if profile else profile_for(link.kind, each)
-        link.know(each.station, known)
+        known = match_profiles(link.kind, each)
+        best = known[0].profile if known else None
+        link.know(each.station, load_profile(profile) if profile else best)
         results.append(await examined(link, each.station))
     return results
 
