@@ -20,7 +20,7 @@ from backend.restore.store import Pending
 from backend.station.matching import match_profiles, profile_for
 from backend.work.jobs import Progress
 from drivers.errors import DriveError, NotAllowed
-from drivers.link import Found, Link, NeedsProfile
+from drivers.link import Found, Link
 from drivers.urls import link_for
 from profiles.loader import ProfileError
 
@@ -157,8 +157,7 @@ async def drive_and_pending(
                 remedy="check power, cable, station address, baud rate and parity",
             )
         facts, spec = profile_for(link.kind, profile or _recognise(link, found))
-        if isinstance(link, NeedsProfile):
-            link.configure_station(station, facts)
+        link.attach(station, facts)
         drive = Drive(
             f"{facts.drive}-{station}",
             f"{facts.drive} station {station}",
