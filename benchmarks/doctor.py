@@ -63,11 +63,11 @@ def _also(first: Prepare, second: Prepare) -> Prepare:
 
 def _with(profile: Profile, **changes: object) -> Profile:
     fields = {name: getattr(profile, name) for name in Profile.model_fields}
-    return Profile(**(fields | changes))  # type: ignore[arg-type]
+    return Profile(**(fields | changes))
 
 
 def _rules(**rules: object) -> Change:
-    return lambda p: _with(p, bring_up=BringUp(source="injected", **rules))  # type: ignore[arg-type]
+    return lambda p: _with(p, bring_up=BringUp(source="injected", **rules))
 
 
 def _identity(**other: int) -> Change:
@@ -89,7 +89,7 @@ CASES: tuple[Case, ...] = (
     Case("mapping_locked", "mapping written, drive's is fixed", "real", drive="fixed"),
     Case("cycle_refused", "SYNC0 of 40 ms", "real",
          change=_rules(clock_modes=(ClockMode(name="DC", assign_activate=0x300,
-                                              sync0={"cycle_ns": 40_000_000}),))),  # type: ignore[arg-type]
+                                              sync0={"cycle_ns": 40_000_000}),))),
     Case("other_product", "profile of another product", "real", _refusing("SAFEOP", 0x1D),
          _identity(product_code=0x9999)),
     Case("other_product", "profile of another maker", "real", _refusing("SAFEOP", 0x1E),
@@ -138,7 +138,7 @@ async def first_cause(namespace: Namespace, case: Case) -> str:
         await link.open()
         try:
             await link.scan(lambda _share, _text: None)
-            link.know(1, case.change(servo_profile()))
+            link.attach(1, case.change(servo_profile()))
             case.prepare(segment)
             result = await examined(link, 1)
         finally:

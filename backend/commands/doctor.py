@@ -72,7 +72,9 @@ async def _here(
             continue
         known = match_profiles(link.kind, each)
         best = known[0].profile if known else None
-        link.know(each.station, load_profile(profile) if profile else best)
+        chosen = load_profile(profile) if profile else best
+        if chosen is not None:
+            link.attach(each.station, chosen)
         results.append(await examined(link, each.station))
     return results
 

@@ -80,7 +80,7 @@ OUTPUTS = [signal(0x6060, "INT8"), signal(0x607A, "INT32"), signal(0x60FF, "INT3
 @pytest.mark.parametrize("name", SAMPLES)
 async def test_from_the_file_to_process_data(namespace: Namespace, name: str) -> None:
     async with brought(namespace, name) as (link, segment):
-        link.know(1, profile_of(name))
+        link.attach(1, profile_of(name))
         cyclic = link.process_data
         taken = await cyclic.configure(INPUTS, OUTPUTS, 0.001)
         assert {s.channel for s in taken} >= {"6041", "6064", "607A", "6060"}
@@ -117,7 +117,7 @@ async def test_jog_with_the_file_alone(namespace: Namespace, name: str) -> None:
     """60 rpm are one revolution, 10000 increments by 608Fh of the file, in a second."""
     profile = profile_of(name)
     async with brought(namespace, name) as (link, segment):
-        link.know(1, profile)
+        link.attach(1, profile)
         spec = profile.link("ethercat")
         assert spec is not None
         axis = Axis(Drive("x", "X", profile, [Port(link, 1, spec)]))
