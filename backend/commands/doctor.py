@@ -13,7 +13,7 @@ from backend.commands.session import opened, run, show_progress
 from backend.station.matching import match_profiles
 from drivers.doctor.diagnosis import Cause
 from drivers.errors import DriveError, NotAllowed
-from drivers.ethercat.link import EthercatLink
+from drivers.ethercat.link import EthercatLink, segment_of
 from drivers.link import Address, CyclicSignal
 from profiles import load_profile
 
@@ -39,13 +39,14 @@ def doctor(
             results = await _by_server(at, url, station)
         else:
             async with opened(url) as link:
-                if not isinstance(link, EthercatLink):
+                segment = segment_of(link)
+                if segment is None:
                     raise NotAllowed(
                         f"{url}: the doctor knows EtherCAT only",
                         value=url,
                         remedy="for other buses see the notes of `servodeck scan`",
                     )
-                results = await _here(link, station, profile)
+                results = await _here(segment, station, profile)
         _show(results, as_json=as_json)
         return all(each["reached"] for each in results)
 

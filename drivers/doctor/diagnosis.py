@@ -78,7 +78,7 @@ def diagnose(evidence: Evidence) -> tuple[Cause, ...]:
 Sign = tuple[str, int, Fact]
 _Rule = Callable[[Evidence], Iterator[Sign]]
 
-_BY_AL_CODE: dict[int, str] = {
+AL_CAUSES: dict[int, str] = {
     0x0002: "restart_needed", 0x0003: "modules_differ", 0x0004: "process_data_setup",
     0x0006: "eeprom_damaged", 0x0014: "no_firmware", 0x0015: "mailbox_setup",
     0x0016: "mailbox_setup", 0x0017: "process_data_setup", 0x0018: "no_outputs",
@@ -111,7 +111,7 @@ def _al_status(e: Evidence) -> Iterator[Sign]:
     fact = Fact("al_status", e.al_code, 0)
     if e.al_code >= 0x8000:
         yield "makers_code", 3, fact
-    elif cause := _BY_AL_CODE.get(e.al_code):
+    elif cause := AL_CAUSES.get(e.al_code):
         yield cause, 3, fact
 
 

@@ -293,10 +293,14 @@ class EthercatLink:
         ``refusal`` is what a start of the exchange raised. Reads registers and objects only.
 
         Raises:
-            LinkLost: the host or the interface is gone, or there is no such station.
+            LinkLost: the host or the interface is gone.
         """
-        facts: Message = await self._call({"op": "examine", "station": station}, _SCAN_S)
         stations = (await self.survey()).stations
+        if all(each.station != station for each in stations):
+            # The search before the refusal did not find it.
+            found = Evidence(station=station, answers=False)
+            return found, diagnose(found)
+        facts: Message = await self._call({"op": "examine", "station": station}, _SCAN_S)
         aliases = [each.alias for each in stations if each.station != station]
         figures = self.exchange
         if figures is not None:

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from backend.api.context import TheBench
 from backend.api.errors import NotFound
 from drivers.doctor.diagnosis import Cause
-from drivers.ethercat.link import EthercatLink
+from drivers.ethercat.link import segment_of
 
 router = APIRouter()
 _OPERATIONAL = 8
@@ -55,8 +55,8 @@ async def ethercat_doctor(
 
     Reads registers and objects as they are now; changes no state.
     """
-    link = bench.buses.opened.get(url)
-    if not isinstance(link, EthercatLink):
+    link = segment_of(bench.buses.opened.get(url))
+    if link is None:
         raise NotFound(
             f"{url} is no opened EtherCAT bus", value=url, remedy="scan it on the Connect page"
         )
