@@ -29,9 +29,10 @@ def doctor(
     as_json: Json = False,
     server: Server = None,
 ) -> None:
-    """Take every drive of an EtherCAT bus to Operational, and say why where one refuses.
+    """Why a drive does not reach Operational. Nothing moves.
 
-    Nothing is enabled and nothing moves. Ends with 1 where a drive does not get there.
+    Takes every drive of an EtherCAT bus there, without enabling it. A running server says what it
+    sees as it is. Ends with 1 where a drive is not in Operational.
     """
 
     async def work() -> bool:
