@@ -22,6 +22,11 @@ COMMANDS = {
     "demo": ("start:demo", "Start the server on a bench of virtual drives: no hardware, no root."),
     "virtual": ("virtual:virtual", "Run one virtual drive on a real wire, for any client."),
     "scan": ("scan:scan", "Look for drives on a bus."),
+    "bus": ("bus:app", "What goes over the wires of a bus."),
+    "doctor": (
+        "doctor:doctor",
+        "Why a drive does not reach Operational. Nothing moves.",
+    ),
     "params": ("params:app", "Read and write parameters on a bus, or by a running server."),
     "jog": (
         "live:jog",

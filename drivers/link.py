@@ -179,6 +179,18 @@ class Link(Protocol):
         """Be told of events, on the event loop's thread."""
 
 
+@runtime_checkable
+class RecordsFrames(Protocol):
+    """A link that keeps the last minute of its frames."""
+
+    async def flight(self, station: int | None = None) -> bytes:
+        """The frames as a pcapng file; of one station only what has to do with it.
+
+        Raises:
+            LinkLost: nothing is being recorded.
+        """
+
+
 @dataclass(frozen=True, slots=True)
 class ScopeBlock:
     """A run of equally spaced samples.

@@ -19,6 +19,8 @@ def show(profile: Profile) -> dict[str, object]:
         "faults": [_fault(f) for f in profile.faults],
         "procedures": [p.model_dump(mode="json") for p in profile.procedures],
         "homing_methods": [m.model_dump(mode="json") for m in profile.homing_methods],
+        "pdo": None if profile.pdo is None else profile.pdo.model_dump(mode="json"),
+        "bring_up": None if profile.bring_up is None else profile.bring_up.model_dump(mode="json"),
         "quirks": [q.model_dump(mode="json") for q in profile.quirks],
     }
 

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from profiles.bring_up import BringUp
 from profiles.functions import Functions, referenced_keys
 from profiles.motion.rule import Motion, MotionOrigin, MotionRule
 from profiles.record import Frozen
@@ -554,6 +555,9 @@ class Profile(Frozen):
     terminals: tuple[IoTerminal, ...] = ()
     signals: tuple[Signal, ...] = ()
     pdo: PdoSpec | None = None
+    bring_up: BringUp | None = Field(
+        default=None, description="what the maker's file prescribes between Init and Operational"
+    )
     notch: NotchSpec | None = None
     stiffness: tuple[StiffnessTable, ...] = ()
     gains: GainSpec | None = None

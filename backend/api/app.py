@@ -42,7 +42,9 @@ from backend.api.sets import lists as routes_lists
 from backend.api.sets import routes as routes_sets
 from backend.api.spoken import Spoken
 from backend.api.station import description as routes_description
+from backend.api.station import doctor as routes_doctor
 from backend.api.station import ethercat as routes_ethercat
+from backend.api.station import flight as routes_flight
 from backend.api.station import routes as routes_bench
 from backend.api.tuning import measure as routes_tune
 from backend.functions.forcing import ForcingSessions
@@ -79,6 +81,8 @@ _PARTS = (
     routes_drive,
     routes_owed,
     routes_ethercat,
+    routes_doctor,
+    routes_flight,
     routes_lists,
     routes_sets,
     routes_handover,

@@ -91,6 +91,8 @@ def _fill(archive: zipfile.ZipFile, evidence: Evidence, folder: Path) -> None:
         archive.write(folder / "samples.csv", "samples.csv")
     for axis in evidence.axes:
         archive.writestr(f"parameters/{axis['drive']}.csv", _parameters(axis))
+    for name, data in evidence.frames.items():
+        archive.writestr(f"frames/{name}", data)
     facts = {
         "reason": evidence.reason,
         "time": evidence.time,

@@ -19,6 +19,7 @@ from backend.drive.readings import Reading
 from backend.recording import facts
 from backend.recording.bundle import build_apart
 from backend.recording.evidence import Evidence, Value
+from backend.recording.flight import flights
 from backend.recording.streams import describe_streams
 from backend.recording.writer import RESERVE_BYTES, free_bytes
 from backend.scope.hub import Subscription
@@ -242,6 +243,7 @@ class FaultCapture:
         blocks, values = [(tap, b) for _, tap, b in self._blocks], list(self._values)
         members = list(self._bench.members.values())
         states = [facts.state(member) for member in members]
+        frames = await flights(self._bench.buses.opened)
         clock = {"sample_s": time.monotonic(), "epoch_s": time.time()}
         rows, pasts = await asyncio.gather(
             asyncio.gather(
@@ -267,6 +269,7 @@ class FaultCapture:
             streams=describe_streams(self._bench, [(True, tap.channels) for tap in taps]),
             blocks=[(taps.index(tap), block) for tap, block in blocks if tap in taps],
             clock=clock,
+            frames=frames,
             names=self._names(values),
         )
 

@@ -34,5 +34,7 @@ class Evidence:
     streams: Sequence[dict[str, Any]]
     blocks: Sequence[tuple[int, ScopeBlock]]
     clock: dict[str, float]
+    frames: Mapping[str, bytes] = field(default_factory=dict)
+    """pcapng files of the opened buses, by the names they get in the bundle."""
     names: Mapping[tuple[str, str], str] = field(default_factory=dict)
     """What the values of the history are, by drive and key, with their units."""

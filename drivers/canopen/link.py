@@ -363,6 +363,10 @@ class CanopenLink:
             except LinkLost:
                 return  # the receiving thread is about to notice and tell of it
 
+    async def flight(self, station: int | None = None) -> bytes:
+        """See `drivers.link.RecordsFrames`."""
+        return await asyncio.to_thread(self._port.ring.file, station)
+
     def _event(self, event: LinkEvent) -> None:
         if event.station is None and event.kind in ("lost", "fault"):
             for channel in self._channels.values():
@@ -371,6 +375,7 @@ class CanopenLink:
         self._announce(event)
 
     def _announce(self, event: LinkEvent) -> None:
+        self._port.ring.note(f"{event.kind}: {event.text}", event.station)
         loop = self._loop
         if loop is not None and not loop.is_closed():
             loop.call_soon_threadsafe(self._tell, event)

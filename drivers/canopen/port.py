@@ -13,6 +13,7 @@ from drivers.canopen.frames import Frame
 from drivers.canopen.slcan import ERROR_BUS_OFF
 from drivers.canopen.url import CanUrl
 from drivers.errors import DriveError, LinkLost
+from drivers.flight.kinds import can_data, can_ring
 from drivers.link import LinkEvent
 
 _IDLE_S = 0.05
@@ -52,6 +53,7 @@ class CanPort:
         self._on_event = on_event
         self._on_idle = on_idle
         self._opener = opener
+        self.ring = can_ring(url.channel)
         self._bus: can.BusABC | None = None
         self._why: DriveError | None = None
         self._closing = threading.Event()
@@ -109,6 +111,8 @@ class CanPort:
                 self.lost_frames += 1
                 raise translate(self.url, error) from error
         self.sent += 1
+        data = can_data(frame.cob_id, frame.data, frame.remote)
+        self.ring.put(time.time_ns(), True, data)
 
     def _lost_error(self) -> LinkLost:
         why = self._why
@@ -138,6 +142,8 @@ class CanPort:
             elif not message.is_extended_id:
                 self.received += 1
                 frame = Frame(message.arbitration_id, bytes(message.data), message.is_remote_frame)
+                data = can_data(frame.cob_id, frame.data, frame.remote)
+                self.ring.put(time.time_ns(), False, data)
                 self._on_frame(frame, now_s)
 
     def _error_frame(self, message: can.Message) -> None:

@@ -13,8 +13,11 @@ from typing import Any
 from drivers import cia402
 from drivers.computer.sockets import require_ethercat
 from drivers.dictionary import Described, EntryDescription, ObjectInfo
+from drivers.doctor.diagnosis import Cause, diagnose
+from drivers.doctor.evidence import Evidence
 from drivers.errors import DriveError, NotAllowed
 from drivers.ethercat.bus import BUS
+from drivers.ethercat.doctor import evidence_of
 from drivers.ethercat.exchange.segmentcyclic import EthercatCyclic
 from drivers.ethercat.process import firmware, permissions
 from drivers.ethercat.process.hostprocess import HostProcess
@@ -22,6 +25,7 @@ from drivers.ethercat.process.protocol import Message
 from drivers.ethercat.process.survey import ExchangeFigures, Survey, exchange_from, survey_from
 from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.listing import Item, fitted, object_of, read_list
+from drivers.flight.segment import SegmentRecorder
 from drivers.link import Address, Cyclic, Found, Link, LinkEvent, LinkQuality, Progress, Unsubscribe
 from profiles.schema import LinkKind, Profile
 
@@ -64,7 +68,10 @@ class EthercatLink:
         self._host = HostProcess(
             interface, launcher, self._received, self._restarted, _options(lockstep)
         )
-        self.process_data = EthercatCyclic(self._host, self._profiles, self._exchange_changed)
+        self.recorder = SegmentRecorder(interface, launcher)
+        self.process_data = EthercatCyclic(
+            self._host, self._profiles, self._exchange_changed, self.recorder.note
+        )
         self.cyclic: Cyclic | None = self.process_data
 
     # Link ----------------------------------------------------------------------------------
@@ -79,11 +86,13 @@ class EthercatLink:
         """
         require_ethercat(self.interface)
         await self._host.start()
+        await self.recorder.start()
 
     async def close(self) -> None:
         """Brake, leave OP, end the host. Calling again does nothing."""
         await self.process_data.close()
         await self._host.stop()
+        await self.recorder.stop()
 
     async def scan(
         self,
@@ -274,6 +283,33 @@ class EthercatLink:
         state: str = answer["state"]
         return state
 
+    async def diagnose(
+        self, station: int, refusal: DriveError | None = None
+    ) -> tuple[Evidence, tuple[Cause, ...]]:
+        """Facts of a station as it is now, and the causes that fit, the likeliest first.
+
+        ``refusal`` is what a start of the exchange raised. Reads registers and objects only.
+
+        Raises:
+            LinkLost: the host or the interface is gone.
+        """
+        stations = (await self.survey()).stations
+        if all(each.station != station for each in stations):
+            # The search before the refusal did not find it.
+            found = Evidence(station=station, answers=False)
+            return found, diagnose(found)
+        facts: Message = await self._call({"op": "examine", "station": station}, _SCAN_S)
+        aliases = [each.alias for each in stations if each.station != station]
+        figures = self.exchange
+        if figures is not None:
+            facts |= {"wkc": figures.last_wkc, "planned_wkc": figures.expected_wkc}
+        found = evidence_of(facts, self._profiles.get(station), refusal, aliases)
+        return found, diagnose(found)
+
+    async def flight(self, station: int | None = None) -> bytes:
+        """See `drivers.link.RecordsFrames`."""
+        return await self.recorder.file(station)
+
     def permissions(self) -> permissions.Permissions:
         """What is missing on the interface, with the commands that grant it."""
         return permissions.check(self.interface)
@@ -315,6 +351,7 @@ class EthercatLink:
             self._tell(LinkEvent("back", station, f"station {station} is in OP again, disabled"))
 
     def _tell(self, event: LinkEvent) -> None:
+        self.recorder.note(f"{event.kind}: {event.text}", event.station)
         for listener in tuple(self._listeners):
             listener(event)
 

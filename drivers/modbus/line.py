@@ -16,6 +16,8 @@ from dataclasses import dataclass, replace
 from typing import NoReturn
 
 from drivers.errors import DriveError, LinkLost, LinkTimeout, ProtocolError, Rejected
+from drivers.flight.kinds import serial_ring
+from drivers.flight.serial import RecordedPort
 from drivers.link import LinkQuality
 from drivers.modbus.framing import (
     EXCEPTION_REMEDIES,
@@ -78,6 +80,7 @@ class Line:
         self._sleep = sleep
         self._opener = opener
         self._port: Port | None = None
+        self.ring = serial_ring(settings.device)
         self._parity: str = settings.parity
         self._counters: dict[int, Counters] = {}
         self._late: dict[int, LateAnswers] = {}
@@ -100,7 +103,7 @@ class Line:
         """
         if self._port is not None:
             return
-        self._port = self._opener(self.settings)
+        self._port = RecordedPort(self._opener(self.settings), self.ring)
         if is_pseudo_terminal(self.settings.device):
             self._parity = "none (pseudo-terminal)"
         self.echo = None

@@ -242,6 +242,10 @@ class RegisterLink:
 
         return unsubscribe
 
+    async def flight(self, station: int | None = None) -> bytes:
+        """See `drivers.link.RecordsFrames`."""
+        return await asyncio.to_thread(self._line.ring.file, station)
+
     # --- on the bus's thread ---
 
     def _read_turn(self, station: int, batch: _Batch) -> None:
@@ -318,6 +322,7 @@ class RegisterLink:
         return None
 
     def _changed(self, up: bool, text: str) -> None:
+        self._line.ring.note(text)
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._tell, up, text)
 

@@ -120,6 +120,7 @@ def build_profile(
         ),
         signals=tuple(s for s in base.signals if s.key in parameters),
         pdo=_pdo_spec(description, parameters, report),
+        bring_up=description.bring_up,
         chapters={description.file: "imported; not checked against a manual"},
     )
     return ImportedProfile(classified(profile), report)
@@ -354,9 +355,23 @@ def _pdo_spec(
         default_tx=default_tx,
         max_entries=max(8, *(len(s.layout or s.entries) for s in sets)),
         max_bytes=8 if description.link == "canopen" else None,
-        remappable=not all(s.fixed for s in sets),
+        remappable=not all(s.fixed for s in sets) and not _contents_locked(description),
+        sync_modes=_sync_modes(description),
         source=description.file,
     )
+
+
+def _contents_locked(description: Description) -> bool:
+    """Whether the file says in so many words that mapping objects cannot be written."""
+    rules = description.bring_up
+    return rules is not None and rules.coe.pdo_config is False
+
+
+def _sync_modes(description: Description) -> tuple[str, ...]:
+    """As the operation modes of the file say: an AssignActivate means distributed clocks."""
+    modes = description.bring_up.clock_modes if description.bring_up is not None else ()
+    kinds = {"DC-synchronous" if mode.assign_activate else "SM-synchronous" for mode in modes}
+    return tuple(sorted(kinds))
 
 
 def _default(sets: list[PdoSet], direction: Literal["rx", "tx"]) -> int | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from profiles.bring_up import BringUp
 from profiles.schema import Access, DataType, LinkKind, PdoMapping, Raw
 
 MAX_ENTRIES = 20_000
@@ -67,5 +68,6 @@ class Description:
     pdos: tuple[DescribedPdo, ...] = ()
     complete_access: bool = False
     foe: bool = False
+    bring_up: BringUp | None = None
     baudrates: tuple[int, ...] = ()
     """Bit rates of a CANopen drive in bit/s."""

@@ -19,6 +19,7 @@ from profiles.importer.description import (
     DescribedPdo,
     Description,
 )
+from profiles.importer.esi_bring_up import read_bring_up
 from profiles.importer.esi_pdo import PdoReader
 from profiles.importer.esi_types import EsiTypes, Member
 from profiles.importer.report import ImportFailed, ImportReport
@@ -107,6 +108,7 @@ def read_device(file: EsiFile, device: int = 0) -> Description:
         pdos=tuple(pdos),
         complete_access=flag_of(mailbox, "CompleteAccess"),
         foe=child(child(element, "Mailbox"), "FoE") is not None,
+        bring_up=read_bring_up(element, name, file.report),
     )
 
 

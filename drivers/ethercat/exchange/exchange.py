@@ -9,15 +9,21 @@ from collections.abc import Sequence
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
 from drivers.ethercat.exchange import setup as setup_
+from drivers.ethercat.exchange.bring_up import BEFORE_OP, send_commands, timeout_s
 from drivers.ethercat.exchange.cyclic import CyclicLoop, Image, layout, percentile_us
 from drivers.ethercat.exchange.preparation import Preparation, Report
 from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.exchange.setup import Snapshot, StationSetup
 from drivers.ethercat.process.protocol import Message
 from drivers.ethercat.process.segment import Segment
-from drivers.ethercat.process.station import Station, al_status, change_state
+from drivers.ethercat.process.station import (
+    STATE_TIMEOUT_S,
+    Station,
+    al_status,
+    change_state,
+)
 from drivers.ethercat.wire.al_status import ERROR_BIT, AlState
-from drivers.ethercat.wire.lanes import Done, Lanes
+from drivers.ethercat.wire.lanes import Done, LaneName, Lanes
 from drivers.ethercat.wire.steps import Pause, Steps
 from drivers.halt import HaltCause, Halted
 from drivers.motion.playback import AxisLoop
@@ -75,6 +81,10 @@ class Exchange:
             ],
         }
 
+    def planned(self, number: int) -> StationSetup | None:
+        """What was last to be set up at a station, also where that was refused."""
+        return self._preparation.planned(number)
+
     # Start and stop ------------------------------------------------------------------------
 
     def start(self, done: Done) -> None:
@@ -113,7 +123,13 @@ class Exchange:
             return reached
 
         for number in self.setups:
-            self._lanes.submit(number, "register", self._to_op(number), one(number))
+            # Commands before OP travel by the mailbox, which only its own lane may use.
+            lane: LaneName = "mailbox" if self._has_commands(number) else "register"
+            self._lanes.submit(number, lane, self._to_op(number), one(number))
+
+    def _has_commands(self, number: int) -> bool:
+        commands = self.setups[number].bring_up.commands
+        return any(command.transition in BEFORE_OP for command in commands)
 
     def _to_op(self, number: int) -> Steps[None]:
         yield Pause(_SETTLE_DC_S if self._dc else _SETTLE_S)
@@ -121,16 +137,20 @@ class Exchange:
 
     def _enter_op(self, station: Station) -> Steps[None]:
         """To OP; once more where data or SYNC0 just stayed away: a computer may stall for 50 ms."""
+        setup = self.setups[station.number]
+        if setup.rules is not None and self._has_commands(station.number):
+            yield from send_commands(station, setup.rules, BEFORE_OP)
+        limit_s = timeout_s(setup.rules, STATE_TIMEOUT_S[AlState.OP])
         for _ in range(_OP_TRIES - 1):
             try:
-                yield from change_state(station, AlState.OP, time.monotonic)
+                yield from change_state(station, AlState.OP, time.monotonic, limit_s)
             except NotAllowed:
                 if station.al_code not in _NOT_YET:
                     raise
                 yield Pause(_OP_PAUSE_S)
             else:
                 return
-        yield from change_state(station, AlState.OP, time.monotonic)
+        yield from change_state(station, AlState.OP, time.monotonic, limit_s)
 
     def stop(self, done: Done) -> None:
         """Brake what moves, disable, leave OP, then end the exchange."""

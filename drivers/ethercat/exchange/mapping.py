@@ -11,9 +11,15 @@ from dataclasses import dataclass
 
 from drivers.codec import size_of
 from drivers.errors import NotAllowed
+from drivers.ethercat.exchange.assignment import (
+    AssignmentRules,
+    Direction,
+    assignment_rules,
+    choose_fixed,
+)
 from drivers.link import Address, CyclicSignal
 from drivers.motion.setpoints import TARGETS
-from profiles.schema import Parameter, PdoPart, PdoSet, PdoSpec, Profile
+from profiles.schema import Parameter, PdoPart, PdoSet, Profile
 
 CONTROL_WORD = Address(0x6040, 0, "UINT16")
 STATUS_WORD = Address(0x6041, 0, "UINT16")
@@ -59,9 +65,52 @@ class Pdo:
         return self.words or tuple(entry.word for entry in self.entries)
 
     @property
+    def ragged(self) -> bool:
+        """Whether it does not end at a byte."""
+        return sum(word & 0xFF for word in self.mapping_words) % 8 != 0
+
+    @property
     def size(self) -> int:
         """Bytes."""
         return sum(entry.size for entry in self.entries)
+
+
+@dataclass(frozen=True, slots=True)
+class Assigned:
+    """All PDOs of one direction in their order, and what they carry byte by byte.
+
+    ``assign`` is False where the drive's assignment cannot be written: it has these by itself.
+    """
+
+    pdos: tuple[Pdo, ...]
+    entries: tuple[Entry, ...]
+    assign: bool = True
+
+    @property
+    def index(self) -> int:
+        """The PDO that is written, else the first one."""
+        written = (pdo.index for pdo in self.pdos if pdo.write)
+        return next(written, self.pdos[0].index)
+
+    @property
+    def write(self) -> bool:
+        """Whether a mapping object is written."""
+        return any(pdo.write for pdo in self.pdos)
+
+    @property
+    def mapping_words(self) -> tuple[int, ...]:
+        """What the mapping objects hold, one after the other."""
+        return tuple(word for pdo in self.pdos for word in pdo.mapping_words)
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return sum(entry.size for entry in self.entries)
+
+
+def alone(pdo: Pdo) -> Assigned:
+    """One PDO for a direction."""
+    return Assigned((pdo,), pdo.entries)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +118,8 @@ class StationPlan:
     """Process data of one station, and what of the wish is in them."""
 
     station: int
-    rx: Pdo
-    tx: Pdo
+    rx: Assigned
+    tx: Assigned
     mapped: tuple[CyclicSignal, ...]
     left_over: tuple[tuple[CyclicSignal, str], ...]
     """Signals for polling, each with the reason in words."""
@@ -108,13 +157,13 @@ def _with_signals(
     station: int,
     inputs: Sequence[CyclicSignal],
     outputs: Sequence[CyclicSignal],
-    rx: tuple[Pdo, dict[tuple[int, int], str]],
-    tx: tuple[Pdo, dict[tuple[int, int], str]],
+    rx: tuple[Assigned, dict[tuple[int, int], str]],
+    tx: tuple[Assigned, dict[tuple[int, int], str]],
 ) -> StationPlan:
     mapped: list[CyclicSignal] = []
     left: list[tuple[CyclicSignal, str]] = []
-    for signals, (pdo, reasons) in ((inputs, tx), (outputs, rx)):
-        present = {(entry.index, entry.subindex) for entry in pdo.entries if entry.code != "x"}
+    for signals, (taken, reasons) in ((inputs, tx), (outputs, rx)):
+        present = {(entry.index, entry.subindex) for entry in taken.entries if entry.code != "x"}
         for signal in signals:
             place = (signal.address.index or 0, signal.address.subindex)
             if place in present:
@@ -125,43 +174,87 @@ def _with_signals(
 
 
 def _direction(
-    station: int, direction: str, wish: Sequence[Address], needed: int, profile: Profile | None
-) -> tuple[Pdo, dict[tuple[int, int], str]]:
-    spec = profile.pdo if profile is not None else None
-    if spec is not None and spec.free_set("rx" if direction == "rx" else "tx") is None:
-        return _fixed(station, direction, wish[:needed], wish, profile), {}
-    index, most, room = _limits(spec, direction)
+    station: int,
+    direction: Direction,
+    wish: Sequence[Address],
+    needed: int,
+    profile: Profile | None,
+) -> tuple[Assigned, dict[tuple[int, int], str]]:
+    if profile is None or profile.pdo is None:
+        index = _GENERIC_RX if direction == "rx" else _GENERIC_TX
+        return _filled(station, direction, wish, needed, profile, _Room(index, _GENERIC_ENTRIES))
+    rules = assignment_rules(profile, profile.pdo, direction)
+    if rules.free is None:
+        return _fixed(station, wish[:needed], wish, profile, rules), {}
+    kept = _set_entries(rules.kept, profile)
+    room = _Room(
+        rules.free.index, profile.pdo.max_entries, rules.room_bytes, rules.kept, kept,
+        rules.assignable, profile,
+    )  # fmt: skip
+    return _filled(station, direction, wish, needed, profile, room)
+
+
+@dataclass(frozen=True, slots=True)
+class _Room:
+    """The PDO to be filled, how much it takes, and what is assigned beside it."""
+
+    index: int
+    most: int
+    bytes: int | None = None
+    kept: tuple[PdoSet, ...] = ()
+    kept_entries: tuple[Entry, ...] = ()
+    assignable: bool = True
+    profile: Profile | None = None
+
+    def assigned(self, entries: Sequence[Entry]) -> Assigned:
+        """With these entries in the free PDO, behind the kept ones."""
+        filled = Pdo(self.index, tuple(entries), write=True)
+        if not self.kept or self.profile is None:
+            return Assigned((filled,), filled.entries, self.assignable)
+        kept = tuple(_fixed_pdo(each, self.profile) for each in self.kept)
+        # One that does not end at a byte stands last: what follows it would not begin at one.
+        pdos = sorted((*kept, filled), key=lambda pdo: (pdo.ragged, pdo.index))
+        loose = tuple(e for pdo in pdos for e in pdo.entries)
+        return Assigned(tuple(pdos), loose, self.assignable)
+
+
+def _filled(
+    station: int,
+    direction: Direction,
+    wish: Sequence[Address],
+    needed: int,
+    profile: Profile | None,
+    room: _Room,
+) -> tuple[Assigned, dict[tuple[int, int], str]]:
     entries: list[Entry] = []
     reasons: dict[tuple[int, int], str] = {}
+    carried = _reached(room.kept_entries)
+    used = sum(entry.size for entry in room.kept_entries)
     for number, address in enumerate(wish):
+        if str(address) in carried:
+            continue
         reason = _unmappable(address, direction, profile)
         entry = _entry(address)
-        if not reason and len(entries) >= most:
-            reason = f"the drive maps {most} objects in one direction and they are used up"
-        if not reason and room is not None and sum(e.size for e in entries) + entry.size > room:
-            reason = f"the drive takes {room} bytes in one direction and they are used up"
+        if not reason and len(entries) >= room.most:
+            reason = f"the drive maps {room.most} objects in one direction and they are used up"
+        if not reason and room.bytes is not None and used + entry.size > room.bytes:
+            reason = f"the drive takes {room.bytes} bytes in one direction and they are used up"
         if not reason:
             entries.append(entry)
+            used += entry.size
         elif number < needed:
             raise NotAllowed(
                 "ethercat.station-cannot-cyclic-data",
                 parameter=str(address),
-                limit=f"{most} objects" + (f", {room} bytes" if room is not None else ""),
+                limit=f"{room.most} objects"
+                + (f", {room.bytes} bytes" if room.bytes is not None else ""),
                 station=station,
                 address=str(address),
                 reason=reason,
             )
         else:
             reasons[address.index or 0, address.subindex] = reason
-    return Pdo(index, tuple(entries), write=True), reasons
-
-
-def _limits(spec: PdoSpec | None, direction: str) -> tuple[int, int, int | None]:
-    if spec is None:
-        return (_GENERIC_RX if direction == "rx" else _GENERIC_TX), _GENERIC_ENTRIES, None
-    index = spec.free_set("rx" if direction == "rx" else "tx")
-    assert index is not None, "a direction without a free set is fixed"
-    return index, spec.max_entries, spec.max_bytes
+    return room.assigned(entries), reasons
 
 
 def _unmappable(address: Address, direction: str, profile: Profile | None) -> str:
@@ -192,30 +285,30 @@ def _entry(address: Address) -> Entry:
 
 def _fixed(
     station: int,
-    direction: str,
     needed: Sequence[Address],
     wish: Sequence[Address],
-    profile: Profile | None,
-) -> Pdo:
-    """The fixed set that has all that is needed and most of what is wished."""
-    assert profile is not None
-    assert profile.pdo is not None
-    default = profile.pdo.default_rx if direction == "rx" else profile.pdo.default_tx
+    profile: Profile,
+    rules: AssignmentRules,
+) -> Assigned:
+    """The fixed PDOs that have all that is needed and most of what is wished."""
     must = {str(address) for address in needed}
     want = {str(address) for address in wish}
-    sets = [s for s in profile.pdo.sets if s.direction == direction]
-    reached = {s.index: _reached(_set_entries(s, profile)) for s in sets}
-    usable = [s for s in sets if must <= reached[s.index]]
-    if not usable:
+    best = choose_fixed(rules, must, want, lambda sets: _reached(_set_entries(sets, profile)))
+    if best is None:
+        own = ", ".join(f"{s.index:04X}h" for s in rules.sets)
         raise NotAllowed(
             "ethercat.station-none-drive-fixed",
-            limit="fixed process data: " + ", ".join(f"{s.index:04X}h" for s in sets),
+            limit=f"fixed process data: {own}",
             station=station,
             must=", ".join(sorted(must)),
         )
-    best = max(usable, key=lambda s: (len(want & reached[s.index]), s.index == default))
-    words = tuple(_word(part) for part in best.layout)
-    return Pdo(best.index, _set_entries(best, profile), write=False, words=words)
+    pdos = tuple(_fixed_pdo(each, profile) for each in best)
+    return Assigned(pdos, _set_entries(best, profile), rules.assignable)
+
+
+def _fixed_pdo(each: PdoSet, profile: Profile) -> Pdo:
+    words = tuple(_word(part) for part in each.layout)
+    return Pdo(each.index, _set_entries((each,), profile), write=False, words=words)
 
 
 def _reached(entries: Sequence[Entry]) -> set[str]:
@@ -230,18 +323,25 @@ def _word(part: PdoPart) -> int:
     return int(part.key[:4], 16) << 16 | int(part.key[5:], 16) << 8 | part.bits
 
 
-def _set_entries(chosen: PdoSet, profile: Profile) -> tuple[Entry, ...]:
-    """Its contents byte by byte; padding and single bits become bytes of no interest."""
-    if not chosen.layout:
-        return tuple(_entry_of(profile.by_key[key]) for key in chosen.entries)
+def _set_entries(chosen: Sequence[PdoSet], profile: Profile) -> tuple[Entry, ...]:
+    """Contents byte by byte; padding and single bits become bytes of no interest.
+
+    PDOs of one direction follow each other without a gap, bit by bit (ETG.1000.4 clause 6.6).
+    """
     entries: list[Entry] = []
+    seen: set[tuple[int, int]] = set()
     loose = 0  # bits since the last object that begins at a byte
-    for part in chosen.layout:
+    for part in (part for each in chosen for part in _parts(each, profile)):
         known = profile.by_key.get(part.key) if part.key is not None else None
         entry = None if known is None else _entry_of(known)
         if entry is None or loose % 8 or entry.size * 8 != part.bits or entry.code == "x":
             loose += part.bits
             continue
+        if (entry.index, entry.subindex) in seen:
+            # Mapped twice: the first place is the one that is used.
+            loose += part.bits
+            continue
+        seen.add((entry.index, entry.subindex))
         if loose:
             entries.append(Entry(0, 0, loose // 8, "x"))
             loose = 0
@@ -249,6 +349,13 @@ def _set_entries(chosen: PdoSet, profile: Profile) -> tuple[Entry, ...]:
     if loose:
         entries.append(Entry(0, 0, (loose + 7) // 8, "x"))
     return tuple(entries)
+
+
+def _parts(each: PdoSet, profile: Profile) -> tuple[PdoPart, ...]:
+    if each.layout:
+        return each.layout
+    sizes = ((key, _entry_of(profile.by_key[key]).size) for key in each.entries)
+    return tuple(PdoPart(key=key, bits=8 * size) for key, size in sizes if size)
 
 
 def _entry_of(parameter: Parameter) -> Entry:

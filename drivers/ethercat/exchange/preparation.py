@@ -5,19 +5,19 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
 from drivers.ethercat.exchange import setup as setup_
+from drivers.ethercat.exchange.bring_up import apply_mailbox, from_wire, set_controls
 from drivers.ethercat.exchange.cyclic import Image, layout, places
-from drivers.ethercat.exchange.mapping import Entry, Pdo
+from drivers.ethercat.exchange.mapping import Assigned, Entry, Pdo
 from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.exchange.setup import Snapshot, StationSetup
 from drivers.ethercat.process.protocol import Message
 from drivers.ethercat.process.segment import IO_MAP_BYTES, Segment, SpoiltMap
-from drivers.ethercat.process.station import Station, change_state, identify
+from drivers.ethercat.process.station import Station, identify
 from drivers.ethercat.wire import coe
-from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.lanes import Done, LaneName, Lanes
 from drivers.ethercat.wire.steps import Steps
 from drivers.motion.interpolation import interpolation_period
@@ -56,6 +56,10 @@ class Preparation:
         self._cycle_ns = 1_000_000
         self._dc = False
 
+    def planned(self, number: int) -> StationSetup | None:
+        """What was last to be set up at a station."""
+        return self._setups.get(number)
+
     def identify(self, stations: Sequence[Station]) -> None:
         """Identify all stations after a search, which leaves those that can in PREOP."""
         jobs = {s.number: identify(s, time.monotonic) for s in stations}
@@ -82,10 +86,18 @@ class Preparation:
         watchdog_ms = max(float(message["watchdog_ms"]), 5 * cycle_ns / 1e6)
         self._setups = {
             number: StationSetup(
-                _pdo(plan["rx"]), _pdo(plan["tx"]), cycle_ns, self._dc, watchdog_ms
+                _assigned(plan["rx"]),
+                _assigned(plan["tx"]),
+                cycle_ns,
+                self._dc,
+                watchdog_ms,
+                from_wire(plan.get("bring_up")),
             )
             for number, plan in message["stations"].items()
         }
+        for number, plan in self._setups.items():
+            if plan.rules is not None:
+                apply_mailbox(stations[number - 1], plan.rules)
         self._write_mappings()
         initial = self._map()
         self._check_places()
@@ -126,6 +138,9 @@ class Preparation:
         }
         whole = self._run("mailbox", probes, "asking who knows complete access")
         entry_by_entry = [number for number, can in whole.items() if not can]
+        entry_by_entry += [
+            n for n, plan in self._setups.items() if plan.bring_up.complete_access is False
+        ]
         if total > IO_MAP_BYTES:
             self._segment.map(total)
         # An emergency that lies in a mailbox would make SOEM's mapping fail.
@@ -157,6 +172,11 @@ class Preparation:
             for number, plan in self._setups.items()
         }
         self._run("register", jobs, "looking where the process data are")
+        controls = {
+            number: set_controls(self._stations[number - 1], plan.bring_up)
+            for number, plan in self._setups.items()
+        }
+        self._run("register", controls, "setting the sync managers")
 
     def _clocks_and_watchdogs(self) -> None:
         self._promise("starting the distributed clocks")
@@ -187,7 +207,9 @@ class Preparation:
         }
         self._run("register", spared, "leaving other drives alone", optional=set(spared))
         states = {
-            station.number: change_state(station, AlState.SAFEOP, time.monotonic)
+            station.number: setup_.to_safeop(
+                station, self._setups.get(station.number), time.monotonic
+            )
             for station in self._stations
             if station.number not in spared
         }
@@ -250,6 +272,13 @@ class Preparation:
         return results
 
 
-def _pdo(plan: Message) -> Pdo:
-    entries = tuple(Entry(*entry) for entry in plan["entries"])
-    return Pdo(plan["index"], entries, plan["write"], tuple(plan["words"]))
+def _assigned(plan: Message) -> Assigned:
+    pdos = tuple(
+        Pdo(item["index"], _entries(item["entries"]), item["write"], tuple(item["words"]))
+        for item in plan["pdos"]
+    )
+    return Assigned(pdos, _entries(plan["entries"]), plan["assign"])
+
+
+def _entries(items: Sequence[Sequence[Any]]) -> tuple[Entry, ...]:
+    return tuple(Entry(*item) for item in items)

@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, motion_halted
-from drivers.ethercat.exchange.mapping import Pdo, StationPlan, plan_station
+from drivers.ethercat.exchange.bring_up import station_bring_up, to_wire
+from drivers.ethercat.exchange.mapping import Assigned, Entry, StationPlan, plan_station
 from drivers.ethercat.exchange.recovery import Recovery
 from drivers.ethercat.exchange.ring import VALID, RingReader, lost_flag
 from drivers.ethercat.exchange.samples import contiguous, fields_of
@@ -50,8 +51,13 @@ class EthercatCyclic:
         host: HostProcess,
         profiles: Mapping[int, Profile],
         tell: Callable[[str, bool], None],
+        note: Callable[[str, int | None], None] = lambda _text, _station: None,
     ) -> None:
-        """``tell`` gets a sentence when the exchange breaks off (False) or runs again (True)."""
+        """``tell`` gets a sentence when the exchange breaks off (False) or runs again (True).
+
+        ``note`` gets what is commanded, with its station, for the record of the bus.
+        """
+        self._note = note
         self._host = host
         self._tell = tell
         self._setup: Message = {}
@@ -104,7 +110,7 @@ class EthercatCyclic:
             "cycle_ns": round(cycle_s * 1e9),
             "dc": True,
             "watchdog_ms": self._watchdog_ms,
-            "stations": {p.station: {"rx": _wire(p.rx), "tx": _wire(p.tx)} for p in plans},
+            "stations": {p.station: self._station_wire(p, round(cycle_s * 1e9)) for p in plans},
         }
         answer: Message = await self._host.call(message, _CONFIGURE_S)
         self._setup = message | {"identities": answer["identities"]}
@@ -112,6 +118,10 @@ class EthercatCyclic:
         self._fields = fields_of(plans)
         self.left_over = tuple(item for plan in plans for item in plan.left_over)
         return tuple(signal for plan in plans for signal in plan.mapped)
+
+    def _station_wire(self, plan: StationPlan, cycle_ns: int) -> Message:
+        rules = station_bring_up(self._profiles.get(plan.station), cycle_ns)
+        return {"rx": _wire(plan.rx), "tx": _wire(plan.tx), "bring_up": to_wire(rules)}
 
     async def start(self) -> None:
         """Go to Operational and exchange process data.
@@ -145,6 +155,9 @@ class EthercatCyclic:
         """
         messages = [message_of(trajectory) for trajectory in trajectories]
         generation = self._generation
+        for each in trajectories:
+            values = f"{len(each.values)} values" if len(each.values) != 1 else "1 value"
+            self._note(f"setpoints: {values} for {each.target}", each.station)
         number: int = await self._host.call({"op": "play", "trajectories": messages}, _ANSWER_S)
         self._played |= {trajectory.station: generation for trajectory in trajectories}
         return number
@@ -209,6 +222,7 @@ class EthercatCyclic:
             NotAllowed: the drive has a fault, or its control word is not mapped.
         """
         message = {"op": "drive_to", "station": station, "goal": goal.name, "mode": mode}
+        self._note(f"power state {goal.name} is commanded", station)
         await self._host.call(message, _ANSWER_S)
 
     async def reset_fault(self, station: int) -> None:
@@ -288,7 +302,14 @@ class EthercatCyclic:
     # Parts ---------------------------------------------------------------------------------
 
     async def _start(self) -> None:
-        await self._host.call({"op": "start"}, _START_S)
+        slowest_ms = max(
+            (
+                each["bring_up"]["safeop_op_ms"] or 0
+                for each in self._setup.get("stations", {}).values()
+            ),
+            default=0,
+        )
+        await self._host.call({"op": "start"}, max(_START_S, slowest_ms / 1000 + _ANSWER_S))
         ring = self._host.ring
         if ring is None:
             raise LinkLost("ethercat.ethercat-process-ended")
@@ -430,6 +451,13 @@ class EthercatCyclic:
             consumer.sequence += 1
 
 
-def _wire(pdo: Pdo) -> Message:
-    entries = [[e.index, e.subindex, e.size, e.code] for e in pdo.entries]
-    return {"index": pdo.index, "entries": entries, "write": pdo.write, "words": pdo.words}
+def _wire(assigned: Assigned) -> Message:
+    pdos = [
+        {"index": p.index, "entries": _listed(p.entries), "write": p.write, "words": p.words}
+        for p in assigned.pdos
+    ]
+    return {"pdos": pdos, "entries": _listed(assigned.entries), "assign": assigned.assign}
+
+
+def _listed(entries: tuple[Entry, ...]) -> list[list[object]]:
+    return [[e.index, e.subindex, e.size, e.code] for e in entries]

@@ -11,8 +11,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from drivers.errors import DriveError, LinkLost, NotAllowed, ProtocolError, Rejected
-from drivers.ethercat.exchange.mapping import Entry, Pdo
-from drivers.ethercat.process.station import Station, change_state
+from drivers.ethercat.exchange.bring_up import (
+    BEFORE_MAPPING,
+    StationBringUp,
+    send_commands,
+    set_controls,
+    set_watchdog_divider,
+    timeout_s,
+)
+from drivers.ethercat.exchange.mapping import Assigned, Entry, Pdo
+from drivers.ethercat.process.station import STATE_TIMEOUT_S, Station, change_state
 from drivers.ethercat.wire import coe, sii
 from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.registers import TRIES, read_again
@@ -30,7 +38,7 @@ _PROCESS_MEMORY = 0x1000
 """Registers end there (ETG.1000.4 clause 6.1)."""
 
 _DC_SYSTEM_TIME, _DC_OFFSET, _DC_DELAY = 0x910, 0x920, 0x928
-_DC_CONTROL, _DC_ACTIVATE, _DC_START, _DC_CYCLE = 0x980, 0x981, 0x990, 0x9A0
+_DC_CONTROL, _DC_ACTIVATE, _DC_START, _DC_CYCLE, _DC_SYNC1 = 0x980, 0x981, 0x990, 0x9A0, 0x9A4
 _ASSIGN = {"rx": 0x1C12, "tx": 0x1C13}
 _READ_ONLY = 0x06010002
 _FIXED = (
@@ -40,18 +48,24 @@ _FIXED = (
 )
 _SETPOINTS = {0x6040, 0x607A, 0x60FF, 0x6071, 0x60B0, 0x60B1, 0x60B2}
 _SYNC_LEAD_NS = 100_000_000
-_SYNC_ACTIVE, _SYNC_TRY_S = 0x03, 3.0
+_SYNC1_BIT, _SYNC_TRY_S = 0x0400, 3.0
 
 
 @dataclass(frozen=True, slots=True)
 class StationSetup:
     """Process data of one station as the server chose them."""
 
-    rx: Pdo
-    tx: Pdo
+    rx: Assigned
+    tx: Assigned
     cycle_ns: int
     dc: bool
     watchdog_ms: float
+    rules: StationBringUp | None = None
+
+    @property
+    def bring_up(self) -> StationBringUp:
+        """What its file prescribes; the usual where there is none."""
+        return self.rules or StationBringUp(sync0_cycle_ns=self.cycle_ns)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,12 +97,13 @@ def write_mapping(station: Station, setup: StationSetup) -> Steps[None]:
     Raises:
         NotAllowed: the drive refuses the mapping; the message says which object and why.
     """
+    yield from send_commands(station, setup.bring_up, BEFORE_MAPPING)
     assign = yield from _assignments(station)
-    for direction, pdo in (("rx", setup.rx), ("tx", setup.tx)):
+    for direction, assigned in (("rx", setup.rx), ("tx", setup.tx)):
         try:
-            yield from _write_pdo(station, assign[direction], pdo)
+            yield from _write_assigned(station, assign[direction], assigned)
         except Rejected as error:
-            if (yield from _has_them_anyway(station, assign[direction], pdo)):
+            if (yield from _has_them_anyway(station, assign[direction], assigned)):
                 continue
             raise NotAllowed(
                 "ethercat.station-not-take-process-data",
@@ -117,23 +132,37 @@ def write_mapping(station: Station, setup: StationSetup) -> Steps[None]:
             continue
 
 
-def _write_pdo(station: Station, assign: int, pdo: Pdo) -> Steps[None]:
+def _write_assigned(station: Station, assign: int, assigned: Assigned) -> Steps[None]:
+    """Write contents and assignment of one direction, as far as they can be written."""
     box = station.box
-    before = yield from coe.upload(box, assign, 0)
-    yield from coe.download(box, assign, 0, b"\0")
-    if pdo.write and pdo.entries:
+    before = b""
+    if assigned.assign:
+        before = yield from coe.upload(box, assign, 0)
+        yield from coe.download(box, assign, 0, b"\0")
+    for pdo in assigned.pdos:
+        if not (pdo.write and pdo.entries):
+            continue
         try:
-            yield from coe.download(box, pdo.index, 0, b"\0")
+            yield from _write_contents(station, pdo)
         except Rejected:
             # Its mapping is fixed: nothing has changed but the assignment, which is put back.
-            yield from coe.download(box, assign, 0, before[:1])
+            if assigned.assign:
+                yield from coe.download(box, assign, 0, before[:1])
             raise
-        for number, entry in enumerate(pdo.entries, start=1):
-            yield from coe.download(box, pdo.index, number, struct.pack("<I", entry.word))
-        yield from coe.download(box, pdo.index, 0, bytes([len(pdo.entries)]))
-    if pdo.entries:
-        yield from coe.download(box, assign, 1, struct.pack("<H", pdo.index))
-        yield from coe.download(box, assign, 0, b"\x01")
+    if not assigned.assign:
+        return
+    chosen = [pdo for pdo in assigned.pdos if pdo.entries]
+    for number, pdo in enumerate(chosen, start=1):
+        yield from coe.download(box, assign, number, struct.pack("<H", pdo.index))
+    if chosen:
+        yield from coe.download(box, assign, 0, bytes([len(chosen)]))
+
+
+def _write_contents(station: Station, pdo: Pdo) -> Steps[None]:
+    yield from coe.download(station.box, pdo.index, 0, b"\0")
+    for number, entry in enumerate(pdo.entries, start=1):
+        yield from coe.download(station.box, pdo.index, number, struct.pack("<I", entry.word))
+    yield from coe.download(station.box, pdo.index, 0, bytes([len(pdo.entries)]))
 
 
 def _assignments(station: Station) -> Steps[dict[str, int]]:
@@ -148,12 +177,16 @@ def _assignments(station: Station) -> Steps[dict[str, int]]:
     return _ASSIGN
 
 
-def _has_them_anyway(station: Station, assign: int, pdo: Pdo) -> Steps[bool]:
+def _has_them_anyway(station: Station, assign: int, assigned: Assigned) -> Steps[bool]:
     """Whether a drive whose assignment cannot be written carries just these process data."""
-    if (yield from _read_list(station, assign, 2)) != ([pdo.index] if pdo.entries else []):
+    pdos = [pdo for pdo in assigned.pdos if pdo.entries]
+    if (yield from _read_list(station, assign, 2)) != [pdo.index for pdo in pdos]:
         return False
-    words = yield from _read_list(station, pdo.index, 4)
-    return words == list(pdo.mapping_words)
+    for pdo in pdos:
+        words = yield from _read_list(station, pdo.index, 4)
+        if words != list(pdo.mapping_words):
+            return False
+    return True
 
 
 def reads_whole(station: Station) -> Steps[bool]:
@@ -219,7 +252,9 @@ def arm_watchdog(station: Station, setup: StationSetup) -> Steps[None]:
         NotAllowed: the slave does not take it. No axis may then be moved over this bus, because
             nothing would stop it when the computer dies.
     """
-    milliseconds = setup.watchdog_ms
+    limit_ns = setup.bring_up.watchdog_limit_ns
+    milliseconds = min(setup.watchdog_ms, (limit_ns or 1 << 62) / 1e6)
+    yield from set_watchdog_divider(station, setup.bring_up)
     divider = yield from read_again(WATCHDOG_DIVIDER, 2)
     if divider is None:
         raise ProtocolError("ethercat.station-not-answer-watchdog", station=station.number)
@@ -333,12 +368,22 @@ def restore(
     for number in (2, 3):
         part = snapshot.sync_managers[8 * number : 8 * number + 8]
         yield Write(SYNC_MANAGERS + 8 * number, part)
+    yield from set_controls(station, setup.bring_up)
     yield Write(FMMU, snapshot.fmmu)
     yield from arm_watchdog(station, setup)
     if setup.dc:
         yield from _restore_clock(snapshot, dc_time)
         yield from start_sync0(station, setup, clock)
-    yield from change_state(station, AlState.SAFEOP, clock)
+    yield from to_safeop(station, setup, clock)
+
+
+def to_safeop(
+    station: Station, setup: StationSetup | None, clock: Callable[[], float]
+) -> Steps[None]:
+    """To SAFEOP in the time that the drive's file allows."""
+    rules = None if setup is None else setup.rules
+    limit_s = timeout_s(rules, STATE_TIMEOUT_S[AlState.SAFEOP])
+    yield from change_state(station, AlState.SAFEOP, clock, limit_s)
 
 
 def start_sync0(station: Station, setup: StationSetup, clock: Callable[[], float]) -> Steps[None]:
@@ -359,29 +404,34 @@ def start_sync0(station: Station, setup: StationSetup, clock: Callable[[], float
 
 def _sync0_started(setup: StationSetup) -> Steps[bool]:
     """One try; False where a frame was lost, or the start had passed before it was activated."""
+    rules = setup.bring_up
     stopped = yield Write(_DC_ACTIVATE, b"\0")
-    yield Write(_DC_CONTROL, b"\0")
+    yield Write(_DC_CONTROL, bytes([rules.activate & 0xFF]))
     here = yield Read(_DC_SYSTEM_TIME, 8)
     if here is None or stopped is None:
         return False
     start_ns = _sync_start(int.from_bytes(here, "little"), setup)
     # What 990h holds cannot be read back: chips tell the next pulse there.
-    written = [
-        (yield Write(_DC_CYCLE, struct.pack("<I", setup.cycle_ns))),
+    written = []
+    if rules.activate & _SYNC1_BIT:
+        written.append((yield Write(_DC_SYNC1, struct.pack("<I", rules.sync1_ns))))
+    written += [
+        (yield Write(_DC_CYCLE, struct.pack("<I", rules.sync0_cycle_ns))),
         (yield Write(_DC_START, struct.pack("<Q", start_ns))),
-        (yield Write(_DC_ACTIVATE, bytes([_SYNC_ACTIVE]))),
+        (yield Write(_DC_ACTIVATE, bytes([rules.activate >> 8]))),
     ]
     now = yield Read(_DC_SYSTEM_TIME, 8)
     if now is None or None in written:
         return False
     # Some chips count 32 bits only.
     ahead_ns = (start_ns - int.from_bytes(now, "little")) & 0xFFFF_FFFF
-    return 0 < ahead_ns <= _SYNC_LEAD_NS
+    return 0 < ahead_ns <= _SYNC_LEAD_NS + abs(rules.sync0_shift_ns)
 
 
 def _sync_start(now_ns: int, setup: StationSetup) -> int:
-    """Whole multiples of the cycle, which all stations share."""
-    return (now_ns + _SYNC_LEAD_NS) // setup.cycle_ns * setup.cycle_ns
+    """Whole multiples of the cycle, which all stations share, and the drive's own shift."""
+    grid_ns = (now_ns + _SYNC_LEAD_NS) // setup.cycle_ns * setup.cycle_ns
+    return grid_ns + setup.bring_up.sync0_shift_ns
 
 
 def _restore_clock(snapshot: Snapshot, dc_time: Callable[[], int]) -> Steps[None]:

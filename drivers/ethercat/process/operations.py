@@ -16,6 +16,7 @@ from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.exchange.setup import FoundInPart
 from drivers.ethercat.process import firmware
 from drivers.ethercat.process import station as transactions
+from drivers.ethercat.process.examination import examine
 from drivers.ethercat.process.protocol import Message, error_to_wire
 from drivers.ethercat.process.realtime import RealTime
 from drivers.ethercat.process.roster import Roster, Send
@@ -54,7 +55,7 @@ class Operations:
             "scan": self._scan, "read": self._read, "read_many": self._read_many,
             "write": self._write, "enumerate": self._enumerate, "state": self._state,
             "counters": self._counters, "clear_counters": self._clear_counters,
-            "alias": self._alias, "foe": self._foe,
+            "alias": self._alias, "foe": self._foe, "examine": self._examine,
             "configure": self._configure, "start": self._start, "stop": self._stop,
             "play": self._play, "renew": self._renew, "halt": self._halt, "pause": self._pause,
             "drive_to": self._drive_to,
@@ -273,6 +274,12 @@ class Operations:
                 for station in stations
             ],
         }  # fmt: skip
+
+    def _examine(self, message: Message, done: Done) -> None:
+        station = self.roster.station(message)
+        setup = self.roster.exchange.planned(station.number)
+        steps = examine(station, setup)
+        self.lanes.submit(station.number, "mailbox", steps, done)
 
     def _clear_counters(self, message: Message, done: Done) -> None:
         station = self.roster.station(message)

@@ -16,7 +16,7 @@ import pytest
 from drivers.cia402 import Mode, State
 from drivers.dictionary import EntryDescription, ObjectInfo
 from drivers.errors import DriveError, LinkLost, NotAllowed, Rejected
-from drivers.ethercat.exchange.mapping import Entry, Pdo
+from drivers.ethercat.exchange.mapping import Entry, Pdo, alone
 from drivers.ethercat.exchange.setup import FoundInPart, StationSetup, check_places
 from drivers.ethercat.link import EthercatLink
 from drivers.ethercat.process.station import Station, identify
@@ -214,8 +214,8 @@ def test_sync_managers_too_far_back_in_the_eeprom_are_told_as_such(filling: int,
         body = category(10, bytes(filling)) + Servo.body
 
     setup = StationSetup(
-        rx=Pdo(0x1600, (Entry(0x6040, 0, 2, "H"),), write=False),
-        tx=Pdo(0x1A00, (Entry(0x6041, 0, 2, "H"),), write=False),
+        rx=alone(Pdo(0x1600, (Entry(0x6040, 0, 2, "H"),), write=False)),
+        tx=alone(Pdo(0x1A00, (Entry(0x6041, 0, 2, "H"),), write=False)),
         cycle_ns=1_000_000, dc=False, watchdog_ms=50.0,
     )  # fmt: skip
     steps = check_places(Station(1), setup, time.monotonic)

@@ -8,13 +8,15 @@ from dataclasses import dataclass, field
 import pytest
 
 from drivers.errors import LinkLost
-from drivers.ethercat.exchange.mapping import Pdo
+from drivers.ethercat.exchange.mapping import Pdo, alone
 from drivers.ethercat.exchange.setup import StationSetup, start_sync0
 from drivers.ethercat.process.station import Station
 from drivers.ethercat.wire.steps import Read, Step, Write
 
 CYCLE_NS = 250_000
-SETUP = StationSetup(Pdo(0x1600, (), True), Pdo(0x1A00, (), True), CYCLE_NS, True, 50.0)
+SETUP = StationSetup(
+    alone(Pdo(0x1600, (), True)), alone(Pdo(0x1A00, (), True)), CYCLE_NS, True, 50.0
+)
 NEVER = 1 << 63
 
 

@@ -268,6 +268,28 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/buses/flight": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Bus Flight
+         * @description The last 60 s of frames of an opened bus as a pcapng file, of one station or of all.
+         *
+         *     Wireshark reads it: EtherCAT as Ethernet, CAN as SocketCAN, serial lines as LINKTYPE_USER0.
+         */
+        get: operations["bus_flight"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/calculate/braking": {
         parameters: {
             query?: never;
@@ -1643,6 +1665,28 @@ export interface paths {
          * @description Set the port error counters of one station or of all to zero.
          */
         post: operations["clear_counters"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/ethercat/doctor": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Ethercat Doctor
+         * @description What keeps the stations of an opened segment from Operational, the likeliest cause first.
+         *
+         *     Reads registers and objects as they are now; changes no state.
+         */
+        get: operations["ethercat_doctor"];
+        put?: never;
+        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -3780,6 +3824,38 @@ export interface components {
             status: "differs" | "same" | "not_in_drive" | "not_in_file" | "invalid" | "read_only" | "energises";
             /** Unit */
             unit: string;
+        };
+        /**
+         * DoctorCause
+         * @description A possible cause; the texts in English and Chinese.
+         */
+        DoctorCause: {
+            /** Code */
+            code: string;
+            /** Facts */
+            facts: components["schemas"]["DoctorFact"][];
+            /** Remedy */
+            remedy: string;
+            /** Remedy Zh */
+            remedy_zh: string;
+            /** Title */
+            title: string;
+            /** Title Zh */
+            title_zh: string;
+            /** Weight */
+            weight: number;
+        };
+        /**
+         * DoctorFact
+         * @description A piece of evidence as it is and as it should be (null: nobody says).
+         */
+        DoctorFact: {
+            /** Actual */
+            actual: number | string;
+            /** Expected */
+            expected: number | string | null;
+            /** Name */
+            name: string;
         };
         /**
          * Doubt
@@ -8422,6 +8498,20 @@ export interface components {
             type: "state";
         };
         /**
+         * StationDiagnosis
+         * @description One station; without causes where it is in Operational.
+         */
+        StationDiagnosis: {
+            /** Causes */
+            causes: components["schemas"]["DoctorCause"][];
+            /** Reached */
+            reached: boolean;
+            /** Refusal */
+            refusal?: string | null;
+            /** Station */
+            station: number;
+        };
+        /**
          * StepRequest
          * @description A step of speed (rpm) or a move (rev).
          */
@@ -9205,6 +9295,8 @@ export type CyclicRequest = components['schemas']['CyclicRequest'];
 export type DescribedDevice = components['schemas']['DescribedDevice'];
 export type Diff = components['schemas']['Diff'];
 export type DiffRow = components['schemas']['DiffRow'];
+export type DoctorCause = components['schemas']['DoctorCause'];
+export type DoctorFact = components['schemas']['DoctorFact'];
 export type Doubt = components['schemas']['Doubt'];
 export type DriveIdentification = components['schemas']['DriveIdentification'];
 export type DriveSummary = components['schemas']['DriveSummary'];
@@ -9396,6 +9488,7 @@ export type SnapshotInfo = components['schemas']['SnapshotInfo'];
 export type SnapshotTrace = components['schemas']['SnapshotTrace'];
 export type StartRecording = components['schemas']['StartRecording'];
 export type StateChanged = components['schemas']['StateChanged'];
+export type StationDiagnosis = components['schemas']['StationDiagnosis'];
 export type StepRequest = components['schemas']['StepRequest'];
 export type StopAll = components['schemas']['StopAll'];
 export type StopReached = components['schemas']['StopReached'];
@@ -11821,6 +11914,146 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    bus_flight: {
+        parameters: {
+            query: {
+                url: string;
+                station?: number | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/octet-stream": string;
+                };
             };
             /** @description Not a request of this interface */
             400: {
@@ -22756,6 +22989,146 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    ethercat_doctor: {
+        parameters: {
+            query: {
+                url: string;
+                station?: number | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StationDiagnosis"][];
+                };
             };
             /** @description Not a request of this interface */
             400: {

@@ -13,14 +13,20 @@ from drivers import scheduling
 from drivers.errors import DriveError
 from drivers.virtual.device import Device
 from drivers.virtual.firmware.factory import number_device
-from drivers.virtual.wires.ethercat.bench import axes_by_name, axes_of_bench, load_factory
+from drivers.virtual.wires.ethercat.bench import (
+    axes_by_name,
+    axes_of_bench,
+    load_factory,
+    load_slave,
+)
 from drivers.virtual.wires.ethercat.clock import LockstepClock, RealClock, SteadyClock, WireClock
 from drivers.virtual.wires.ethercat.segment import Segment
 from drivers.virtual.wires.ethercat.server import SegmentServer
-from drivers.virtual.wires.ethercat.slave import MAILBOXES, Slave, SlaveIdentity
+from drivers.virtual.wires.ethercat.slave import MAILBOXES, SlaveIdentity
 from profiles.loader import ProfileError
 
 _FACTORY = "drivers.virtual.firmware.factory:make_device"
+_SLAVE = "drivers.virtual.wires.ethercat.slave:Slave"
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -31,6 +37,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--drive", action="append", default=[], help="a drive family, in order")
     parser.add_argument("--nvm", type=Path, help="folder for the drives' memory; kept if given")
     parser.add_argument("--factory", default=_FACTORY, help="module:function that makes devices")
+    parser.add_argument("--slave", default=_SLAVE, help="module:class of the slaves")
     parser.add_argument("--lockstep", action="store_true", help="time follows the frames")
     parser.add_argument(
         "--steady", action="store_true", help="time follows process data while they flow"
@@ -83,8 +90,9 @@ def build(arguments: argparse.Namespace) -> Segment:
     mailboxes = (arguments.mailboxes[0], arguments.mailboxes[1])
     if not all(16 <= size <= most for size, most in zip(mailboxes, MAILBOXES, strict=True)):
         raise ValueError(f"--mailboxes: {mailboxes} are not of 16 to {MAILBOXES[0]} bytes")
+    slave_type = load_slave(arguments.slave)
     slaves = [
-        Slave(device, clock, SlaveIdentity(serial=axis.serial or station), mailboxes)
+        slave_type(device, clock, SlaveIdentity(serial=axis.serial or station), mailboxes)
         for station, (device, axis) in enumerate(zip(devices, axes, strict=True), 1)
     ]
     for slave in slaves:

@@ -10,6 +10,7 @@ from drivers.errors import NotAllowed
 from drivers.virtual.bench import AxisSpec, load_bench
 from drivers.virtual.device import Device
 from drivers.virtual.mechanics.spec import MechanicsSpec
+from drivers.virtual.wires.ethercat.slave import Slave
 
 DeviceFactory = Callable[[str, MechanicsSpec, Path | None, int], Device]
 """Family, mechanics, folder of the NVM files, station: to a drive."""
@@ -57,3 +58,10 @@ def load_factory(spec: str) -> DeviceFactory:
     module, _, name = spec.partition(":")
     factory: DeviceFactory = getattr(importlib.import_module(module), name)
     return factory
+
+
+def load_slave(spec: str) -> type[Slave]:
+    """``module:class`` to the class of the slaves."""
+    module, _, name = spec.partition(":")
+    found: type[Slave] = getattr(importlib.import_module(module), name)
+    return found

@@ -57,6 +57,8 @@ class SlaveIdentity:
 class Slave:
     """See the module docstring. Not thread-safe: the segment's thread calls it."""
 
+    dictionary_type: type[CoeDictionary] = CoeDictionary
+
     def __init__(
         self,
         device: Device,
@@ -65,13 +67,15 @@ class Slave:
         mailboxes: tuple[int, int] = MAILBOXES,
     ) -> None:
         self.device = device
-        self._layout = _layout(mailboxes)
+        self._layout = self.sii_layout(mailboxes)
         link = device.profile.link("ethercat")
         self._has_dc = _supports_dc(device)
         self.report = SyncReport()
-        self.dictionary = CoeDictionary(device, lambda: self.al.state, self.report, self._has_dc)
+        self.dictionary = self.dictionary_type(
+            device, lambda: self.al.state, self.report, self._has_dc
+        )
         complete = bool(link and link.complete_access)
-        self.coe = CoeServer(self.dictionary, complete, mailboxes[1] - HEADER)
+        self.coe = CoeServer(self.dictionary, complete, self._layout[1].length - HEADER)
         self.files = FirmwareStore() if link and link.foe else None
         memory = bytearray(0x10000)
         self.dc = DistributedClock(memory, clock)
@@ -88,6 +92,10 @@ class Slave:
         self._housekeeping_ns = 0
         self._now_ns = 0
         self.power_on(0)
+
+    def sii_layout(self, mailboxes: tuple[int, int]) -> tuple[sii.SmLayout, ...]:
+        """Its sync managers, as the EEPROM gives them."""
+        return _layout(mailboxes)
 
     # -- power ----------------------------------------------------------------------------------
 

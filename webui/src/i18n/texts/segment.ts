@@ -90,4 +90,12 @@ export const segment = {
     '周期通信中断，正在自动恢复；恢复后所有轴保持断使能，需手动使能。原因：',
   ],
   'segment.endRecovery': ['Do not set it up again', '不再恢复'],
+  'segment.doctor': ['Why not in Operational?', '为何未进入 Operational？'],
+  'segment.doctorStation': ['Station {station}', '站点 {station}'],
+  'segment.doctorWell': ['is in Operational', '已处于 Operational'],
+  'segment.doctorFact': [
+    '{name} = {actual}, should be {expected}',
+    '{name} = {actual}，应为 {expected}',
+  ],
+  'segment.frames': ['Frames of the last minute (pcapng)', '最近一分钟的数据帧（pcapng）'],
 } satisfies Texts

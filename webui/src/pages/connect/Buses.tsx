@@ -1,12 +1,14 @@
 import { Button } from '@mantine/core'
-import { api, ask } from '../../api/client'
+import { API_ROOT, api, ask } from '../../api/client'
 import { useT } from '../../i18n'
 import { useDrives } from '../../live/store'
+import { Icon } from '../../widgets/Icon'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { CyclicExchange } from './CyclicExchange'
 import { QualityTable } from './QualityTable'
+import { DoctorCard } from './segment/DoctorCard'
 import { SegmentPanel } from './segment/SegmentPanel'
 import { useBuses } from './useBuses'
 
@@ -39,8 +41,16 @@ export function Buses() {
               </Button>
             )}
           </div>
+          <a
+            className="download"
+            href={`${API_ROOT}/api/v1/buses/flight?url=${encodeURIComponent(bus.url)}`}
+            download
+          >
+            <Icon name="download" /> {t('segment.frames')}
+          </a>
           <QualityTable quality={bus.quality} />
           {bus.kind === 'ethercat' && <SegmentPanel url={bus.url} />}
+          {bus.kind === 'ethercat' && <DoctorCard url={bus.url} />}
           {bus.cyclic_possible && <CyclicExchange bus={bus} onChange={refresh} />}
         </div>
       ))}

@@ -1,0 +1,87 @@
+"""Route to the doctor: why stations of an EtherCAT segment are not in Operational."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+from pydantic import BaseModel
+
+from backend.api.context import TheBench
+from backend.api.errors import NotFound
+from drivers.doctor.diagnosis import Cause
+from drivers.ethercat.link import segment_of
+
+router = APIRouter()
+_OPERATIONAL = 8
+
+
+class DoctorFact(BaseModel):
+    """A piece of evidence as it is and as it should be (null: nobody says)."""
+
+    name: str
+    actual: int | str
+    expected: int | str | None
+
+
+class DoctorCause(BaseModel):
+    """A possible cause; the texts in English and Chinese."""
+
+    code: str
+    weight: int
+    title: str
+    title_zh: str
+    remedy: str
+    remedy_zh: str
+    facts: list[DoctorFact]
+
+
+class StationDiagnosis(BaseModel):
+    """One station; without causes where it is in Operational."""
+
+    station: int
+    reached: bool
+    refusal: str | None = None
+    causes: list[DoctorCause]
+
+
+@router.get("/ethercat/doctor")
+async def ethercat_doctor(
+    bench: TheBench,
+    url: Annotated[str, Query()],
+    station: Annotated[int | None, Query(ge=1)] = None,
+) -> list[StationDiagnosis]:
+    """What keeps the stations of an opened segment from Operational, the likeliest cause first.
+
+    Reads registers and objects as they are now; changes no state.
+    """
+    link = segment_of(bench.buses.opened.get(url))
+    if link is None:
+        raise NotFound(
+            f"{url} is no opened EtherCAT bus", value=url, remedy="scan it on the Connect page"
+        )
+    seen = [s.station for s in (await link.survey()).stations if station in (None, s.station)]
+    found = []
+    for number in seen:
+        evidence, causes = await link.diagnose(number)
+        reached = evidence.al == _OPERATIONAL
+        found.append(
+            StationDiagnosis(
+                station=number, reached=reached,
+                causes=[] if reached else [_cause(each) for each in causes],
+            )
+        )  # fmt: skip
+    return found
+
+
+def _cause(cause: Cause) -> DoctorCause:
+    text = cause.text
+    return DoctorCause(
+        code=cause.code,
+        weight=cause.weight,
+        title=text.title,
+        title_zh=text.zh,
+        remedy=text.remedy,
+        remedy_zh=text.zh_remedy,
+        facts=[DoctorFact(name=f.name, actual=f.actual, expected=f.expected) for f in cause.facts],
+    )

@@ -1,0 +1,43 @@
+"""Routes to what went over the wires: the last minute of frames of a bus."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from backend.api.context import TheBench
+from backend.api.errors import NotFound
+from backend.recording.flight import file_name
+from drivers.errors import NotAllowed
+from drivers.link import RecordsFrames
+
+router = APIRouter()
+
+_FILE = {
+    200: {"content": {"application/octet-stream": {"schema": {"type": "string"}}}},
+}
+
+
+@router.get("/buses/flight", response_class=Response, responses=_FILE)  # type: ignore[arg-type]
+async def bus_flight(
+    bench: TheBench,
+    url: Annotated[str, Query()],
+    station: Annotated[int | None, Query(ge=0, le=0xFFFF)] = None,
+) -> Response:
+    """The last 60 s of frames of an opened bus as a pcapng file, of one station or of all.
+
+    Wireshark reads it: EtherCAT as Ethernet, CAN as SocketCAN, serial lines as LINKTYPE_USER0.
+    """
+    link = bench.buses.opened.get(url)
+    if link is None:
+        raise NotFound(f"{url} is no opened bus", value=url, remedy="scan it on the Connect page")
+    if not isinstance(link, RecordsFrames):
+        raise NotAllowed(
+            f"{url}: its frames are not recorded",
+            value=url,
+            remedy="only EtherCAT, CANopen, Modbus and MLink record them",
+        )
+    data = await link.flight(station)
+    headers = {"content-disposition": f'attachment; filename="{file_name(url)}"'}
+    return Response(data, media_type="application/octet-stream", headers=headers)

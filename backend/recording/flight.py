@@ -1,0 +1,33 @@
+"""The last minute of frames of every opened bus, for a support bundle or a download."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from drivers.errors import DriveError
+from drivers.link import Link, RecordsFrames
+
+SUFFIX = ".pcapng"
+
+
+def file_name(url: str) -> str:
+    """A file name for a bus: of its URL what file names may have."""
+    return (re.sub(r"[^A-Za-z0-9]+", "-", url).strip("-")[:60] or "bus") + SUFFIX
+
+
+async def flights(opened: Mapping[str, Link]) -> dict[str, bytes]:
+    """A pcapng file of each bus that records; a bus that cannot give one is left out."""
+    found: dict[str, bytes] = {}
+    for url, link in list(opened.items()):
+        if not isinstance(link, RecordsFrames):
+            continue
+        try:
+            data = await link.flight()
+        except DriveError:
+            continue
+        name, number = file_name(url), 2
+        while name in found:
+            name, number = f"{number}-{file_name(url)}", number + 1
+        found[name] = data
+    return found

@@ -1,0 +1,1 @@
+"""Why a drive does not reach Operational: facts read from it, and the causes that fit them."""

@@ -1,0 +1,166 @@
+"""Which PDOs are assigned in one direction, by the rules of the profile: pure, no I/O.
+
+Source: ETG.2000 v1.0.10 clauses 6.10 (Fixed, Mandatory, Exclude, Sm) and 6.9 (PDOs of an
+operation mode); ETG.1000.6 clause 5.6.7.4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from profiles.bring_up import BringUp
+from profiles.schema import PdoSet, PdoSpec, Profile
+
+Direction = Literal["rx", "tx"]
+
+
+@dataclass(frozen=True, slots=True)
+class AssignmentRules:
+    """What may be assigned in one direction of one drive.
+
+    ``free`` is the set whose contents are written, None where none can be; ``kept`` are those
+    that are assigned beside it. ``room_bytes`` is what the sync manager holds.
+    """
+
+    sets: tuple[PdoSet, ...]
+    default: tuple[PdoSet, ...]
+    mandatory: tuple[PdoSet, ...]
+    free: PdoSet | None
+    kept: tuple[PdoSet, ...]
+    assignable: bool
+    room_bytes: int | None
+
+
+def assignment_rules(profile: Profile, spec: PdoSpec, direction: Direction) -> AssignmentRules:
+    """The rules of ``profile`` for one direction."""
+    rules = profile.bring_up
+    assignable = rules is None or rules.coe.pdo_assign is not False
+    sets = tuple(s for s in spec.sets if s.direction == direction)
+    listed = () if rules is None else rules.mode_pdos(_manager_number(rules, direction))
+    if listed:
+        sets = tuple(s for s in sets if s.mandatory or s.index in listed) or sets
+    mandatory = tuple(s for s in sets if s.mandatory)
+    default = _default(spec, sets, direction, listed)
+    free = _free(spec, sets, direction, default, mandatory, assignable=assignable)
+    beside = mandatory if assignable else default
+    kept = tuple(s for s in beside if free is not None and s.index != free.index)
+    return AssignmentRules(
+        sets, default, mandatory, free, kept, assignable, _room(rules, spec, direction)
+    )
+
+
+def _manager_number(rules: BringUp, direction: Direction) -> int:
+    found = rules.sync_manager("outputs" if direction == "rx" else "inputs")
+    return (2 if direction == "rx" else 3) if found is None else found.number
+
+
+def _room(rules: BringUp | None, spec: PdoSpec, direction: Direction) -> int | None:
+    manager = None
+    if rules is not None:
+        manager = rules.sync_manager("outputs" if direction == "rx" else "inputs")
+    limits = [spec.max_bytes, None if manager is None else manager.max_size or None]
+    return min((limit for limit in limits if limit is not None), default=None)
+
+
+def _default(
+    spec: PdoSpec, sets: tuple[PdoSet, ...], direction: Direction, listed: Collection[int]
+) -> tuple[PdoSet, ...]:
+    """What is assigned without a master's doing: PDOs with a sync manager, else the first one."""
+    chosen = tuple(s for s in sets if s.index in listed)
+    chosen = chosen or tuple(s for s in sets if s.sync_manager is not None)
+    first = spec.default_rx if direction == "rx" else spec.default_tx
+    return chosen or tuple(s for s in sets if s.index == first)
+
+
+def _free(
+    spec: PdoSpec,
+    sets: tuple[PdoSet, ...],
+    direction: Direction,
+    default: tuple[PdoSet, ...],
+    mandatory: tuple[PdoSet, ...],
+    *,
+    assignable: bool,
+) -> PdoSet | None:
+    """The set to be filled: the profile's choice where the rules allow it, else another."""
+    preferred = spec.free_set(direction)
+    if preferred is None:
+        return None
+    candidates = [s for s in (sets if assignable else default) if s.is_free]
+    candidates.sort(key=lambda s: s.index != preferred)
+    for candidate in candidates:
+        if all(compatible(candidate, other) for other in mandatory):
+            return candidate
+    if not any(s.index == preferred for s in sets) and not default:
+        # A profile may name a free PDO without describing its contents.
+        return PdoSet(index=preferred, direction=direction, entries=(), source=spec.source)
+    return None
+
+
+def compatible(one: PdoSet, other: PdoSet) -> bool:
+    """Whether two PDOs can be assigned together."""
+    return one is other or (other.index not in one.exclude and one.index not in other.exclude)
+
+
+def choose_fixed(
+    rules: AssignmentRules,
+    must: Collection[str],
+    want: Collection[str],
+    keys_of: Callable[[Sequence[PdoSet]], Collection[str]],
+) -> tuple[PdoSet, ...] | None:
+    """PDOs with fixed contents that carry all of ``must`` and most of ``want``.
+
+    ``keys_of`` gives the objects that a list of PDOs carries in whole bytes. One PDO beside the
+    mandatory ones where that is enough, the default assignment where it carries as much, several
+    PDOs only where it takes them. None where no assignment carries ``must``.
+    """
+    if not rules.assignable:
+        return rules.default if set(must) <= set(keys_of(rules.default)) else None
+    candidates = [_with(rules, (each,)) for each in rules.sets]
+    candidates.append(_with(rules, rules.default))
+    usable = [c for c in candidates if c and set(must) <= set(keys_of(c))]
+    if not usable:
+        several = _several(rules, must, keys_of)
+        usable = [several] if set(must) <= set(keys_of(several)) else []
+    if not usable:
+        return None
+    default = {s.index for s in rules.default}
+    return max(
+        usable,
+        key=lambda c: (
+            len(set(want) & set(keys_of(c))), {s.index for s in c} == default,
+            any(s.index in default for s in c), -len(c),
+        ),
+    )  # fmt: skip
+
+
+def _with(rules: AssignmentRules, chosen: Sequence[PdoSet]) -> tuple[PdoSet, ...]:
+    """Mandatory PDOs and ``chosen`` in the file's order; empty where they exclude each other."""
+    wanted = {s.index for s in (*rules.mandatory, *chosen)}
+    together = tuple(s for s in rules.sets if s.index in wanted)
+    fits = all(compatible(one, other) for one in together for other in together)
+    keys = [key for each in together if each.direction == "rx" for key in each.entries]
+    # An output in two places would have to be written in both.
+    return together if fits and len(keys) == len(set(keys)) else ()
+
+
+def _several(
+    rules: AssignmentRules,
+    must: Collection[str],
+    keys_of: Callable[[Sequence[PdoSet]], Collection[str]],
+) -> tuple[PdoSet, ...]:
+    """Mandatory PDOs, and one after the other those that carry most of what is still missing."""
+    taken = _with(rules, ())
+    while missing := set(must) - set(keys_of(taken)):
+        further = [
+            longer
+            for each in rules.sets
+            if each not in taken
+            and (longer := _with(rules, (*taken, each)))
+            and missing & set(keys_of((each,)))
+        ]
+        if not further:
+            break
+        taken = max(further, key=lambda c: len(missing & set(keys_of(c))))
+    return taken

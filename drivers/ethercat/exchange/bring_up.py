@@ -1,0 +1,236 @@
+"""What the maker's file prescribes for the way to Operational, as the host process obeys it.
+
+The server makes a `StationBringUp` of the profile; it travels to the host as a plain map.
+Source: ETG.2000 v1.0.10; ETG.1000.4 clauses 6.3 (watchdog), 6.7 (sync managers), 6.8 (clocks).
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import asdict, dataclass
+
+from drivers.errors import NotAllowed, ProtocolError, Rejected
+from drivers.ethercat.process.protocol import Message
+from drivers.ethercat.process.station import Station
+from drivers.ethercat.wire import coe
+from drivers.ethercat.wire.registers import read_again
+from drivers.ethercat.wire.steps import Steps, Write
+from profiles.bring_up import BringUp, ClockMode, InitCommand
+from profiles.motion.classify import standard_rule
+from profiles.schema import Profile
+
+SYNC_MANAGERS, WATCHDOG_DIVIDER = 0x800, 0x400
+_WATCHDOG_BIT = 0x40
+_PLAIN_ACTIVATE = 0x0300
+_MODE_OF_OPERATION = 0x6060
+_MAPPING = (
+    range(0x1600, 0x1800), range(0x1A00, 0x1C00), range(0x1C12, 0x1C13), range(0x1C13, 0x1C14),
+)  # fmt: skip
+#: Transitions that this master makes on the way up, in their order.
+BEFORE_MAPPING, BEFORE_OP = ("IP", "PS"), ("SO",)
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """An object to be written on a transition."""
+
+    transition: str
+    index: int
+    subindex: int
+    data: bytes
+    complete: bool
+    comment: str
+
+
+@dataclass(frozen=True, slots=True)
+class StationBringUp:
+    """See the module. Times in ns unless their name says ms; None: the file does not say."""
+
+    commands: tuple[Command, ...] = ()
+    activate: int = _PLAIN_ACTIVATE
+    sync0_cycle_ns: int = 0
+    sync0_shift_ns: int = 0
+    sync1_ns: int = 0
+    watchdog_divider: int | None = None
+    watchdog_limit_ns: int | None = None
+    controls: tuple[tuple[int, int], ...] = ()
+    """Number and control byte of the sync managers of process data."""
+    complete_access: bool | None = None
+    safeop_op_ms: int | None = None
+    mailbox_ms: int | None = None
+    notes: tuple[str, ...] = ()
+
+
+def station_bring_up(profile: Profile | None, cycle_ns: int) -> StationBringUp:
+    """What a profile prescribes for process data of this cycle [ns]."""
+    rules = profile.bring_up if profile is not None else None
+    if rules is None:
+        return StationBringUp(sync0_cycle_ns=cycle_ns)
+    commands, notes = _commands(rules)
+    mode = rules.clock_mode
+    sync0_ns = cycle_ns if mode is None else mode.sync0.period_ns(cycle_ns)
+    return StationBringUp(
+        commands=commands,
+        activate=_PLAIN_ACTIVATE if mode is None else mode.assign_activate,
+        sync0_cycle_ns=sync0_ns,
+        sync0_shift_ns=0 if mode is None else mode.sync0.shift_ns,
+        sync1_ns=_sync1_ns(mode, sync0_ns),
+        watchdog_divider=rules.watchdog.divider,
+        watchdog_limit_ns=rules.watchdog.process_data_ns,
+        controls=tuple(
+            (each.number, each.control)
+            for each in rules.sync_managers
+            if each.kind in ("outputs", "inputs") and each.control is not None
+        ),
+        complete_access=rules.coe.complete_access,
+        safeop_op_ms=rules.timeouts.safeop_op_ms,
+        mailbox_ms=rules.timeouts.mailbox_response_ms,
+        notes=notes,
+    )
+
+
+def _sync1_ns(mode: ClockMode | None, sync0_ns: int) -> int:
+    """Register 9A4h: from SYNC0 to SYNC1, with whole SYNC0 cycles where SYNC1 is slower.
+
+    ETG.1000.4 clause 6.8: SYNC1 follows the first SYNC0 by this time, and then every
+    ``9A4h div 9A0h + 1`` cycles of SYNC0.
+    """
+    if mode is None or mode.sync1 is None:
+        return 0
+    slower = mode.sync1.period_ns(sync0_ns) // sync0_ns if sync0_ns else 1
+    return max((max(slower, 1) - 1) * sync0_ns + mode.sync1.shift_ns, 0)
+
+
+def withheld(command: InitCommand) -> str:
+    """Why a command of the file is not written by this tool; empty where it is.
+
+    The mode may be set, as the axis is not enabled before Operational; a control word, a target
+    or a forced output may not: the maker's file must not move the axis. The assignment of process
+    data is written as they are chosen.
+    """
+    if any(command.index in each for each in _MAPPING):
+        return "the process data are written as they are chosen"
+    if command.transition not in (*BEFORE_MAPPING, *BEFORE_OP):
+        return "only commands on the way up to Operational are written"
+    rule = standard_rule(f"{command.index:04X}:{command.subindex:02X}")
+    if rule is None or rule.motion != "energises" or command.index == _MODE_OF_OPERATION:
+        return ""
+    return f"it could move the axis ({rule.reason})"
+
+
+def _commands(rules: BringUp) -> tuple[tuple[Command, ...], tuple[str, ...]]:
+    sent, notes = [], []
+    for each in rules.init_commands:
+        reason = withheld(each)
+        if reason:
+            notes.append(
+                f"the command {each.transition} {each.index:04X}:{each.subindex:02X} of its file is"
+                f" not written: {reason}"
+            )
+            continue
+        sent.append(
+            Command(
+                each.transition, each.index, each.subindex, each.raw,
+                each.complete_access, each.comment,
+            )
+        )  # fmt: skip
+    return tuple(sent), tuple(notes)
+
+
+def to_wire(rules: StationBringUp) -> Message:
+    """As a plain map."""
+    return asdict(rules)
+
+
+def from_wire(message: Message | None) -> StationBringUp | None:
+    """From the plain map; None where there is none."""
+    if message is None:
+        return None
+    fields = dict(message)
+    fields["commands"] = tuple(Command(**each) for each in message["commands"])
+    fields["controls"] = tuple((number, value) for number, value in message["controls"])
+    fields["notes"] = tuple(message["notes"])
+    return StationBringUp(**fields)
+
+
+def send_commands(
+    station: Station, rules: StationBringUp, transitions: tuple[str, ...]
+) -> Steps[None]:
+    """Write the commands of these transitions, each transition's in the order of the file.
+
+    Raises:
+        NotAllowed: the drive refuses one of them.
+    """
+    for transition in transitions:
+        for command in rules.commands:
+            if command.transition != transition:
+                continue
+            try:
+                yield from coe.download(
+                    station.box, command.index, command.subindex, command.data,
+                    complete=command.complete,
+                )  # fmt: skip
+            except Rejected as error:
+                raise NotAllowed(
+                    f"station {station.number} refuses the command {transition}"
+                    f" {command.index:04X}:{command.subindex:02X} = {command.data.hex()} of its"
+                    f" maker's file: {error.message}",
+                    parameter=f"{command.index:04X}:{command.subindex:02X}",
+                    value=command.data.hex(),
+                    remedy="import the file of this very revision, or take the command out of"
+                    " bring_up.init_commands in the profile",
+                ) from error
+
+
+def set_watchdog_divider(station: Station, rules: StationBringUp) -> Steps[None]:
+    """Write 0400h as the file gives it.
+
+    Raises:
+        NotAllowed: it reads back as something else.
+    """
+    if rules.watchdog_divider is None:
+        return
+    wanted = struct.pack("<H", rules.watchdog_divider)
+    yield Write(WATCHDOG_DIVIDER, wanted)
+    if (yield from read_again(WATCHDOG_DIVIDER, 2)) != wanted:
+        raise NotAllowed(
+            f"station {station.number} does not take the watchdog divider"
+            f" {rules.watchdog_divider} of its file",
+            remedy="cyclic motion is refused: nothing would stop the axis if the computer died",
+        )
+
+
+def set_controls(station: Station, rules: StationBringUp) -> Steps[None]:
+    """Give the sync managers of process data the control bytes of the file.
+
+    The watchdog's bit stays as it is: whether outputs trigger it is this tool's to decide.
+
+    Raises:
+        ProtocolError: the station stopped answering.
+    """
+    for number, control in rules.controls:
+        base = SYNC_MANAGERS + 8 * number
+        manager = yield from read_again(base, 8)
+        if manager is None:
+            raise ProtocolError(f"station {station.number} stopped answering")
+        wanted = control & ~_WATCHDOG_BIT | manager[4] & _WATCHDOG_BIT
+        if manager[4] == wanted or not manager[6] & 1:
+            continue
+        yield Write(base + 6, b"\0")
+        yield Write(base + 4, bytes([wanted]))
+        yield Write(base + 6, b"\x01")
+
+
+def timeout_s(rules: StationBringUp | None, usual_s: float) -> float:
+    """How long a step to Safe-Op or Op may take: as usual, or as long as the file allows."""
+    named_ms = None if rules is None else rules.safeop_op_ms
+    return usual_s if named_ms is None else max(usual_s, named_ms / 1000)
+
+
+def apply_mailbox(station: Station, rules: StationBringUp) -> None:
+    """Complete access and patience as the file says; its notes become the station's."""
+    if rules.complete_access is False:
+        station.complete_access = False
+    if rules.mailbox_ms and station.mailbox is not None:
+        station.box.timeout_s = max(station.box.timeout_s, rules.mailbox_ms / 1000)
+    station.notes += [note for note in rules.notes if note not in station.notes]

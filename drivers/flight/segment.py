@@ -1,0 +1,96 @@
+"""The recorder process of an EtherCAT segment, as the server starts and asks it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import socket
+import struct
+import sys
+import time
+from collections.abc import Sequence
+
+from drivers.errors import LinkLost
+
+_LENGTH = struct.Struct("<Q")
+_FILE_S, _END_S = 30.0, 2.0
+
+
+class SegmentRecorder:
+    """Starts with the link and ends with it; a link works without it as well."""
+
+    def __init__(self, interface: str, launcher: Sequence[str]) -> None:
+        self._interface = interface
+        self._launcher = tuple(launcher)
+        self._process: asyncio.subprocess.Process | None = None
+        self._streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = None
+        self._asking = asyncio.Lock()
+
+    @property
+    def process_id(self) -> int | None:
+        """Of the recorder; None where it does not run."""
+        return None if self._process is None else self._process.pid
+
+    async def start(self) -> None:
+        """Begin to record; a computer that has no room for the process records nothing."""
+        ours, theirs = socket.socketpair()
+        try:
+            with theirs:
+                self._process = await asyncio.create_subprocess_exec(
+                    *self._launcher, sys.executable, "-m", "drivers.flight.process",
+                    self._interface, "--control", str(theirs.fileno()),
+                    pass_fds=(theirs.fileno(),), stdin=asyncio.subprocess.DEVNULL,
+                )  # fmt: skip
+            self._streams = await asyncio.open_connection(sock=ours)
+        except OSError:
+            ours.close()
+
+    def note(self, text: str, station: int | None = None) -> None:
+        """A remark for the next frame."""
+        message = {"note": text, "station": station, "time_ns": time.time_ns()}
+        if self._streams is not None and not self._streams[1].is_closing():
+            self._streams[1].write(json.dumps(message).encode() + b"\n")
+
+    async def file(self, station: int | None = None) -> bytes:
+        """The last minute as a pcapng file.
+
+        Raises:
+            LinkLost: the recorder does not run.
+        """
+        if self._streams is None:
+            raise self._gone()
+        reader, writer = self._streams
+        async with self._asking:
+            try:
+                writer.write(json.dumps({"file": True, "station": station}).encode() + b"\n")
+                async with asyncio.timeout(_FILE_S):
+                    (size,) = _LENGTH.unpack(await reader.readexactly(_LENGTH.size))
+                    return await reader.readexactly(size)
+            except (OSError, asyncio.IncompleteReadError, TimeoutError) as error:
+                writer.close()
+                self._streams = None
+                raise self._gone() from error
+
+    async def stop(self) -> None:
+        """End it. Calling again does nothing."""
+        if self._streams is not None:
+            self._streams[1].close()
+            self._streams = None
+        process, self._process = self._process, None
+        if process is None:
+            return
+        try:
+            async with asyncio.timeout(_END_S):
+                await process.wait()
+        except TimeoutError:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+            await process.wait()
+
+    def _gone(self) -> LinkLost:
+        return LinkLost(
+            f"the frames of {self._interface} are not being recorded",
+            remedy="close the bus and open it again; recording needs the same permission for raw"
+            " sockets as the exchange",
+        )

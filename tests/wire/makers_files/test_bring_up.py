@@ -1,0 +1,148 @@
+"""From a maker's file alone to Operational, on a slave that insists on every rule of the file."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
+
+import pytest
+
+from backend.axis.axis import Axis
+from backend.axis.cyclic import CyclicSession
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
+from backend.tools.jog.cyclic import jog_cyclic
+from backend.tools.jog.hold import Hold
+from backend.tools.jog.run import JogSettings
+from drivers.cia402 import State
+from drivers.ethercat.link import EthercatLink
+from drivers.link import Address, CyclicSignal, ScopeBlock
+from drivers.virtual.wires.ethercat.launch import VirtualSegment
+from drivers.virtual.wires.netns import Namespace, unavailable
+from profiles.importer import import_file
+from profiles.schema import DataType, Profile
+from tests.virtual.tools.rig import silent
+from tests.wire.makers_files.samples import SAMPLES
+
+_FACTORY = "tests.wire.makers_files.strict_slave:make_device"
+_SLAVE = "tests.wire.makers_files.strict_slave:StrictSlave"
+
+
+@pytest.fixture(scope="module")
+def namespace() -> Iterator[Namespace]:
+    reason = unavailable()
+    if reason is not None:
+        pytest.skip(reason)
+    with Namespace.create() as made:
+        yield made
+
+
+@asynccontextmanager
+async def brought(
+    namespace: Namespace, name: str
+) -> AsyncIterator[tuple[EthercatLink, VirtualSegment]]:
+    # A slave that takes its time takes real time: that of a lockstep wire stands without frames.
+    lockstep = "slow" not in name
+    arguments = ["--factory", _FACTORY, "--slave", _SLAVE, "--sdo-ms", "0.3", "--drive", name]
+    arguments += ["--lockstep"] if lockstep else []
+    segment = VirtualSegment.start("ec0s", arguments, namespace)
+    link = EthercatLink(
+        "ec0m", url="ethercat://virtual0", launcher=namespace.command([]),
+        lockstep=1.0 if lockstep else 0.0,
+    )  # fmt: skip
+    await link.open()
+    try:
+        # A search that lost frames on a busy computer is made again, as the page offers.
+        for _ in range(5):
+            found = await link.scan(lambda _share, _text: None)
+            if [each.state for each in found] == ["PREOP"]:
+                break
+        assert [each.state for each in found] == ["PREOP"], found
+        yield link, segment
+    finally:
+        await link.close()
+        segment.close()
+
+
+def profile_of(name: str) -> Profile:
+    return import_file(SAMPLES[name], f"{name}.xml").profile
+
+
+def signal(index: int, kind: DataType) -> CyclicSignal:
+    return CyclicSignal(1, Address(index, 0, kind), f"{index:04X}")
+
+
+INPUTS = [signal(0x6041, "UINT16"), signal(0x6064, "INT32"), signal(0x606C, "INT32")]
+OUTPUTS = [signal(0x6060, "INT8"), signal(0x607A, "INT32"), signal(0x60FF, "INT32")]
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+async def test_from_the_file_to_process_data(namespace: Namespace, name: str) -> None:
+    async with brought(namespace, name) as (link, segment):
+        link.attach(1, profile_of(name))
+        cyclic = link.process_data
+        taken = await cyclic.configure(INPUTS, OUTPUTS, 0.001)
+        assert {s.channel for s in taken} >= {"6041", "6064", "607A", "6060"}
+        blocks: list[ScopeBlock] = []
+        cyclic.blocks(blocks.append)
+        await cyclic.start()
+        state = segment.command("state")
+        assert state["slaves"][0]["state"] == "OP", state
+        await cyclic.drive_to(1, State.OPERATION_ENABLED, mode=9)
+        segment.command("inject", slave=0, what="shift", value=4321)
+        await link.write(1, Address(0x6060, 0, "INT8"), b"\x09")
+        for _ in range(400):
+            await asyncio.sleep(0.01)
+            last = blocks[-1] if blocks else None
+            if last is not None and last.samples[-1, last.channels.index("6064")] >= 5321:
+                break
+        assert last is not None
+        row = dict(zip(last.channels, last.samples[-1], strict=True))
+        truth = bytes.fromhex(segment.command("read", slave=0, index=0x6064))
+        assert row["6064"] == int.from_bytes(truth, "little", signed=True) == 5321
+        assert int(row["6041"]) & 0x6F == 0x27, "operation enabled, by the status word (CiA 402)"
+        mode = bytes.fromhex(segment.command("read", slave=0, index=0x6060))
+        assert mode == b"\x09", "the output that was written has arrived"
+        await cyclic.stop()
+
+
+_JOG = JogSettings(
+    direction=1, speed_rpm=60.0, acceleration_rpm_s=600.0, travel_rev=5.0, torque_percent=100.0
+)
+
+
+@pytest.mark.parametrize("name", ["mandatory_and_free", "shifted_clock"])
+async def test_jog_with_the_file_alone(namespace: Namespace, name: str) -> None:
+    """60 rpm are one revolution, 10000 increments by 608Fh of the file, in a second."""
+    profile = profile_of(name)
+    async with brought(namespace, name) as (link, segment):
+        link.attach(1, profile)
+        spec = profile.link("ethercat")
+        assert spec is not None
+        axis = Axis(Drive("x", "X", profile, [Port(link, 1, spec)]))
+        session = CyclicSession(link, [axis.drive])
+        await session.start(1e-3)
+        axis.session = session
+        # The page's time, which a busy computer does not interrupt.
+        page_s = [0.0]
+        hold = Hold(clock=lambda: page_s[0])
+
+        async def held() -> None:
+            for _ in range(40):
+                page_s[0] += 0.05
+                hold.renew()
+                await asyncio.sleep(0.05)
+            hold.release("released")
+
+        holding = asyncio.create_task(held())
+        try:
+            result = await jog_cyclic(axis, session, _JOG, hold, silent())
+        finally:
+            holding.cancel()
+            await session.stop()
+        truth = bytes.fromhex(segment.command("read", slave=0, index=0x6064))
+    moved = int.from_bytes(truth, "little", signed=True) - 1000
+    assert result["reason"] == "released", result
+    assert result["moved_rev"] == pytest.approx(moved / 10_000, abs=1e-3)
+    assert moved > 2000

@@ -1,0 +1,60 @@
+import { Button } from '@mantine/core'
+import { useState } from 'react'
+import { api, ask } from '../../../api/client'
+import type { StationDiagnosis } from '../../../api/schema'
+import { useLanguage, useT } from '../../../i18n'
+import { ProblemNote } from '../../../widgets/ProblemNote'
+import { useAction } from '../../../widgets/useAction'
+
+/** Why stations of a segment are not in Operational: causes with evidence, the likeliest first. */
+export function DoctorCard({ url }: { url: string }) {
+  const t = useT()
+  const chinese = useLanguage() === 'zh'
+  const [found, setFound] = useState<StationDiagnosis[] | null>(null)
+  const examine = useAction()
+  return (
+    <section aria-label={t('segment.doctor')}>
+      <Button
+        loading={examine.busy}
+        onClick={() =>
+          void examine.run(async () => {
+            setFound(await ask(api.GET('/api/v1/ethercat/doctor', { params: { query: { url } } })))
+          })
+        }
+      >
+        {t('segment.doctor')}
+      </Button>
+      <ProblemNote problem={examine.problem} onClose={examine.clear} />
+      {found?.map((each) => (
+        <div key={each.station}>
+          <h4>{t('segment.doctorStation', { station: each.station })}</h4>
+          {each.reached ? (
+            <p>{t('segment.doctorWell')}</p>
+          ) : (
+            <ol>
+              {each.causes.map((cause) => (
+                <li key={cause.code}>
+                  <strong>{chinese ? cause.title_zh : cause.title}</strong>
+                  <p>{chinese ? cause.remedy_zh : cause.remedy}</p>
+                  <ul className="plain-list dim num">
+                    {cause.facts.map((fact) => (
+                      <li key={fact.name}>
+                        {fact.expected === null
+                          ? `${fact.name} = ${fact.actual}`
+                          : t('segment.doctorFact', {
+                              name: fact.name,
+                              actual: fact.actual,
+                              expected: fact.expected,
+                            })}
+                      </li>
+                    ))}
+                  </ul>
+                </li>
+              ))}
+            </ol>
+          )}
+        </div>
+      ))}
+    </section>
+  )
+}
