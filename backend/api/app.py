@@ -50,7 +50,7 @@ from backend.recording.rerun_feed import RerunFeed
 from backend.recording.service import Recordings
 from backend.scene.feed import SceneFeed
 from backend.station.bench import Bench
-from drivers import scheduling
+from drivers.computer import scheduling
 
 PREFIX = "/api/v1"
 _HERE = Path(__file__).resolve()

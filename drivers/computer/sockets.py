@@ -6,6 +6,7 @@ import os
 import socket
 import struct
 import sys
+from pathlib import Path
 
 from drivers.errors import NotAllowed
 
@@ -19,8 +20,8 @@ _SIOCGIFFLAGS, _SIOCSIFFLAGS = 0x8913, 0x8914
 
 __all__ = [
     "AF_NETLINK", "AF_PACKET", "AF_UNIX", "MSG_DONTWAIT", "NETLINK_ROUTE",
-    "blocks", "interface_flags", "receive_with_notes", "require_ethercat",
-    "set_blocking", "set_interface_flags", "shared_memory_file",
+    "blocks", "hold_name", "interface_flags", "open_sockets", "receive_with_notes",
+    "require_ethercat", "set_blocking", "set_interface_flags", "shared_memory_file",
 ]  # fmt: skip
 
 
@@ -42,7 +43,10 @@ def require_ethercat(interface: str) -> None:
 
 def blocks(descriptor: int) -> bool:
     """Whether reading this descriptor waits; True on Windows, where it always does."""
-    return True if sys.platform == "win32" else os.get_blocking(descriptor)
+    if sys.platform == "win32":
+        return True
+    else:  # noqa: RET505 - type checkers follow the branches of a system
+        return os.get_blocking(descriptor)
 
 
 def set_blocking(descriptor: int, wanted: bool) -> None:
@@ -77,7 +81,8 @@ def receive_with_notes(
     """
     if sys.platform == "win32":
         raise OSError("recvmsg is not available on Windows")
-    return source.recvmsg(most, notes)
+    else:  # noqa: RET506 - type checkers follow the branches of a system
+        return source.recvmsg(most, notes)
 
 
 def interface_flags(interface: str) -> int:
@@ -107,3 +112,31 @@ def _flags_by(request: int, interface: str, flags: int) -> int:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
         answer = fcntl.ioctl(control, request, wanted)
     return int(struct.unpack("16sH14x", answer)[1])
+
+
+def hold_name(name: str) -> socket.socket:
+    """A socket that holds this name for this process alone: abstract (unix(7)), so that it belongs
+    to the network namespace as its interfaces do, and goes with the process.
+
+    Raises:
+        OSError: another process holds it, or the system has no such names.
+    """
+    holder = socket.socket(AF_UNIX, socket.SOCK_DGRAM)
+    try:
+        holder.bind(f"\0{name}")
+    except OSError:
+        holder.close()
+        raise
+    return holder
+
+
+def open_sockets() -> set[int]:
+    """The descriptors of this process that are sockets; Linux alone lists them (proc(5))."""
+    found = set()
+    for entry in Path("/proc/self/fd").iterdir():
+        try:
+            if str(entry.readlink()).startswith("socket:"):
+                found.add(int(entry.name))
+        except OSError:
+            continue
+    return found

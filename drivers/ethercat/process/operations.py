@@ -9,6 +9,7 @@ from typing import Any
 
 from drivers import cia402
 from drivers.cia402 import State
+from drivers.computer.realtime import RealTime
 from drivers.errors import Busy, DriveError, LinkLost, NotAllowed, OutOfRange, ProtocolError
 from drivers.ethercat.exchange.cyclic import CyclicLoop
 from drivers.ethercat.exchange.ring import Ring
@@ -16,7 +17,6 @@ from drivers.ethercat.exchange.setup import FoundInPart
 from drivers.ethercat.process import firmware
 from drivers.ethercat.process import station as transactions
 from drivers.ethercat.process.protocol import Message, error_to_wire
-from drivers.ethercat.process.realtime import RealTime
 from drivers.ethercat.process.roster import Roster, Send
 from drivers.ethercat.process.segment import Segment, SpoiltMap
 from drivers.ethercat.process.station import Station

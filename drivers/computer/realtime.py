@@ -8,7 +8,7 @@ import signal
 import sys
 from dataclasses import dataclass
 
-from drivers import scheduling
+from drivers.computer import scheduling
 
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
 _PR_SET_PDEATHSIG = 1
