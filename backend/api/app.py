@@ -41,6 +41,7 @@ from backend.api.sets import lists as routes_lists
 from backend.api.sets import routes as routes_sets
 from backend.api.station import description as routes_description
 from backend.api.station import ethercat as routes_ethercat
+from backend.api.station import preflight as routes_preflight
 from backend.api.station import routes as routes_bench
 from backend.api.tuning import measure as routes_tune
 from backend.functions.forcing import ForcingSessions
@@ -77,6 +78,7 @@ _PARTS = (
     routes_drive,
     routes_owed,
     routes_ethercat,
+    routes_preflight,
     routes_lists,
     routes_sets,
     routes_description,

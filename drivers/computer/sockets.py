@@ -21,7 +21,8 @@ _SIOCGIFFLAGS, _SIOCSIFFLAGS = 0x8913, 0x8914
 __all__ = [
     "AF_NETLINK", "AF_PACKET", "AF_UNIX", "MSG_DONTWAIT", "NETLINK_ROUTE",
     "blocks", "hold_name", "interface_flags", "open_sockets", "receive_with_notes",
-    "require_ethercat", "set_blocking", "set_interface_flags", "shared_memory_file",
+    "require_ethercat", "require_linux", "set_blocking", "set_interface_flags",
+    "shared_memory_file",
 ]  # fmt: skip
 
 
@@ -38,6 +39,21 @@ def require_ethercat(interface: str) -> None:
             limit="Linux",
             remedy="run servodeck on a computer with Linux at the machine and open its page from"
             " here; Modbus, MLink and CANopen by slcan work on this one",
+        )
+
+
+def require_linux(what: str) -> None:
+    """Some things are to be had on Linux only.
+
+    Raises:
+        NotAllowed: another system.
+    """
+    if sys.platform != "linux":
+        raise NotAllowed(
+            f"{what} is not available: it looks at what Linux says of itself",
+            value=sys.platform,
+            limit="Linux",
+            remedy="run it on the computer with Linux at the machine",
         )
 
 
