@@ -115,7 +115,7 @@ async def ours(
         cyclic = link.process_data
         stations = range(1, slaves + 1)
         for station in stations:
-            link.know(station, load_profile("mms7"))
+            link.attach(station, load_profile("mms7"))
         await cyclic.configure(
             [s for n in stations for s in signals(n)[0]],
             [s for n in stations for s in signals(n)[1]],

@@ -22,9 +22,10 @@ from pymodbus.client import ModbusSerialClient
 
 from backend.drive.drive import Drive
 from backend.drive.ports import Port
+from drivers.modbus.line_url import line_settings
 from drivers.modbus.link import modbus_link
 from drivers.modbus.registers import words_of
-from drivers.urls import line_settings, parse_url
+from drivers.urls import parse_url
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.wires.modbus import ModbusSlave, TableRegisters
 from drivers.virtual.wires.pty import PtyWire, WireTime
@@ -66,7 +67,7 @@ async def dump(path: str, profile: Profile) -> tuple[float, int]:
     """Seconds of one dump (median) and the number of values in it."""
     url = f"modbus://{path}?baudrate={BAUDRATE}&parity=N"
     link = modbus_link(url, line_settings(parse_url(url)))
-    link.configure_station(1, profile)
+    link.attach(1, profile)
     await link.open()
     try:
         drive = Drive("z", "Z", profile, [Port(link, 1, profile.link("modbus"))])

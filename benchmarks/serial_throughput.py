@@ -25,8 +25,9 @@ from pymodbus.client import ModbusSerialClient
 from drivers.errors import DriveError
 from drivers.link import Address
 from drivers.mlink.link import MlinkLayout, mlink_link
+from drivers.modbus.line_url import line_settings
 from drivers.modbus.registers import Place, plan_blocks
-from drivers.urls import line_settings, parse_url
+from drivers.urls import parse_url
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.wires.modbus import ModbusSlave, ObjectRegisters
 from drivers.virtual.wires.pty import PtyWire, WireTime
@@ -111,7 +112,7 @@ async def ours(path: str, baudrate: int | None, addresses: list[Address], blocks
     assert spec is not None
     others = tuple(s for s in profile.links if s.kind != "mlink")
     chosen = spec.model_copy(update={"max_registers": 125 if blocks else None})
-    link.configure_station(1, profile.model_copy(update={"links": (*others, chosen)}))
+    link.attach(1, profile.model_copy(update={"links": (*others, chosen)}))
     await link.open()
     try:
         results = await link.read_many(1, addresses)

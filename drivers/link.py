@@ -16,7 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.cia402 import State
-from drivers.errors import DriveError
+from drivers.dictionary import Described
+from drivers.errors import DriveError, NotAllowed
 from drivers.halt import LoopState
 from drivers.motion.feedback import FeedbackScale
 from profiles.schema import DataType, LinkKind, Profile
@@ -87,11 +88,41 @@ Progress = Callable[[float, str], None]
 Unsubscribe = Callable[[], None]
 
 
+@dataclass(frozen=True, slots=True)
+class LinkTraits:
+    """What a kind of bus is like: callers ask for a trait, never for a kind."""
+
+    batch: int = 16
+    """Values for one `Link.read_many`. Small, so that a STOP never waits behind a long batch; a
+    link that lets a write go between two of its requests takes more.
+    """
+    whole_objects: bool = False
+    """Entries of an object are read together: an object is not parted between two batches."""
+    registers: bool = False
+    """Values are reached by their Modbus register, not by index and subindex."""
+    synchronous: bool = False
+    """Set-points and samples share one instant of every cycle without clocks in the drives."""
+    description: Literal["none", "dictionary", "stored_eds"] = "none"
+    """How a drive tells of its own objects: not, by `Link.enumerate`, or by an EDS in 1021h."""
+    silent: str = "power, cable and address"
+    """What to look at where nothing answers."""
+
+
+def lists_nothing(kind: LinkKind, station: int) -> NotAllowed:
+    """What `Link.enumerate` raises on a bus whose drives do not list their objects."""
+    return NotAllowed(
+        f"a drive on {kind} cannot list its own objects",
+        drive=f"station {station}",
+        remedy="import the maker's EDS or ESI file, or use the generic profile",
+    )
+
+
 class Link(Protocol):
     """One opened bus. See the module docstring for byte order and threading."""
 
     kind: LinkKind
     url: str
+    traits: LinkTraits
 
     @property
     def cyclic(self) -> Cyclic | None:
@@ -107,8 +138,31 @@ class Link(Protocol):
     async def close(self) -> None:
         """Close it. Calling again does nothing."""
 
-    async def scan(self, progress: Progress, stations: Sequence[int] | None = None) -> list[Found]:
-        """Look for drives; cancel by cancelling the task."""
+    def attach(self, station: int, profile: Profile) -> None:
+        """Say which family answers at ``station``: word order, block limits, process data."""
+
+    def unreachable(self, station: int, address: Address) -> str:
+        """Why the link cannot carry this value of the attached family; empty where it can."""
+
+    async def scan(
+        self,
+        progress: Progress,
+        stations: Sequence[int] | None = None,
+        *,
+        stop_after: int | None = None,
+    ) -> list[Found]:
+        """Look for drives; cancel by cancelling the task.
+
+        ``stop_after`` so many drives a bus stops that asks one address after the other, each at
+        the price of a time-out; one that asks all at once pays it no heed.
+        """
+
+    async def enumerate(self, station: int, progress: Progress) -> Sequence[Described]:
+        """Objects and entries of the drive's own dictionary, each object before its entries.
+
+        Raises:
+            NotAllowed: drives on this kind of bus list nothing (`LinkTraits.description`).
+        """
 
     async def read(self, station: int, address: Address) -> bytes:
         """Read one value, little endian, exactly as long as its type (text: as sent)."""
@@ -126,22 +180,6 @@ class Link(Protocol):
 
     def listen(self, listener: Callable[[LinkEvent], None]) -> Unsubscribe:
         """Be told of events, on the event loop's thread."""
-
-
-@runtime_checkable
-class NeedsProfile(Protocol):
-    """A link whose wire format depends on the family: word order, block limits, register table."""
-
-    def configure_station(self, station: int, profile: Profile) -> None:
-        """Say which family answers at ``station``."""
-
-
-@runtime_checkable
-class TellsUnreachable(Protocol):
-    """A link that knows, without asking the drive, which objects it cannot carry."""
-
-    def unreachable(self, station: int, address: Address) -> str:
-        """Why not, as a sentence; empty where it can. Of the family said to be at ``station``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,6 +247,14 @@ class Trajectory:
 class Cyclic(Protocol):
     """Synchronous process data of a bus that has them (EtherCAT, CANopen with SYNC)."""
 
+    @property
+    def dc(self) -> bool | None:
+        """Whether clocks in the drives rule the instant; None: the bus has none."""
+
+    @property
+    def left_over(self) -> tuple[tuple[CyclicSignal, str], ...]:
+        """Signals of the last `configure` that are not exchanged, each with the reason."""
+
     async def configure(
         self, inputs: Sequence[CyclicSignal], outputs: Sequence[CyclicSignal], cycle_s: float
     ) -> tuple[CyclicSignal, ...]:
@@ -235,14 +281,6 @@ class Cyclic(Protocol):
 
     def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:
         """Deliver samples on the event loop's thread; NaN stands for inputs of a lost station."""
-
-
-@runtime_checkable
-class KnowsFamilies(Protocol):
-    """A link whose process data depend on what the drive family can map."""
-
-    def know(self, station: int, profile: Profile | None) -> None:
-        """Tell which family a station is; None: unknown."""
 
 
 @runtime_checkable

@@ -16,7 +16,6 @@ from drivers.errors import Busy, DriveError, NotAllowed
 from drivers.link import (
     Cyclic,
     CyclicSignal,
-    KnowsFamilies,
     Link,
     OwnsPowerState,
     RecoversByItself,
@@ -82,8 +81,7 @@ class CyclicSession:
         inputs, outputs = [], []
         for drive in self.drives:
             port = self._port(drive)
-            if isinstance(self.link, KnowsFamilies):
-                self.link.know(port.station, drive.profile)
+            self.link.attach(port.station, drive.profile)
             by_speed = drive.id in self.by_speed
             if isinstance(self.cyclic, TakesSpeeds):
                 self.cyclic.take_speeds(port.station, by_speed)
@@ -100,10 +98,10 @@ class CyclicSession:
                 await asyncio.shield(self.cyclic.stop())
             raise
         left = {s.channel for s in [*inputs, *outputs]} - {s.channel for s in mapped}
-        reasons = {s.channel: why for s, why in getattr(self.cyclic, "left_over", ())}
+        reasons = {s.channel: why for s, why in self.cyclic.left_over}
         self.state = CyclicState(
             cycle_s=cycle_s,
-            dc=getattr(self.cyclic, "dc", None),
+            dc=self.cyclic.dc,
             channels=tuple(signal.channel for signal in mapped),
             left_over=tuple((c, reasons.get(c, "does not fit")) for c in sorted(left)),
         )
@@ -140,7 +138,7 @@ class CyclicSession:
     @property
     def synchronous(self) -> bool:
         """Whether set-points take effect, and samples are taken, at the same instant each cycle."""
-        return self.state is not None and (bool(self.state.dc) or self.link.kind == "canopen")
+        return self.state is not None and (bool(self.state.dc) or self.link.traits.synchronous)
 
     def _port(self, drive: Drive) -> Port:
         return next(port for port in drive.ports if port.link is self.link)

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from backend.commands.options import Json, Server, Url, server_for
 from backend.commands.session import opened, run, show_progress
 from backend.station.matching import match_profiles
-from drivers.urls import parse_url
+from drivers.urls import bus_kind, parse_url
 
 
 def scan(
@@ -29,18 +29,11 @@ def scan(
             serial = "no serial number" if row["serial"] is None else f"serial {row['serial']}"
             print(f"station {row['station']}: {name}  {serial}  {which}")
         if not rows:
-            print(f"no drive answers: check {_LOOK_AT[parse_url(url).scheme]}")
+            print(f"no drive answers: check {bus_kind(parse_url(url).scheme).traits.silent}")
 
     run(work)
 
 
-_SERIAL = "power, cable, baud rate, parity and address"
-_LOOK_AT = {
-    "mlink": _SERIAL,
-    "modbus": _SERIAL,
-    "canopen": "power, cable, both terminating resistors, bit rate and node number",
-    "ethercat": "power, cable (computer to IN of the first drive) and the interface's name",
-}
 _FOUND = {
     "station", "vendor_id", "product_code", "revision", "serial", "name", "alias", "firmware",
     "state", "notes",

@@ -20,7 +20,7 @@ from backend.station.matching import match_profiles, profile_for
 from backend.work.jobs import Progress
 from drivers.computer import signals
 from drivers.errors import DriveError, NotAllowed
-from drivers.link import Found, Link, NeedsProfile
+from drivers.link import Found, Link
 from drivers.urls import link_for
 from profiles.loader import ProfileError
 
@@ -147,8 +147,7 @@ async def drive_and_pending(
                 remedy="check power, cable, station address, baud rate and parity",
             )
         facts, spec = profile_for(link.kind, profile or _recognise(link, found))
-        if isinstance(link, NeedsProfile):
-            link.configure_station(station, facts)
+        link.attach(station, facts)
         drive = Drive(
             f"{facts.drive}-{station}",
             f"{facts.drive} station {station}",

@@ -114,7 +114,7 @@ class Drive:
         if any(port.carries(parameter) for port in self.ports):
             return ""
         for port in self.ports:
-            if carries(port.link.kind, parameter):
+            if carries(port.link.traits, parameter):
                 return port.why_not(parameter)
         kinds = " and ".join(sorted({port.link.kind for port in self.ports})) or "no link"
         needed = "Modbus" if parameter.index is None else "CANopen"

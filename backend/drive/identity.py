@@ -14,7 +14,7 @@ async def read_serial(drive: Drive) -> int | None:
         LinkTimeout, LinkLost: it does not answer.
     """
     for port in drive.ports:
-        if port.link.kind == "modbus":
+        if port.link.traits.registers:
             continue
         try:
             async with drive.rest.asking():

@@ -37,7 +37,7 @@ from backend.store.files import StorageFailed
 from backend.work.jobs import Job, JobRunner
 from backend.work.journal import Journal, Level
 from drivers.errors import Busy, DriveError, NotAllowed
-from drivers.link import Found, Link, NeedsProfile
+from drivers.link import Found, Link
 from profiles.loader import ProfileError
 
 log = logging.getLogger(__name__)
@@ -145,8 +145,7 @@ class Bench:
         link = await self.buses.open(url)
         self._require_free(link, url, station)
         facts, spec = profile_for(link.kind, profile)
-        if isinstance(link, NeedsProfile):
-            link.configure_station(station, facts)
+        link.attach(station, facts)
         name = name or self._names.unused(
             url, station, [m.drive.name for m in self.members.values()]
         )
@@ -185,8 +184,7 @@ class Bench:
                 limit=", ".join(known.kind for known in drive.profile.links),
                 remedy="choose one of its links",
             )
-        if isinstance(link, NeedsProfile):
-            link.configure_station(station, drive.profile)
+        link.attach(station, drive.profile)
         port = Port(link, station, spec)
         if check is not None:
             await check(drive, port)

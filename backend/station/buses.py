@@ -11,7 +11,6 @@ from backend.drive.ports import Port
 from backend.people.identity import by_itself
 from drivers.errors import Busy, NotAllowed
 from drivers.link import Found, Link, LinkEvent
-from drivers.modbus.link import RegisterLink
 from drivers.urls import link_for
 
 if TYPE_CHECKING:
@@ -95,11 +94,7 @@ class Buses:
             if any(port.link is link for port in member.drive.ports):
                 self._bench.motion.require_idle(member)
         with self._bench.exchanges.searching(url):
-            if stop_after_first and isinstance(link, RegisterLink):
-                # Only there is one address asked after the other, each at the price of a time-out.
-                found = await link.scan(progress, stations, stop_after=1)
-            else:
-                found = await link.scan(progress, stations)
+            found = await link.scan(progress, stations, stop_after=1 if stop_after_first else None)
         self._bench.journal.add(
             f"{url}: {len(found)} {'drive' if len(found) == 1 else 'drives'} found"
         )

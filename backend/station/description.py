@@ -8,10 +8,10 @@ import json
 import pickle
 import sys
 from collections.abc import Sequence
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
+from drivers.dictionary import Described, ObjectInfo
 from drivers.errors import NotAllowed, Rejected
-from drivers.ethercat.wire.information import EntryDescription, ObjectInfo
 from drivers.link import Address, Found, Link, Progress
 from profiles.importer import (
     ImportedProfile,
@@ -35,16 +35,6 @@ class BadDescription(NotAllowed):
     """A description file or dictionary of which no profile can be made, and why."""
 
     kind = "bad-description"
-
-
-@runtime_checkable
-class ListsObjects(Protocol):
-    """A link whose drives can list their own objects (SDO information)."""
-
-    async def enumerate(
-        self, station: int, progress: Progress
-    ) -> list[EntryDescription | ObjectInfo]:
-        """Objects and entries, each object before its entries."""
 
 
 async def import_in_process(task: Task, limit_s: float = IMPORT_LIMIT_S) -> dict[str, Any]:
@@ -103,14 +93,9 @@ async def drive_task(
         NotAllowed: this drive, or a drive on this kind of bus, tells nothing.
         ImportFailed: it offers a list, and nothing is in it.
     """
-    if link.kind == "canopen":
+    if link.traits.description == "stored_eds":
         eds = await _stored_eds(link, found)
         return FileTask(eds, f"1021h of station {found.station}", user_folder(), name)
-    if not isinstance(link, ListsObjects):
-        raise NotAllowed(
-            f"a drive on {link.kind} cannot list its own objects",
-            remedy="import the maker's EDS or ESI file, or use the generic profile",
-        )
     report = ImportReport()
     description = describe_dictionary(
         dictionary_entries(await link.enumerate(found.station, progress)),
@@ -168,7 +153,7 @@ async def _stored_eds(link: Link, found: Found) -> bytes:
 
 
 def dictionary_entries(
-    told: Sequence[EntryDescription | ObjectInfo],
+    told: Sequence[Described],
 ) -> list[DictionaryEntry]:
     """What the drive told, each entry with the name of its object."""
     objects = {item.index: item for item in told if isinstance(item, ObjectInfo)}

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from backend.station.bench import Bench
 from drivers.errors import Busy, NotAllowed
 from drivers.modbus.search import LineFound, search_line_settings
-from drivers.urls import parse_url
+from drivers.urls import bus_kind, parse_url
 
 
 async def search_line(
@@ -20,7 +20,7 @@ async def search_line(
         Busy: drives of the bench use this adapter. LinkLost: the adapter is missing.
     """
     wanted = parse_url(url)
-    if wanted.scheme not in ("modbus", "mlink") or wanted.is_virtual or url in bench.buses.wires:
+    if bus_kind(wanted.scheme).serial is None or wanted.is_virtual or url in bench.buses.wires:
         raise NotAllowed(
             f"{url} has no baud rate and parity to search for",
             value=url,

@@ -9,6 +9,7 @@ from backend.drive.drive import Drive
 from backend.drive.ports import Port, carries
 from backend.parameters.set_file import storable
 from drivers.errors import LinkTimeout, NotAllowed
+from drivers.urls import bus_kind
 from profiles.schema import LinkKind
 
 #: Settings that are compared before a second port is believed.
@@ -36,10 +37,11 @@ def missing_ports(drive: Drive) -> list[MissingPort]:
     for spec in drive.profile.links:
         if spec.kind in connected:
             continue
+        traits = bus_kind(spec.kind).traits
         only_there = [
             p
             for p in drive.profile.parameters
-            if carries(spec.kind, p) and not any(port.carries(p) for port in drive.ports)
+            if carries(traits, p) and not any(port.carries(p) for port in drive.ports)
         ]
         groups = Counter(p.group for p in only_there)
         names = tuple(name for name, _ in groups.most_common())

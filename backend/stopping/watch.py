@@ -12,6 +12,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 
 from backend.axis import loop
 from backend.axis.axis import Axis
@@ -22,7 +23,7 @@ from backend.stopping.settings import (
     deceleration_rpm_s,
     known_settings,
 )
-from backend.stopping.speed import LOOK_S, Sample, SpeedWatch, units_of
+from backend.stopping.speed import LOOK_S, WINDOW_S, Sample, SpeedWatch, units_of
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, LinkTimeout
@@ -45,8 +46,9 @@ _UNPOWERED_S = 0.1
 _RUNS_OUT, _FALLS = 0.95, 1.05
 #: A drive that tells nothing for this long is not reached.
 _SILENT_S = 1.5
-#: A position that was read in this time before tells whether the axis stood.
-_BEFORE_S = (0.03, 5.0)
+#: A position that was read within this time before STOP shows whether the axis stood; a younger one
+#: than `WINDOW_S` is too young for a speed, and is let grow old enough.
+_BEFORE_S = 5.0
 _POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION, State.UNKNOWN)
 
 
@@ -73,10 +75,12 @@ class StopWatch:
         try:
             units = await units_of(axis)
             self._watch = SpeedWatch(axis, units)
+            if before is not None and not problem:
+                await asyncio.sleep(before.at_s + WINDOW_S - time.monotonic())
             first = await self._watch.look()
         except DriveError as error:
             return await self._silent(problem or error.message)
-        if not problem and before is not None and self._stood(first, *before):
+        if not problem and before is not None and self._stood(before, first):
             return self._verdict(Verdict.STOPPED)
         self._until_s = self._began_s + SHORTEST_S
         await self._know_ramp()
@@ -92,8 +96,8 @@ class StopWatch:
             except TimeoutError:
                 return
 
-    def _resting_at(self) -> tuple[int, float] | None:
-        """Position and age of what was read before STOP, of an axis that had no power then."""
+    def _resting_at(self) -> Sample | None:
+        """What was read before STOP, of an axis that had no power then."""
         drive = self._axis.drive
         position, status = (
             drive.readings.get(drive.key(role) or "") for role in ("position_actual", "status_word")
@@ -102,17 +106,17 @@ class StopWatch:
             return None
         if not isinstance(position.raw, int) or not isinstance(status.raw, int):
             return None
-        ago_s = time.time() - position.time
-        if not _BEFORE_S[0] <= ago_s <= _BEFORE_S[1]:
+        ago_s, state = time.time() - position.time, drive.decode_state(status.raw)
+        if state in _POWERED or not 0.0 <= ago_s <= _BEFORE_S:
             return None
-        return None if drive.decode_state(status.raw) in _POWERED else (position.raw, ago_s)
+        return Sample(time.monotonic() - ago_s, state, position.raw, None)
 
-    def _stood(self, sample: Sample, position: int, ago_s: float) -> bool:
+    def _stood(self, before: Sample, now: Sample) -> bool:
         """It had no power and stood before STOP, and does so now: no need to look for longer."""
-        if sample.state in _POWERED:
+        if now.state in _POWERED:
             return False
-        self._watch.take(Sample(sample.at_s - ago_s, sample.state, position, sample.velocity))
-        self._watch.take(sample)
+        self._watch.take(replace(before, velocity=now.velocity))
+        self._watch.take(now)
         return self._watch.stands(0.0)
 
     async def _silent(self, problem: str) -> AxisStop:

@@ -57,6 +57,7 @@ class CanopenCyclic:
         clock: LoopClock | None = None,
     ) -> None:
         self.load: BusLoad | None = None
+        self.dc = None
         self.left_over: tuple[tuple[CyclicSignal, str], ...] = ()
         """Signals of the last `configure` that are not exchanged, and why."""
         self.unguarded: frozenset[int] = frozenset()

@@ -17,6 +17,7 @@ from typing import TypeVar
 import can
 
 from drivers.canopen.adapter import open_bus
+from drivers.canopen.bus import BUS
 from drivers.canopen.channel import SdoChannel
 from drivers.canopen.cyclic import CanopenCyclic
 from drivers.canopen.frames import HEARTBEAT, SDO_ANSWER, SDO_REQUEST, Frame
@@ -28,6 +29,7 @@ from drivers.canopen.url import CanUrl, parse_canopen_url
 from drivers.cia402 import is_stop
 from drivers.codec import size_of
 from drivers.dialect import dialect_of
+from drivers.dictionary import Described
 from drivers.errors import DriveError, LinkLost, NotAllowed, NotAsked
 from drivers.link import (
     Address,
@@ -37,6 +39,7 @@ from drivers.link import (
     LinkQuality,
     Progress,
     Unsubscribe,
+    lists_nothing,
 )
 from profiles.schema import LinkKind, Profile
 
@@ -56,6 +59,7 @@ class CanopenLink:
     """
 
     kind: LinkKind = "canopen"
+    traits = BUS.traits
 
     def __init__(
         self,
@@ -112,17 +116,34 @@ class CanopenLink:
             await asyncio.get_running_loop().run_in_executor(None, self._port.close)
             workers.shutdown(wait=True)
 
-    def configure_station(self, station: int, profile: Profile) -> None:
-        """Learn which family answers at ``station`` (`drivers.link.NeedsProfile`)."""
+    def attach(self, station: int, profile: Profile) -> None:
+        """See `drivers.link.Link.attach`: its modes, and how its firmware reads CiA 301."""
         self._cyclic.set_modes(station, profile.supported_modes)
         self._cyclic.speak(station, dialect_of(profile))
 
-    async def scan(self, progress: Progress, stations: Sequence[int] | None = None) -> list[Found]:
+    def unreachable(self, station: int, address: Address) -> str:
+        """See `drivers.link.Link.unreachable`; SDO transfers carry every object."""
+        del station
+        return "" if address.index is not None else f"{address} is no object"
+
+    async def enumerate(self, station: int, progress: Progress) -> list[Described]:
+        """See `drivers.link.Link.enumerate`: a node may carry its EDS instead (1021h)."""
+        del progress
+        raise lists_nothing(self.kind, station)
+
+    async def scan(
+        self,
+        progress: Progress,
+        stations: Sequence[int] | None = None,
+        *,
+        stop_after: int | None = None,
+    ) -> list[Found]:
         """Ask every node number for its device type, then who answers for its identity.
 
         Numbers that two nodes answer for, and nodes that send heartbeats but answer nothing, are
         in the result with a note.
         """
+        del stop_after  # sixteen are asked at once
         numbers = sorted(set(stations if stations is not None else range(1, 128)))
         found: list[Found] = []
         for start in range(0, len(numbers), 16):

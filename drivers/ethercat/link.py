@@ -13,16 +13,17 @@ from typing import Any
 from drivers import cia402
 from drivers.computer import permissions
 from drivers.computer.sockets import require_ethercat
+from drivers.dictionary import Described, EntryDescription, ObjectInfo
 from drivers.errors import DriveError, NotAllowed
+from drivers.ethercat.bus import BUS
 from drivers.ethercat.exchange.segmentcyclic import EthercatCyclic
 from drivers.ethercat.process import firmware
 from drivers.ethercat.process.hostprocess import HostProcess
 from drivers.ethercat.process.protocol import Message
 from drivers.ethercat.process.survey import ExchangeFigures, Survey, exchange_from, survey_from
 from drivers.ethercat.wire.al_status import AlState
-from drivers.ethercat.wire.information import EntryDescription, ObjectInfo
 from drivers.ethercat.wire.listing import Item, fitted, object_of, read_list
-from drivers.link import Address, Cyclic, Found, LinkEvent, LinkQuality, Progress, Unsubscribe
+from drivers.link import Address, Cyclic, Found, Link, LinkEvent, LinkQuality, Progress, Unsubscribe
 from profiles.schema import LinkKind, Profile
 
 _SCHEME = "ethercat://"
@@ -40,6 +41,7 @@ class EthercatLink:
     """
 
     kind: LinkKind = "ethercat"
+    traits = BUS.traits
 
     def __init__(
         self,
@@ -84,7 +86,13 @@ class EthercatLink:
         await self.process_data.close()
         await self._host.stop()
 
-    async def scan(self, progress: Progress, stations: Sequence[int] | None = None) -> list[Found]:
+    async def scan(
+        self,
+        progress: Progress,
+        stations: Sequence[int] | None = None,
+        *,
+        stop_after: int | None = None,
+    ) -> list[Found]:
         """Search the segment: every drive is reset to PREOP and identified.
 
         Where only ``stations`` are asked for that are known and answer, the others are left alone.
@@ -92,6 +100,7 @@ class EthercatLink:
         Raises:
             Busy: the cyclic exchange runs.
         """
+        del stop_after  # all are asked at once
         wanted = None if stations is None else list(stations)
         found: list[Message] = await self._call(
             {"op": "scan", "stations": wanted}, _SCAN_S, progress=progress
@@ -186,21 +195,21 @@ class EthercatLink:
 
     # What only EtherCAT has ----------------------------------------------------------------
 
-    def know(self, station: int, profile: Profile | None) -> None:
-        """Tell which drive family a station is, for the limits of its process data."""
-        if profile is None:
-            self._profiles.pop(station, None)
-        else:
-            self._profiles[station] = profile
+    def attach(self, station: int, profile: Profile) -> None:
+        """See `drivers.link.Link.attach`: the limits of its process data."""
+        self._profiles[station] = profile
 
-    async def enumerate(
-        self, station: int, progress: Progress
-    ) -> list[EntryDescription | ObjectInfo]:
+    def unreachable(self, station: int, address: Address) -> str:
+        """See `drivers.link.Link.unreachable`; the mailbox carries every object."""
+        del station
+        return "" if address.index is not None else f"{address} is no object"
+
+    async def enumerate(self, station: int, progress: Progress) -> list[Described]:
         """The drive's own dictionary, by the SDO information service."""
         found: list[Message] = await self._call(
             {"op": "enumerate", "station": station}, 600.0, progress=progress
         )
-        described: list[EntryDescription | ObjectInfo] = []
+        described: list[Described] = []
         for item in found:
             whole = item.pop("kind") == "object"
             described.append(ObjectInfo(**item) if whole else EntryDescription(**item))
@@ -334,3 +343,8 @@ def _found(item: Message) -> Found:
 
 def _options(lockstep: float) -> tuple[str, ...]:
     return ("--lockstep", f"{lockstep:g}") if lockstep else ()
+
+
+def segment_of(link: Link | None) -> EthercatLink | None:
+    """The link of an EtherCAT segment, for what only EtherCAT has; None for another bus."""
+    return link if isinstance(link, EthercatLink) else None

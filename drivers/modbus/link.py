@@ -15,6 +15,7 @@ from functools import partial
 from typing import TypeVar
 
 from drivers.cia402 import is_stop
+from drivers.dictionary import Described
 from drivers.errors import (
     DriveError,
     LinkLost,
@@ -31,6 +32,7 @@ from drivers.link import (
     LinkQuality,
     Progress,
     Unsubscribe,
+    lists_nothing,
 )
 from drivers.modbus.framing import BUSY
 from drivers.modbus.layout import Layout, TableLayout
@@ -44,6 +46,7 @@ from drivers.modbus.registers import (
     to_words,
 )
 from drivers.modbus.thread import BusThread
+from drivers.urls import bus_kind
 from profiles.schema import LinkKind, Profile
 
 T = TypeVar("T")
@@ -93,6 +96,7 @@ class RegisterLink:
         line: Callable[..., Line] = Line,
     ) -> None:
         self.kind: LinkKind = layout.kind
+        self.traits = bus_kind(layout.kind).traits
         self.url = url
         self._settings = settings
         self._layout = layout
@@ -104,19 +108,24 @@ class RegisterLink:
         self._plans: dict[tuple[int, tuple[Address, ...]], _Plan] = {}
         self._refused_blocks: set[tuple[int, int, int]] = set()
 
-    def configure_station(self, station: int, profile: Profile) -> None:
-        """Use what ``profile`` says of this link (word order, block lengths) for ``station``."""
+    def attach(self, station: int, profile: Profile) -> None:
+        """See `drivers.link.Link.attach`: word order and block lengths."""
         self._layout.configure(station, profile)
         self._plans.clear()
         self._refused_blocks.clear()
 
     def unreachable(self, station: int, address: Address) -> str:
-        """See `drivers.link.TellsUnreachable`."""
+        """See `drivers.link.Link.unreachable`."""
         try:
             self._layout.place(station, address)
         except NotAllowed as error:
             return error.message
         return ""
+
+    async def enumerate(self, station: int, progress: Progress) -> list[Described]:
+        """See `drivers.link.Link.enumerate`: no drive lists anything over registers."""
+        del progress
+        raise lists_nothing(self.kind, station)
 
     async def open(self) -> None:
         """Open the adapter. See `drivers.link.Link.open`."""

@@ -5,21 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from drivers.bus import BusUrl
 from drivers.errors import OutOfRange
 from drivers.link import Found, Progress
 from drivers.modbus.port import Parity, is_pseudo_terminal
-from drivers.urls import BusUrl, link_for, parse_url
-
-#: In the order in which they are likely: makers' defaults first.
-USUAL_BAUDRATES: dict[str, tuple[int, ...]] = {
-    "mlink": (2_500_000, 115_200, 1_000_000, 5_000_000, 921_600, 460_800, 230_400, 57_600, 38_400,
-              19_200, 9600),
-    "modbus": (115_200, 9600, 19_200, 57_600, 38_400, 230_400, 460_800, 921_600),
-}  # fmt: skip
-USUAL_PARITIES: dict[str, tuple[Parity, ...]] = {
-    "mlink": ("E", "N", "O"),
-    "modbus": ("N", "E", "O"),
-}
+from drivers.urls import bus_kind, link_for, parse_url
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +37,10 @@ async def search_line_settings(
         LinkLost: the adapter is missing, in use, or pulled during the search.
     """
     bus = parse_url(url) if isinstance(url, str) else url
-    rates = baudrates or USUAL_BAUDRATES[bus.scheme]
-    kinds = parities or USUAL_PARITIES[bus.scheme]
+    usual = bus_kind(bus.scheme).serial
+    assert usual is not None, "only a serial line has settings to search for"
+    rates = baudrates or usual.baudrates
+    kinds: Sequence[str] = parities or usual.parities
     if is_pseudo_terminal(bus.place):
         kinds = kinds[:1]  # no bits, no parity: the others would be the same again
     settings = [(rate, parity) for rate in rates for parity in kinds]

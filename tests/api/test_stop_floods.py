@@ -6,6 +6,7 @@ this one.
 
 from __future__ import annotations
 
+import gc
 import os
 import socket
 import subprocess
@@ -18,6 +19,7 @@ from pathlib import Path
 import pytest
 from argon2 import PasswordHasher
 
+from backend.commands.serve import settle
 from backend.people.passwords import DEFAULT
 from backend.people.rights import Role
 from tests.support import flood
@@ -31,8 +33,10 @@ STOPS, P99_S = 200, 0.1
 def server(tmp_path: Path) -> Iterator[GuardedServer]:
     running = GuardedServer(tmp_path).start()
     running.add_people()
+    running.run(settle())  # as every server does at the end of its start
     yield running
     running.stop()
+    gc.unfreeze()
 
 
 def stops(server: GuardedServer, caller: Caller, count: int) -> list[tuple[float, float]]:

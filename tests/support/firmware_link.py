@@ -11,6 +11,7 @@ from drivers.codec import size_of
 from drivers.errors import DriveError, Rejected
 from drivers.link import Address, Found, LinkEvent, LinkQuality, Progress, Unsubscribe
 from drivers.modbus.registers import Place, to_bytes, to_words
+from drivers.urls import bus_kind
 from drivers.virtual.device import SdoAbort
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.firmware.kernel import layout as k
@@ -36,6 +37,7 @@ class FirmwareLink:
         assert isinstance(device, VirtualServo)
         self.device: VirtualServo = device
         self.kind: LinkKind = kind
+        self.traits = bus_kind(kind).traits
         self.url = f"{kind}://firmware-{family}"
         self._ns = 0
         spec = device.profile.link(kind)
@@ -125,6 +127,10 @@ class FirmwareLink:
         del listener
         return lambda: None
 
-    def configure_station(self, station: int, facts: Any) -> None:
-        """Register links are told the family."""
+    def attach(self, station: int, facts: Any) -> None:
+        """The family is known here."""
         del station, facts
+
+    def unreachable(self, station: int, address: Address) -> str:
+        del station, address
+        return ""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Literal
 
+from drivers.dictionary import Described
 from drivers.errors import DriveError, Rejected
 from drivers.link import (
     Address,
@@ -12,16 +12,20 @@ from drivers.link import (
     Found,
     LinkEvent,
     LinkQuality,
+    LinkTraits,
     Progress,
     Unsubscribe,
+    lists_nothing,
 )
+from drivers.urls import bus_kind
+from profiles.schema import LinkKind, Profile
 
 
 class MemoryLink:
     """Objects in memory. ``failures`` are raised in turn by the next writes after they act."""
 
     def __init__(self, objects: dict[tuple[int, int], bytes]) -> None:
-        self.kind: Literal["ethercat", "canopen", "modbus", "mlink"] = "mlink"
+        self.kind: LinkKind = "mlink"
         self.url = "mlink://memory"
         self.cyclic: Cyclic | None = None
         self.objects = objects
@@ -30,11 +34,29 @@ class MemoryLink:
         self.read_errors: dict[tuple[int, int], DriveError] = {}
         self.loses_writes = False
 
+    @property
+    def traits(self) -> LinkTraits:
+        return bus_kind(self.kind).traits
+
+    def attach(self, station: int, profile: Profile) -> None: ...
+
+    def unreachable(self, station: int, address: Address) -> str:
+        return ""
+
+    async def enumerate(self, station: int, progress: Progress) -> list[Described]:
+        raise lists_nothing(self.kind, station)
+
     async def open(self) -> None: ...
 
     async def close(self) -> None: ...
 
-    async def scan(self, progress: Progress, stations: Sequence[int] | None = None) -> list[Found]:
+    async def scan(
+        self,
+        progress: Progress,
+        stations: Sequence[int] | None = None,
+        *,
+        stop_after: int | None = None,
+    ) -> list[Found]:
         return [Found(1, serial=7)]
 
     async def read(self, station: int, address: Address) -> bytes:

@@ -30,7 +30,7 @@ from drivers.adapters import require_interface
 from drivers.cia402 import State
 from drivers.computer import permissions
 from drivers.errors import DriveError, NotAllowed, OutOfRange
-from drivers.ethercat.link import EthercatLink
+from drivers.ethercat.link import EthercatLink, segment_of
 from drivers.ethercat.process import firmware
 from drivers.ethercat.process.survey import ExchangeFigures, Survey, SurveyedStation
 from drivers.ethercat.wire.al_status import AlState
@@ -248,8 +248,8 @@ async def _body(request: Request, file: str) -> bytes:
 
 
 def _link(bench: Bench, url: str) -> EthercatLink:
-    link = bench.buses.opened.get(url)
-    if not isinstance(link, EthercatLink):
+    link = segment_of(bench.buses.opened.get(url))
+    if link is None:
         raise NotFound(
             f"{url} is no opened EtherCAT bus", value=url, remedy="scan it on the Connect page"
         )
@@ -282,8 +282,9 @@ def _require_confirmed(confirmed: bool, warning: str) -> None:
 
 def _firmware_port(member: Member) -> tuple[EthercatLink, int]:
     for port in member.drive.ports:
-        if isinstance(port.link, EthercatLink) and port.spec is not None and port.spec.foe:
-            return port.link, port.station
+        link = segment_of(port.link)
+        if link is not None and port.spec is not None and port.spec.foe:
+            return link, port.station
     raise NotAllowed(
         f"{member.drive.name}: its profile does not say that it takes firmware over EtherCAT",
         drive=member.drive.name,

@@ -10,6 +10,7 @@ from typing import Any
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.computer.realtime import RealTime
+from drivers.dictionary import ObjectInfo
 from drivers.errors import Busy, DriveError, LinkLost, NotAllowed, OutOfRange, ProtocolError
 from drivers.ethercat.exchange.cyclic import CyclicLoop
 from drivers.ethercat.exchange.ring import Ring
@@ -23,7 +24,6 @@ from drivers.ethercat.process.station import Station
 from drivers.ethercat.wire import coe, esc, reading, sii
 from drivers.ethercat.wire.al_status import AlState, state_name
 from drivers.ethercat.wire.frames import ROOM_BYTES
-from drivers.ethercat.wire.information import ObjectInfo
 from drivers.ethercat.wire.lanes import Done, Lanes, Urgency
 from drivers.halt import HaltCause, Halted
 

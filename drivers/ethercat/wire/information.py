@@ -6,47 +6,16 @@ Generators over `Mailbox`; no I/O. Source: ETG.1000.6 clause 5.6.3.
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 
+from drivers.dictionary import EntryDescription, ObjectInfo
 from drivers.errors import ProtocolError
 from drivers.ethercat.wire.coe import MAX_BYTES, OVERTAKEN_READS, settle
 from drivers.ethercat.wire.mailbox import COE, Mail, Mailbox, Overtaken
+from drivers.ethercat.wire.registers import GONE_S
 from drivers.ethercat.wire.steps import Steps
 from drivers.sdo_abort import rejected
 
 _INFO = 8
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectInfo:
-    """One object as the drive's own dictionary describes it."""
-
-    index: int
-    name: str
-    data_type: int
-    object_code: int
-    max_subindex: int
-
-
-@dataclass(frozen=True, slots=True)
-class EntryDescription:
-    """One entry as the drive's own dictionary describes it.
-
-    ``access`` is the bit field of ETG.1000.6 table 49: 0–2 readable and 3–5 writable in PREOP,
-    SAFEOP and OP, 6 RxPDO, 7 TxPDO. ``unit``, ``default``, ``minimum`` and ``maximum`` are None
-    where the drive tells none.
-    """
-
-    index: int
-    subindex: int
-    data_type: int
-    bit_length: int
-    access: int
-    name: str
-    unit: int | None = None
-    default: bytes | None = None
-    minimum: bytes | None = None
-    maximum: bytes | None = None
 
 
 def list_objects(box: Mailbox) -> Steps[list[int]]:
@@ -106,7 +75,8 @@ def _info_once(box: Mailbox, opcode: int, data: bytes, answer_code: int) -> Step
         return service == _INFO and mail.payload[2] & 0x7F in (answer_code, 0x07)
 
     request = struct.pack("<HBBH", _INFO << 12, opcode, 0, 0) + data
-    answer = yield from box.request(COE, request, matches)
+    # Hundreds of requests in a row: a computer that stands still meanwhile is no reason to give up.
+    answer = yield from box.request(COE, request, matches, gone_s=GONE_S)
     parts: list[bytes] = []
     while True:
         if answer[2] & 0x7F == 0x07:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from drivers.dictionary import Described
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotInUse, Rejected
 from drivers.ethercat.process.station import Station
 from drivers.ethercat.wire import coe, information
@@ -161,10 +162,10 @@ def _prove(station: Station, index: int, sizes: dict[int, int], singles: dict[in
 
 def enumerate_objects(
     station: Station, on_progress: Callable[[int, int], None]
-) -> Steps[list[information.EntryDescription | information.ObjectInfo]]:
+) -> Steps[list[Described]]:
     """Every object and entry that the drive's own dictionary tells of."""
     indices = yield from information.list_objects(station.box)
-    found: list[information.EntryDescription | information.ObjectInfo] = []
+    found: list[Described] = []
     for number, index in enumerate(indices):
         on_progress(number, len(indices))
         try:

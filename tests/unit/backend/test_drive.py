@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from backend.api.drive.models_parameters import ParameterWrite
 from backend.drive.drive import Drive
-from backend.drive.ports import OBJECT_BATCH, Port
+from backend.drive.ports import Port
 from backend.tools.parameters import read_all
 from drivers.errors import (
     DriveError,
@@ -144,7 +144,7 @@ def test_no_object_is_cut_between_two_batches_on_ethercat(link: MemoryLink) -> N
     where = [{p.index for p in part} for part in parts]
     assert len(parts) > 1
     assert not any(one & other for one, other in pairwise(where))
-    assert all(len(part) >= OBJECT_BATCH for part in parts[:-1])
+    assert all(len(part) >= 128 for part in parts[:-1])
     link.kind = "mlink"
     assert max(len(part) for part in port.batches(parameters)) < 20, "a stop waits for no more"
 

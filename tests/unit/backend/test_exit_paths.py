@@ -148,7 +148,7 @@ async def test_no_motion_begins_on_a_bus_that_is_searched(
     """A scan asks for axes that stand; one that began after the question was reset as it moved."""
     gate = asyncio.Event()
 
-    async def scan(*_what: object) -> list[object]:
+    async def scan(*_what: object, **_how: object) -> list[object]:
         await gate.wait()
         return []
 

@@ -8,9 +8,10 @@ import pytest
 from importer_samples import GOOD_EDS
 
 from backend.station.description import dictionary_entries, profile_of_drive
+from drivers.dictionary import EntryDescription, ObjectInfo
 from drivers.errors import NotAllowed, Rejected
-from drivers.ethercat.wire.information import EntryDescription, ObjectInfo
 from drivers.link import Address, Found
+from drivers.urls import bus_kind
 from profiles.importer import ImportFailed
 
 TOLD: list[EntryDescription | ObjectInfo] = [
@@ -27,6 +28,7 @@ TOLD: list[EntryDescription | ObjectInfo] = [
 
 class FakeEthercat:
     kind = "ethercat"
+    traits = bus_kind("ethercat").traits
 
     def __init__(self, told: list[EntryDescription | ObjectInfo]) -> None:
         self.told = told
@@ -61,6 +63,7 @@ class FakeCanopen:
     """A node with some objects; the others are aborted as CiA 301 says."""
 
     kind = "canopen"
+    traits = bus_kind("canopen").traits
 
     def __init__(self, objects: dict[int, bytes]) -> None:
         self.objects = objects

@@ -143,7 +143,7 @@ async def can_bench(
     )  # fmt: skip
     await link.open()
     try:
-        link.configure_station(STATION, profile)
+        link.attach(STATION, profile)
         one = Drive("x", "X", profile, [Port(link, STATION, profile.link("canopen"))])
         session = CyclicSession(link, [one], {"x"} if profile_speed.needed(one, link) else ())
         axis = Axis(one)

@@ -45,6 +45,7 @@ from drivers.link import (
 from drivers.motion.interpolation import interpolation_period
 from drivers.motion.playback import AxisLoop
 from drivers.motion.setpoint_plan import Motion, limits_of
+from drivers.urls import bus_kind
 from drivers.virtual.device import Device, SdoAbort
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.mechanics import MechanicsSpec
@@ -135,6 +136,8 @@ class DirectLink:
 
     kind: Literal["ethercat", "canopen", "modbus", "mlink"] = "ethercat"
     url = "direct://virtual"
+    traits = bus_kind("ethercat").traits
+    left_over = ()
 
     def __init__(self, device: Device, profile: Profile) -> None:
         self.device = device
@@ -160,6 +163,12 @@ class DirectLink:
         self._written: dict[int, int] = {}
 
     # Link ----------------------------------------------------------------------------------
+
+    def attach(self, station: int, profile: Profile) -> None:
+        pass
+
+    def unreachable(self, station: int, address: Address) -> str:
+        return ""
 
     @property
     def cyclic(self) -> DirectLink:

@@ -124,7 +124,7 @@ async def bench(
             try:
                 profile = load_profile(drive)
                 await link.scan(lambda _share, _text: None)
-                link.know(1, profile)
+                link.attach(1, profile)
                 axis = Axis(Drive("x", "X", profile, [Port(link, 1, profile.link("ethercat"))]))
                 await set_up(axis, settings or {})
                 if settings:

@@ -41,7 +41,7 @@ async def axis(request: pytest.FixtureRequest) -> AsyncIterator[Axis]:
     with CanWire(PythonCanSide(bus), [CanopenNode(device, 3, time.monotonic_ns)]):
         link = CanopenLink(f"canopen://virtual/{channel}")
         await link.open()
-        link.configure_station(3, profile)
+        link.attach(3, profile)
         drive = Drive("d", "Drive", profile, [Port(link, 3, profile.link("canopen"))])
         yield Axis(drive)
         await link.close()

@@ -280,7 +280,7 @@ async def test_a_drive_that_falls_silent_is_given_up(bench: Bench, link: Canopen
 async def test_a_drive_without_cyclic_modes_is_commanded_by_sdo(
     bench: Bench, link: CanopenLink
 ) -> None:
-    link.configure_station(5, bench.device.profile)  # modes 1 and 3 only
+    link.attach(5, bench.device.profile)  # modes 1 and 3 only
     cyclic = _cyclic(link)
     mapped = await cyclic.configure([STATUS, POSITION], [CONTROL, TARGET], 0.002)
     assert mapped == (STATUS, POSITION)

@@ -148,7 +148,7 @@ async def ports(request: pytest.FixtureRequest, tmp_path: Path) -> AsyncIterator
             for link in (bus, serial):
                 await link.open()
                 assert isinstance(link, (CanopenLink, RegisterLink))
-                link.configure_station(7, profile)
+                link.attach(7, profile)
             yield TwoPorts(profile, bus, serial, wire)
             await bus.close()
             await serial.close()

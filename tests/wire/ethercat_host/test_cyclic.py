@@ -61,7 +61,7 @@ async def running(
     """2 ms: the tests must hold on a computer that does other things as well."""
     async with rig.link() as bus:
         for station in stations:
-            bus.link.know(station, servo_profile())
+            bus.link.attach(station, servo_profile())
         cyclic = bus.link.process_data
         await cyclic.configure(
             [s for n in stations for s in inputs(n)],
@@ -302,7 +302,7 @@ async def test_a_refused_mapping_names_drive_and_reason(rig: Rig) -> None:
         rig.do("refuse", slave=0, state="SAFEOP", code=0x0025)
         with pytest.raises(NotAllowed, match=r"refuses SAFEOP.*invalid output mapping"):
             await bus.link.process_data.configure(inputs(1), outputs(1), 0.001)
-        bus.link.know(1, servo_profile())
+        bus.link.attach(1, servo_profile())
         with pytest.raises(NotAllowed, match="takes cycles of 250 to 10000"):
             await bus.link.process_data.configure(inputs(1), outputs(1), 0.02)
         with pytest.raises(NotAllowed, match="configure the cyclic data first"):

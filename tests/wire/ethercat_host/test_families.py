@@ -25,8 +25,8 @@ def odd_rig(namespace: Namespace) -> Iterator[Rig]:
 async def test_fixed_process_data_and_no_clock(odd_rig: Rig) -> None:
     async with odd_rig.link() as bus:
         link = bus.link
-        link.know(1, servo_profile(remappable=False))
-        link.know(2, servo_profile(dc=False))
+        link.attach(1, servo_profile(remappable=False))
+        link.attach(2, servo_profile(dc=False))
         mapped = await link.process_data.configure(
             [*inputs(1), *inputs(2)],
             [CyclicSignal(n, POSITION, f"{n}.target") for n in (1, 2)],
@@ -55,7 +55,7 @@ async def test_firmware_goes_in_with_progress(odd_rig: Rig) -> None:
 
 async def test_an_emergency_before_mapping_does_not_spoil_it(odd_rig: Rig) -> None:
     async with odd_rig.link() as bus:
-        bus.link.know(1, servo_profile(remappable=False))
+        bus.link.attach(1, servo_profile(remappable=False))
         for code in (0x8611, 0x7305):
             odd_rig.do("inject", slave=0, what="emergency", value=code)
         await bus.link.process_data.configure(

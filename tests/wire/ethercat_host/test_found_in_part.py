@@ -32,7 +32,7 @@ async def test_the_search_is_repeated(wire: Namespace) -> None:
     link = EthercatLink("ec0m", launcher=wire.command([]), lockstep=1.0)
     await link.open()
     try:
-        link.know(1, odd_profile())
+        link.attach(1, odd_profile())
         process_data = link.process_data
         await process_data.configure(
             [CyclicSignal(1, Address(0x6064, 0, "INT32"), "position")],

@@ -51,7 +51,7 @@ async def test_mms7_is_read_whole_and_moves(namespace: Namespace, mms7: VirtualS
         assert (
             found[0].vendor_id == profile.identity.vendor_id or profile.identity.vendor_id is None
         )
-        link.know(1, profile)
+        link.attach(1, profile)
         once = await link.read_many(1, addresses)
         again = await link.read_many(1, addresses)
         singles = [await link.read(1, address) for address in addresses[::7]]

@@ -118,7 +118,7 @@ async def test_killing_the_server_in_motion_stops_the_axis(rig: Rig) -> None:
             link = EthercatLink("ec0m", launcher={rig.namespace.command([])!r})
             bus = Bus(link)
             await link.open()
-            link.know(1, servo_profile())
+            link.attach(1, servo_profile())
             cyclic = link.process_data
             await cyclic.configure(inputs(1), outputs(1), 0.002)
             await cyclic.start()

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from drivers.cia402 import Mode, State
+from drivers.dictionary import EntryDescription, ObjectInfo
 from drivers.errors import DriveError, LinkLost, NotAllowed, Rejected
 from drivers.ethercat.exchange.mapping import Entry, Pdo
 from drivers.ethercat.exchange.setup import FoundInPart, StationSetup, check_places
 from drivers.ethercat.link import EthercatLink
 from drivers.ethercat.process.station import Station, identify
-from drivers.ethercat.wire.information import EntryDescription, ObjectInfo
 from drivers.ethercat.wire.steps import Read, Steps, Write
 from drivers.link import Address, CyclicSignal, Envelope, Trajectory
 from drivers.virtual.wires.netns import Namespace
@@ -115,7 +115,7 @@ async def test_its_fixed_process_data_on_swapped_sync_managers_move_it(bus: Bus)
     cyclic = bus.link.process_data
     try:
         await bus.link.scan(lambda _s, _t: None)
-        bus.link.know(SERVO, odd_profile())
+        bus.link.attach(SERVO, odd_profile())
         mapped = await cyclic.configure(
             [CyclicSignal(SERVO, Address(0x6064, 0, "INT32"), "position")],
             [CyclicSignal(SERVO, Address(0x607A, 0, "INT32"), "target")],
@@ -153,7 +153,7 @@ async def test_a_drive_with_a_bare_eeprom_is_read_whole_and_moved_by_nobody(bus:
         assert entries[0x1018, 4].name == f"entry 4 {LONG}".strip()
         assert entries[0x1018, 4].bit_length == 32
         assert await bus.link.read(BARE, Address(0x3123, 0, "UINT16")) == b"\x23\x01"
-        bus.link.know(BARE, odd_profile())
+        bus.link.attach(BARE, odd_profile())
         with pytest.raises(NotAllowed, match="EEPROM does not tell where its process data are"):
             await bus.link.process_data.configure(
                 [CyclicSignal(BARE, Address(0x6064, 0, "INT32"), "position")],
@@ -168,7 +168,7 @@ async def test_a_mapping_that_can_only_be_read_is_told_and_left_assigned(bus: Bu
     await bus.link.open()
     try:
         await bus.link.scan(lambda _s, _t: None)
-        bus.link.know(FIXED, servo_profile(remappable=True, dc=False))
+        bus.link.attach(FIXED, servo_profile(remappable=True, dc=False))
         position = CyclicSignal(FIXED, Address(0x6064, 0, "INT32"), "position")
         speed = CyclicSignal(FIXED, Address(0x606C, 0, "INT32"), "speed")
         target = CyclicSignal(FIXED, Address(0x607A, 0, "INT32"), "target")

@@ -12,8 +12,9 @@ import pytest
 from drivers.errors import LinkTimeout, NotAllowed, ProtocolError, Rejected
 from drivers.link import Address, Found, LinkQuality
 from drivers.mlink.link import MlinkLayout, ambiguous_objects, register_of
+from drivers.modbus.line_url import line_settings
 from drivers.modbus.link import RegisterLink
-from drivers.urls import line_settings, parse_url
+from drivers.urls import parse_url
 from drivers.virtual.wires.modbus import Trouble
 from profiles.schema import DataType
 
@@ -116,7 +117,7 @@ async def test_neighbouring_subindices_are_read_together_if_the_profile_allows(
         link = cast("RegisterLink", await opened(f"mlink://{port}"))
         assert await link.read_many(1, addresses) == [b"\x03\0", b"\x01\0", b"\x02\0"]
         alone = slave.requests
-        link.configure_station(1, small_profile(("6041:00", "UINT16"), max_registers=16))
+        link.attach(1, small_profile(("6041:00", "UINT16"), max_registers=16))
         assert await link.read_many(1, addresses) == [b"\x03\0", b"\x01\0", b"\x02\0"]
         assert (alone, slave.requests - alone) == (3, 1)
 
@@ -126,7 +127,7 @@ async def test_drive_that_refuses_blocks_is_read_one_by_one(port: Path, opened: 
     addresses = [Address(0x2070, s, "UINT16") for s in (1, 2, 3, 4)]  # no such subindex 4
     with serving(port, {1: shelf}) as slave:
         link = cast("RegisterLink", await opened(f"mlink://{port}"))
-        link.configure_station(1, small_profile(("6041:00", "UINT16"), max_registers=16))
+        link.attach(1, small_profile(("6041:00", "UINT16"), max_registers=16))
         for requests in (5, 4):  # the block and then each; later each at once
             before = slave.requests
             *good, bad = await link.read_many(1, addresses)

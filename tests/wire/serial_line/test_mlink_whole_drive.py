@@ -36,7 +36,7 @@ async def test_every_setting_reads_as_the_drive_holds_it(
     slave.start()
     try:
         link = cast("RegisterLink", await opened(f"mlink://{port}?timeout_ms=1000"))
-        link.configure_station(1, profile.model_copy(update={"links": links}))
+        link.attach(1, profile.model_copy(update={"links": links}))
         addresses = [
             Address(p.index, p.subindex or 0, p.type)
             for p in profile.parameters

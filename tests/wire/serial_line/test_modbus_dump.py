@@ -30,7 +30,7 @@ async def test_a_whole_ds_c_takes_few_requests_and_no_unnamed_register(
     with serving(port, {1: shelf}, by_table=True) as slave:
         link = await opened(f"modbus://{port}?silence_us=0")
         drive = Drive("z", "Z", profile, [Port(link, 1, spec)])
-        link.configure_station(1, profile)  # type: ignore[attr-defined]
+        link.attach(1, profile)  # type: ignore[attr-defined]
         readings = await drive.read_many([p.key for p in readable])
         assert not [r.error for r in readings.values() if r.error]
         # One request for each run of neighbours, and one more where a batch ends inside a run.

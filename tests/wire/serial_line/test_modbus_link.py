@@ -43,9 +43,7 @@ async def test_high_word_comes_first(port: Path, opened: OpenLink) -> None:
 async def test_word_order_is_the_profiles(port: Path, opened: OpenLink) -> None:
     with serving(port, {1: shelf_with({0x60: 0x5678, 0x61: 0x1234})}, by_table=True):
         link = cast("RegisterLink", await opened(f"modbus://{port}?silence_us=0"))
-        link.configure_station(
-            1, small_profile(("6041:00", "UINT16"), kind="modbus", word_order="low_first")
-        )
+        link.attach(1, small_profile(("6041:00", "UINT16"), kind="modbus", word_order="low_first"))
         assert await link.read(1, register(0x60, "UINT32")) == b"\x78\x56\x34\x12"
 
 
@@ -63,7 +61,7 @@ async def test_block_limits_are_the_profiles(port: Path, opened: OpenLink) -> No
     with serving(port, {1: shelf}, by_table=True) as slave:
         link = cast("RegisterLink", await opened(f"modbus://{port}?silence_us=0"))
         profile = small_profile(("6041:00", "UINT16"), kind="modbus", max_registers=8, max_gap=2)
-        link.configure_station(1, profile)
+        link.attach(1, profile)
         numbers = [0x30, 0x31, 0x34, 0x37, 0x38, 0x3C]
         got = await link.read_many(1, [register(n) for n in numbers])
         assert got == [bytes((n, 0)) for n in numbers]
@@ -76,7 +74,7 @@ async def test_hole_in_a_bridged_gap_falls_back_to_single_reads(
     shelf = shelf_with({0x30: 1, 0x32: 2})
     with serving(port, {1: shelf}, by_table=True) as slave:
         link = cast("RegisterLink", await opened(f"modbus://{port}?silence_us=0"))
-        link.configure_station(
+        link.attach(
             1, small_profile(("6041:00", "UINT16"), kind="modbus", max_registers=8, max_gap=2)
         )
         for requests in (3, 2):  # once in vain, then known

@@ -6,8 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.bus import BusUrl
 from drivers.errors import NotAllowed, OutOfRange
-from drivers.urls import BusUrl, line_settings, link_for, parse_url
+from drivers.modbus.line_url import line_settings
+from drivers.urls import link_for, parse_url
 
 
 def test_examples() -> None:

@@ -1,0 +1,34 @@
+"""CANopen as a kind of bus."""
+
+from __future__ import annotations
+
+from urllib.parse import unquote
+
+from drivers.adapters import CAN_INTERFACES, require_channel
+from drivers.bus import BusKind, BusUrl
+from drivers.link import Link, LinkTraits
+
+
+def _require_place(place: str) -> None:
+    interface, _, channel = place.partition("/")
+    # What else can be wrong with it, the CANopen link says (`parse_canopen_url`).
+    if interface in CAN_INTERFACES and channel:
+        require_channel(interface, unquote(channel))
+
+
+def _link(url: BusUrl) -> Link:
+    from drivers.canopen.link import CanopenLink
+
+    return CanopenLink(str(url))
+
+
+BUS = BusKind(
+    example="canopen://socketcan/can0?bitrate=1000000",
+    traits=LinkTraits(
+        synchronous=True,
+        description="stored_eds",
+        silent="power, cable, both terminating resistors, bit rate and node number",
+    ),
+    require_place=_require_place,
+    link=_link,
+)

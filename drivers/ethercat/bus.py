@@ -1,0 +1,28 @@
+"""EtherCAT as a kind of bus."""
+
+from __future__ import annotations
+
+from drivers.adapters import require_interface
+from drivers.bus import BusKind, BusUrl
+from drivers.link import Link, LinkTraits
+
+
+def _link(url: BusUrl) -> Link:
+    from drivers.ethercat.link import EthercatLink
+
+    return EthercatLink(str(url))
+
+
+BUS = BusKind(
+    example="ethercat://eth0",
+    # The link parts a batch by itself, and reads whole objects: one that is cut between two
+    # batches would be read entry by entry.
+    traits=LinkTraits(
+        batch=128,
+        whole_objects=True,
+        description="dictionary",
+        silent="power, cable (computer to IN of the first drive) and the interface's name",
+    ),
+    require_place=require_interface,
+    link=_link,
+)
