@@ -98,6 +98,10 @@ COMMANDS = {
     ),
     "people": ("people:app", "Accounts of this station."),
     "station": ("station:app", "A station as a service."),
+    "preflight": (
+        "preflight:preflight_command",
+        "Is this computer punctual enough, and what would help most? Writes to no drive.",
+    ),
 }
 """Name of a command to where it is, below `backend.commands`, and what the list says of it."""
 

@@ -20,13 +20,12 @@ import ipaddress
 import os
 import re
 import stat
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from serial.tools import list_ports
 
-from drivers.computer.terminals import own_terminals
+from drivers.computer.terminals import has_descriptor, own_terminals
 from drivers.errors import LinkLost, OutOfRange
 
 _COM = re.compile(r"(?:\\\\\.\\)?COM[1-9]\d{0,2}", re.IGNORECASE)
@@ -67,7 +66,7 @@ def serial_device(place: str) -> str:
         LinkLost: no serial device, or the terminal that this server itself was started in.
     """
     require_serial_form(place)
-    if sys.platform == "win32":
+    if not has_descriptor():
         return place
     device = os.path.realpath(place)
     if not place.startswith("/dev/") and not _is_serial(device):

@@ -45,6 +45,7 @@ from backend.api.station import description as routes_description
 from backend.api.station import doctor as routes_doctor
 from backend.api.station import ethercat as routes_ethercat
 from backend.api.station import flight as routes_flight
+from backend.api.station import preflight as routes_preflight
 from backend.api.station import routes as routes_bench
 from backend.api.tuning import measure as routes_tune
 from backend.functions.forcing import ForcingSessions
@@ -54,7 +55,7 @@ from backend.recording.rerun_feed import RerunFeed
 from backend.recording.service import Recordings
 from backend.scene.feed import SceneFeed
 from backend.station.bench import Bench
-from drivers import scheduling
+from drivers.computer import scheduling
 
 PREFIX = "/api/v1"
 _HERE = Path(__file__).resolve()
@@ -83,6 +84,7 @@ _PARTS = (
     routes_ethercat,
     routes_doctor,
     routes_flight,
+    routes_preflight,
     routes_lists,
     routes_sets,
     routes_handover,

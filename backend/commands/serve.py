@@ -21,7 +21,7 @@ from backend.people.tls import Certificate, machine_names, own_certificate, stat
 from backend.station.bench import Bench
 from backend.store.database import FILE
 from backend.work.journal import Entry
-from drivers import scheduling
+from drivers.computer import scheduling
 from drivers.computer.processes import raise_descriptors
 from drivers.errors import NotAllowed
 from profiles import load_all

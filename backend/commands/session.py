@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
-import signal
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
@@ -19,6 +18,7 @@ from backend.drive.ports import Port
 from backend.restore.store import Pending
 from backend.station.matching import match_profiles, profile_for
 from backend.work.jobs import Progress
+from drivers.computer import signals
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import Found, Link
 from drivers.urls import link_for
@@ -74,28 +74,18 @@ def run_in_order(work: Callable[[], Awaitable[T]]) -> T:
 
     What the drive was lent for a measurement is put back while the work is cancelled.
     """
-    # The event loop makes a cancelling of SIGINT alone, and only where that is not ignored, as it
-    # is for what a shell starts in the background.
-    interrupt = signal.signal(signal.SIGINT, signal.default_int_handler)
-    before = signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
-    try:
-        return _run(work)
-    except KeyboardInterrupt:
-        print("cancelled; the axis is disabled, its settings are as before", file=sys.stderr)
-        raise typer.Exit(130) from None
-    finally:
-        signal.signal(signal.SIGTERM, before)
-        signal.signal(signal.SIGINT, interrupt)
+    # The event loop makes a cancelling of SIGINT alone, and only where that is not ignored.
+    with signals.interruptible():
+        try:
+            return _run(work)
+        except KeyboardInterrupt:
+            print("cancelled; the axis is disabled, its settings are as before", file=sys.stderr)
+            raise typer.Exit(130) from None
 
 
 def until_interrupted(work: Callable[[], Awaitable[None]]) -> None:
     """Run it; Ctrl+C and a service manager's end (SIGTERM) are both orderly."""
-
-    def end(_number: int, _frame: object) -> None:
-        # A service manager's end is as orderly as Ctrl+C: virtual drives and folders are let go.
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, end)
+    signals.termination_interrupts()
     # uvicorn has already shut down in order when the interrupt arrives here.
     with contextlib.suppress(KeyboardInterrupt):
         _run(work)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
-import signal
 import sys
 import tempfile
 from pathlib import Path
@@ -14,6 +12,7 @@ import typer
 
 from backend.commands.session import until_interrupted
 from backend.station.demo import DemoBench
+from drivers.computer.signals import until_asked_to_end
 from drivers.errors import NotAllowed
 from drivers.urls import parse_url
 from drivers.virtual.mechanics.spec import load_mechanics, standard_mechanics
@@ -51,7 +50,7 @@ def virtual(
                 for real in drives.addresses.values():
                     print(f"{drive} answers at {real} station {station}  (Ctrl+C ends it)")
                 sys.stdout.flush()
-                await _told_to_end()
+                await until_asked_to_end()
 
     until_interrupted(work)
 
@@ -63,15 +62,3 @@ def _one_drive(file: Path, folder: Path, nvm: Path | None) -> DemoBench:
     except NotAllowed as error:
         error.text = prose(error.message.removeprefix(f"bench file {file}: "))
         raise
-
-
-async def _told_to_end() -> None:
-    """Wait for Ctrl+C or for the end that a service is given (SIGTERM)."""
-    over, loop = asyncio.Event(), asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        # Windows' event loop takes no handlers: there a signal is passed on to it.
-        if sys.platform == "win32":
-            signal.signal(number, lambda *_: loop.call_soon_threadsafe(over.set))
-        else:
-            loop.add_signal_handler(number, over.set)
-    await over.wait()

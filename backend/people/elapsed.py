@@ -7,16 +7,11 @@ system tells it.
 
 from __future__ import annotations
 
-import sys
 import time
 
+from drivers.computer.clock import elapsed_s
 
-def elapsed_s() -> float:
-    """Seconds since some time before the start of this process; never set, never back."""
-    if sys.platform == "linux":
-        return time.clock_gettime(time.CLOCK_BOOTTIME)
-    else:  # noqa: RET505 - type checkers follow the branches of a system
-        return time.monotonic()
+__all__ = ["elapsed_s", "moment_of"]
 
 
 def moment_of(elapsed: float) -> float:

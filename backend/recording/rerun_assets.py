@@ -20,6 +20,7 @@ from pathlib import Path
 
 import platformdirs
 
+from drivers.computer.files import program_name
 from drivers.errors import NotAllowed
 
 FILES = {"re_viewer.js": "text/javascript", "re_viewer_bg.wasm": "application/wasm"}
@@ -66,9 +67,7 @@ def extract(folder: Path) -> None:
     spec = find_spec("rerun_cli")
     if spec is None or not spec.submodule_search_locations:
         raise NotAllowed("recording.rerun-command-line-not")
-    program = Path(spec.submodule_search_locations[0]) / (
-        "rerun.exe" if os.name == "nt" else "rerun"
-    )
+    program = Path(spec.submodule_search_locations[0]) / program_name("rerun")
     with tempfile.TemporaryDirectory() as home:
         web, data = free_port(), free_port()
         # A home of its own: no settings are read or written and no usage data sent.

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from types import TracebackType
 
+from drivers.computer.processes import SESSIONS
 from drivers.errors import LinkLost
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Link
@@ -75,7 +76,7 @@ class DemoBench:
             stdout=subprocess.PIPE,
             text=True,
             # Ctrl+C in the terminal ends the server first, which then ends the drives.
-            start_new_session=True,
+            start_new_session=SESSIONS,
         )
         answer = self._read()
         if not answer.get("ready"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drivers.ethercat.process.permissions import NEEDED, USEFUL
+from drivers.computer.permissions import NEEDED, USEFUL
 
 _UNIT = """\
 [Unit]

@@ -15,4 +15,10 @@ def write_parts(descriptor: int, parts: Sequence[bytes | memoryview]) -> int:
     """
     if sys.platform == "win32":
         return os.write(descriptor, b"".join(parts))
-    return os.writev(descriptor, parts)
+    else:  # noqa: RET505 - type checkers follow the branches of a system
+        return os.writev(descriptor, parts)
+
+
+def program_name(name: str) -> str:
+    """The name of a program's file."""
+    return f"{name}.exe" if sys.platform == "win32" else name

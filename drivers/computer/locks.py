@@ -38,8 +38,9 @@ def try_lock(descriptor: int) -> bool:
         except OSError:  # EACCES or EDEADLOCK, by the C runtime
             return False
         return True
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
+    else:  # noqa: RET505 - type checkers follow the branches of a system
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        return True

@@ -10,6 +10,9 @@ from pathlib import Path
 
 import psutil
 
+#: Whether a child process can have a session of its own, so that Ctrl+C does not reach it (not on
+#: Windows, which has no such sessions).
+SESSIONS = sys.platform != "win32"
 _BOOT = Path("/proc/sys/kernel/random/boot_id")
 #: Fields of /proc/PID/stat behind the command's name: the 20th of these is the start time (proc(5),
 #: field 22).

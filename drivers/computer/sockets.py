@@ -6,6 +6,7 @@ import os
 import socket
 import struct
 import sys
+from pathlib import Path
 
 from drivers.errors import NotAllowed
 
@@ -19,8 +20,9 @@ _SIOCGIFFLAGS, _SIOCSIFFLAGS = 0x8913, 0x8914
 
 __all__ = [
     "AF_NETLINK", "AF_PACKET", "AF_UNIX", "MSG_DONTWAIT", "NETLINK_ROUTE",
-    "blocks", "interface_flags", "receive_with_notes", "require_ethercat",
-    "set_blocking", "set_interface_flags", "shared_memory_file",
+    "blocks", "hold_name", "interface_flags", "open_sockets", "receive_with_notes",
+    "require_ethercat", "require_linux", "set_blocking", "set_interface_flags",
+    "shared_memory_file",
 ]  # fmt: skip
 
 
@@ -36,9 +38,27 @@ def require_ethercat(interface: str) -> None:
         )
 
 
+def require_linux(what: str) -> None:
+    """Some things are to be had on Linux only.
+
+    Raises:
+        NotAllowed: another system.
+    """
+    if sys.platform != "linux":
+        raise NotAllowed(
+            f"{what} is not available: it looks at what Linux says of itself",
+            value=sys.platform,
+            limit="Linux",
+            remedy="run it on the computer with Linux at the machine",
+        )
+
+
 def blocks(descriptor: int) -> bool:
     """Whether reading this descriptor waits; True on Windows, where it always does."""
-    return True if sys.platform == "win32" else os.get_blocking(descriptor)
+    if sys.platform == "win32":
+        return True
+    else:  # noqa: RET505 - type checkers follow the branches of a system
+        return os.get_blocking(descriptor)
 
 
 def set_blocking(descriptor: int, wanted: bool) -> None:
@@ -68,7 +88,8 @@ def receive_with_notes(
     """
     if sys.platform == "win32":
         raise OSError("recvmsg is not available on Windows")
-    return source.recvmsg(most, notes)
+    else:  # noqa: RET506 - type checkers follow the branches of a system
+        return source.recvmsg(most, notes)
 
 
 def interface_flags(interface: str) -> int:
@@ -98,3 +119,31 @@ def _flags_by(request: int, interface: str, flags: int) -> int:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
         answer = fcntl.ioctl(control, request, wanted)
     return int(struct.unpack("16sH14x", answer)[1])
+
+
+def hold_name(name: str) -> socket.socket:
+    """A socket that holds this name for this process alone: abstract (unix(7)), so that it belongs
+    to the network namespace as its interfaces do, and goes with the process.
+
+    Raises:
+        OSError: another process holds it, or the system has no such names.
+    """
+    holder = socket.socket(AF_UNIX, socket.SOCK_DGRAM)
+    try:
+        holder.bind(f"\0{name}")
+    except OSError:
+        holder.close()
+        raise
+    return holder
+
+
+def open_sockets() -> set[int]:
+    """The descriptors of this process that are sockets; Linux alone lists them (proc(5))."""
+    found = set()
+    for entry in Path("/proc/self/fd").iterdir():
+        try:
+            if str(entry.readlink()).startswith("socket:"):
+                found.add(int(entry.name))
+        except OSError:
+            continue
+    return found

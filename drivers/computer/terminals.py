@@ -5,17 +5,35 @@ from __future__ import annotations
 import errno
 import os
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 
 import serial
 
-if sys.platform != "win32":
-    import termios
+from drivers.errors import NotAllowed
 
+TERMINAL_ERRORS: tuple[type[Exception], ...]
+if sys.platform != "win32":
+    import select
+    import termios
+    import tty
+
+    _NAMED = {
+        getattr(termios, name): int(name[1:])
+        for name in dir(termios)
+        if name[0] == "B" and name[1:].isdigit()
+    }
     #: No OSError: pyserial lets it through where it sets up a terminal that has just gone.
-    TERMINAL_ERRORS: tuple[type[Exception], ...] = (termios.error,)
+    TERMINAL_ERRORS = (termios.error,)
 else:
     TERMINAL_ERRORS = ()
+
+#: Rates that Linux has (asm-generic/termbits.h) and Python's termios does not name.
+_LINUX_SPEEDS = {
+    0o010005: 500_000, 0o010006: 576_000, 0o010007: 921_600, 0o010010: 1_000_000,
+    0o010011: 1_152_000, 0o010012: 1_500_000, 0o010013: 2_000_000, 0o010014: 2_500_000,
+    0o010015: 3_000_000, 0o010016: 3_500_000, 0o010017: 4_000_000,
+}  # fmt: skip
 
 
 def flush(port: serial.Serial) -> bool:
@@ -58,3 +76,93 @@ def own_terminals() -> set[str]:
             with suppress(OSError):
                 found.add(os.ttyname(descriptor))
     return found
+
+
+def port_options() -> dict[str, bool]:
+    """What pyserial is asked for beside the line's settings: the port for this process alone.
+
+    A COM port always is; pyserial refuses to be asked for it there.
+    """
+    return {} if sys.platform == "win32" else {"exclusive": True}
+
+
+def has_descriptor() -> bool:
+    """Whether a serial port is a file descriptor that can be waited for (not on Windows)."""
+    return sys.platform != "win32"
+
+
+if sys.platform != "win32":
+
+    def _poll(descriptor: int, event: int) -> Callable[[float], object]:
+        poll = select.poll()
+        poll.register(descriptor, event)
+        return poll.poll
+
+
+class Readiness:
+    """Waits until a descriptor can be read or written (poll(2)); not on Windows."""
+
+    def __init__(self, descriptor: int) -> None:
+        self._readable: Callable[[float], object]
+        self._writable: Callable[[float], object]
+        if sys.platform == "win32":
+            raise NotAllowed("a serial port has no file descriptor on Windows", limit="POSIX")
+        else:  # noqa: RET506 - type checkers follow the branches of a system
+            self._readable = _poll(descriptor, select.POLLIN)
+            self._writable = _poll(descriptor, select.POLLOUT)
+
+    def readable(self, timeout_s: float) -> bool:
+        """Whether there is something to read within this time."""
+        return bool(self._readable(max(0.0, timeout_s) * 1000))
+
+    def writable(self, timeout_s: float) -> bool:
+        """Whether it takes something within this time."""
+        return bool(self._writable(max(0.0, timeout_s) * 1000))
+
+
+def require_pseudo_terminals() -> None:
+    """Virtual serial drives need them.
+
+    Raises:
+        NotAllowed: the system has none (Windows).
+    """
+    if sys.platform == "win32":
+        raise NotAllowed(
+            "virtual serial drives need pseudo-terminals, which Windows does not have",
+            limit="Linux, macOS",
+            remedy="run the demo on Linux or macOS; real drives on COM ports work here",
+        )
+
+
+def open_pair() -> tuple[int, int]:
+    """A raw pseudo-terminal: its master and slave end; see `require_pseudo_terminals`.
+
+    Raises:
+        NotAllowed: the system has none (Windows).
+    """
+    if sys.platform == "win32":
+        raise NotAllowed("Windows has no pseudo-terminals", limit="Linux, macOS")
+    else:  # noqa: RET506 - type checkers follow the branches of a system
+        master, slave = os.openpty()
+        tty.setraw(slave)
+        return master, slave
+
+
+def terminal_name(descriptor: int) -> str:
+    """The path of a terminal; empty on Windows, which knows none by name."""
+    if sys.platform == "win32":
+        return ""
+    else:  # noqa: RET505 - type checkers follow the branches of a system
+        return os.ttyname(descriptor)
+
+
+def output_speed(descriptor: int) -> int | None:
+    """The baud rate that a terminal is set to; None where the system has no name for it."""
+    if sys.platform == "win32":
+        return None
+    else:  # noqa: RET505 - type checkers follow the branches of a system
+        try:
+            code = termios.tcgetattr(descriptor)[5]
+        except termios.error:
+            return None
+        return (_NAMED | _LINUX_SPEEDS).get(code)

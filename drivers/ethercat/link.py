@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from drivers import cia402
+from drivers.computer import permissions
 from drivers.computer.sockets import require_ethercat
 from drivers.dictionary import Described, EntryDescription, ObjectInfo
 from drivers.doctor.diagnosis import Cause, diagnose
@@ -19,7 +20,7 @@ from drivers.errors import DriveError, NotAllowed
 from drivers.ethercat.bus import BUS
 from drivers.ethercat.doctor import evidence_of
 from drivers.ethercat.exchange.segmentcyclic import EthercatCyclic
-from drivers.ethercat.process import firmware, permissions
+from drivers.ethercat.process import firmware
 from drivers.ethercat.process.hostprocess import HostProcess
 from drivers.ethercat.process.protocol import Message
 from drivers.ethercat.process.survey import ExchangeFigures, Survey, exchange_from, survey_from

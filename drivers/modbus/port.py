@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import errno
 import os
-import select
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Protocol
@@ -17,7 +15,13 @@ from typing import Literal, Protocol
 import serial
 
 from drivers.adapters import ports_found, serial_device
-from drivers.computer.terminals import TERMINAL_ERRORS, deliver_soon
+from drivers.computer.terminals import (
+    TERMINAL_ERRORS,
+    Readiness,
+    deliver_soon,
+    has_descriptor,
+    port_options,
+)
 from drivers.errors import DriveError, LinkLost, OutOfRange
 
 Parity = Literal["N", "E", "O"]
@@ -93,7 +97,7 @@ def open_port(settings: LineSettings) -> Port:
             stopbits=settings.stopbits,
             timeout=0,
             write_timeout=1.0,
-            exclusive=None if sys.platform == "win32" else True,
+            **port_options(),
         )
     except ValueError as error:
         raise _unsuitable(settings, str(error)) from error
@@ -103,9 +107,9 @@ def open_port(settings: LineSettings) -> Port:
         # An adapter that goes while it is being set up.
         raise _gone(settings.device, error) from error
     deliver_soon(port)
-    if sys.platform == "win32":
-        return SerialPort(port, settings.device)
-    return _PosixPort(port, settings.device)
+    return (
+        _PosixPort(port, settings.device) if has_descriptor() else SerialPort(port, settings.device)
+    )
 
 
 def is_pseudo_terminal(device: str) -> bool:
@@ -147,14 +151,11 @@ class _PosixPort:
         self._port = port
         self._device = device
         self._fd: int = port.fileno()
-        self._poll = select.poll()
-        self._poll.register(self._fd, select.POLLIN)
-        self._poll_writable = select.poll()
-        self._poll_writable.register(self._fd, select.POLLOUT)
+        self._ready = Readiness(self._fd)
 
     def read(self, timeout_s: float) -> bytes:
         """See `Port.read`."""
-        if not self._poll.poll(max(0.0, timeout_s) * 1000):
+        if not self._ready.readable(timeout_s):
             return b""
         try:
             data = os.read(self._fd, 4096)
@@ -173,7 +174,7 @@ class _PosixPort:
             try:
                 sent += os.write(self._fd, data[sent:])
             except BlockingIOError:
-                if not self._poll_writable.poll(1000):
+                if not self._ready.writable(1.0):
                     raise _gone(self._device, None) from None
             except OSError as error:
                 raise _gone(self._device, error) from error

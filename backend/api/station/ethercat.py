@@ -28,9 +28,10 @@ from backend.station.connected_drive import Member
 from backend.work.jobs import JobResult, Progress
 from drivers.adapters import require_interface
 from drivers.cia402 import State
+from drivers.computer import permissions
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from drivers.ethercat.link import EthercatLink, segment_of
-from drivers.ethercat.process import firmware, permissions
+from drivers.ethercat.process import firmware
 from drivers.ethercat.process.survey import ExchangeFigures, Survey, SurveyedStation
 from drivers.ethercat.wire.al_status import AlState
 from texts.message import Text, language, text

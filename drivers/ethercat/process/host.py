@@ -14,17 +14,16 @@ from __future__ import annotations
 import argparse
 import contextlib
 import select
-import signal
 import socket
 import struct
 import sys
 import time
-from types import FrameType
 
+from drivers.computer import realtime, signals
 from drivers.computer.processes import end_within
 from drivers.errors import DriveError, LinkLost, ProtocolError
 from drivers.ethercat.exchange.ring import Ring
-from drivers.ethercat.process import protocol, realtime
+from drivers.ethercat.process import protocol
 from drivers.ethercat.process.operations import Operations
 from drivers.ethercat.process.protocol import Message
 from drivers.halt import HaltCause, Halted
@@ -145,7 +144,7 @@ class Host:
             return
         del self._outgoing[:sent]
 
-    def orphan(self, _signal: int, _frame: FrameType | None) -> None:
+    def orphan(self) -> None:
         """SIGTERM: end in good order."""
         end_within(_LAST_WORDS_S)
         self._orphaned = True
@@ -161,14 +160,14 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--lockstep", type=float, default=0.0, help="for virtual segments")
     options = parser.parse_args(argv)
     realtime.die_with_parent()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signals.ignore_interrupt()
     control = socket.socket(fileno=options.control)
     host = Host(options.interface, control, Ring(options.ring))
     if options.lockstep:
         host.operations.roster.exchange.lockstep = options.lockstep
         # A virtual segment on a busy computer answers when it gets its turn.
         host.operations.segment.frame_timeout_us = _PATIENT_FRAME_US
-    signal.signal(signal.SIGTERM, host.orphan)
+    signals.on_termination(host.orphan)
     granted = realtime.claim(wanted=not options.no_realtime)
     with contextlib.suppress(LinkLost):
         host.run(granted)

@@ -9,6 +9,7 @@ from typing import Any
 
 from drivers import cia402
 from drivers.cia402 import State
+from drivers.computer.realtime import RealTime
 from drivers.dictionary import ObjectInfo
 from drivers.errors import Busy, DriveError, LinkLost, NotAllowed, OutOfRange, ProtocolError
 from drivers.ethercat.exchange.cyclic import CyclicLoop
@@ -18,7 +19,6 @@ from drivers.ethercat.process import firmware
 from drivers.ethercat.process import station as transactions
 from drivers.ethercat.process.examination import examine
 from drivers.ethercat.process.protocol import Message, error_to_wire
-from drivers.ethercat.process.realtime import RealTime
 from drivers.ethercat.process.roster import Roster, Send
 from drivers.ethercat.process.segment import Segment, SpoiltMap
 from drivers.ethercat.process.station import Station

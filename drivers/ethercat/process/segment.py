@@ -21,14 +21,14 @@ import select
 import socket
 import time
 from collections.abc import Collection, Sequence
-from pathlib import Path
 
 import pysoem
 
 from drivers.adapters import require_interface
-from drivers.computer.sockets import AF_UNIX, MSG_DONTWAIT, blocks, set_blocking
+from drivers.computer import permissions
+from drivers.computer.sockets import MSG_DONTWAIT, blocks, hold_name, open_sockets, set_blocking
 from drivers.errors import Busy, LinkLost, NotAllowed, ProtocolError
-from drivers.ethercat.process import permissions, promiscuous
+from drivers.ethercat.process import promiscuous
 from drivers.ethercat.wire import frames
 from drivers.ethercat.wire.steps import Read, Write
 
@@ -91,12 +91,12 @@ class Segment:
         self._lock = _lock(self.interface)
         master = pysoem.Master()
         was_promiscuous = promiscuous.is_set(self.interface)
-        before = _sockets()
+        before = open_sockets()
         try:
             master.open(self.interface)
         except ConnectionError as error:
             # pysoem leaves the socket of a failed open behind.
-            for descriptor in _sockets() - before:
+            for descriptor in open_sockets() - before:
                 os.close(descriptor)
             self._unlock()
             raise LinkLost(
@@ -106,7 +106,7 @@ class Segment:
                 interface=self.interface,
                 check=permissions.check(self.interface).words(),
             ) from error
-        self.socket_fd = min(_sockets() - before)
+        self.socket_fd = min(open_sockets() - before)
         self._index = socket.if_nametoindex(self.interface)
         self._ear = socket.socket(fileno=os.dup(self.socket_fd))
         if not was_promiscuous:
@@ -325,24 +325,10 @@ class Segment:
 
 def _lock(interface: str) -> socket.socket:
     """An abstract socket: per network namespace like the interface, and gone with its holder."""
-    lock = socket.socket(AF_UNIX, socket.SOCK_DGRAM)
     try:
-        lock.bind(f"\0servodeck-ethercat-{interface}")
+        return hold_name(f"servodeck-ethercat-{interface}")
     except OSError as error:
-        lock.close()
         raise Busy("ethercat.another-servodeck-already-uses", interface=interface) from error
-    return lock
-
-
-def _sockets() -> set[int]:
-    found = set()
-    for entry in Path("/proc/self/fd").iterdir():
-        try:
-            if str(entry.readlink()).startswith("socket:"):
-                found.add(int(entry.name))
-        except OSError:
-            continue
-    return found
 
 
 def _mapping_error(item: Exception) -> str:

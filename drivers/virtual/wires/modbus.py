@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from drivers.codec import size_of
+from drivers.computer.scheduling import fine_timers
 from drivers.errors import NotAllowed
 from drivers.mlink.link import register_of
 from drivers.modbus.framing import (
@@ -24,7 +25,6 @@ from drivers.modbus.framing import (
     write_response,
 )
 from drivers.modbus.registers import Place, to_bytes, to_words
-from drivers.scheduling import fine_timers
 from drivers.virtual.device import (
     ABORT_LENGTH,
     ABORT_NO_OBJECT,

@@ -11,7 +11,6 @@ It imports nothing heavy: a namespace can be changed only while there is one thr
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import errno
 import os
 import socket
@@ -22,10 +21,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 
+from drivers.computer.namespaces import (
+    AVAILABLE,
+    disable_ipv6,
+    enter_namespaces,
+    leave_namespaces,
+)
 from drivers.computer.sockets import AF_NETLINK, NETLINK_ROUTE
-
-_CLONE_NEWUSER = 0x10000000
-_CLONE_NEWNET = 0x40000000
 
 _RTM_NEWLINK = 16
 _REQUEST, _ACK, _EXCLUSIVE, _CREATE = 0x01, 0x04, 0x200, 0x400
@@ -69,7 +71,7 @@ class Namespace:
         Raises:
             NamespaceUnavailable: with the reason and what would allow it.
         """
-        if not sys.platform.startswith("linux"):
+        if not AVAILABLE:
             raise NamespaceUnavailable("virtual EtherCAT cables need Linux network namespaces")
         for name in (name for pair in pairs for name in pair):
             if not 0 < len(name.encode()) <= 15:
@@ -133,21 +135,11 @@ def enter(pid: int) -> None:
     Raises:
         NamespaceUnavailable: not permitted, more than one thread, or no such process.
     """
-    libc = ctypes.CDLL(None, use_errno=True)
-    for kind, flag in (("user", _CLONE_NEWUSER), ("net", _CLONE_NEWNET)):
-        path = Path(f"/proc/{pid}/ns/{kind}")
-        try:
-            if path.samefile(f"/proc/self/ns/{kind}"):
-                continue
-            handle = os.open(path, os.O_RDONLY)
-        except OSError as error:
-            raise NamespaceUnavailable(f"cannot open {path}: {error.strerror}") from error
-        try:
-            if libc.setns(handle, flag):
-                reason = os.strerror(ctypes.get_errno())
-                raise NamespaceUnavailable(f"cannot join the {kind} namespace of {pid}: {reason}")
-        finally:
-            os.close(handle)
+    try:
+        enter_namespaces(pid)
+    except OSError as error:
+        reason = f"{error.filename}: {error.strerror}"
+        raise NamespaceUnavailable(f"cannot join the namespaces of {pid}: {reason}") from error
 
 
 def _python() -> list[str]:
@@ -162,21 +154,6 @@ def child_environment() -> dict[str, str]:
 
 
 # -- inside the holder --------------------------------------------------------------------------
-
-
-def _unshare() -> None:
-    """New user and network namespace; with root and no user namespaces, the network alone."""
-    libc = ctypes.CDLL(None, use_errno=True)
-    uid, gid = os.geteuid(), os.getegid()
-    if libc.unshare(_CLONE_NEWUSER | _CLONE_NEWNET) == 0:
-        # The kernel wants setgroups denied before an ordinary user may map a group.
-        Path("/proc/self/setgroups").write_text("deny", encoding="ascii")
-        Path("/proc/self/uid_map").write_text(f"0 {uid} 1", encoding="ascii")
-        Path("/proc/self/gid_map").write_text(f"0 {gid} 1", encoding="ascii")
-        return
-    code = ctypes.get_errno()
-    if libc.unshare(_CLONE_NEWNET):
-        raise OSError(code, f"the system forbids user namespaces ({os.strerror(code)})")
 
 
 def _attribute(kind: int, data: bytes) -> bytes:
@@ -229,13 +206,12 @@ def silence(name: str) -> None:
     inet6 = _attribute(socket.AF_INET6 | _NESTED, mode)
     with contextlib.suppress(OSError):
         _request(0, head + _attribute(_IFLA_AF_SPEC | _NESTED, inet6), f"cannot silence {name}")
-    with contextlib.suppress(OSError):
-        Path(f"/proc/sys/net/ipv6/conf/{name}/disable_ipv6").write_text("1", encoding="ascii")
+    disable_ipv6(name)
 
 
 def _hold(names: Sequence[str]) -> int:
     try:
-        _unshare()
+        leave_namespaces()
         set_up("lo")
         for first, second in zip(names[::2], names[1::2], strict=True):
             create_veth(first, second)

@@ -9,35 +9,20 @@ from __future__ import annotations
 
 import os
 import select
-import sys
 import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.computer.sockets import set_blocking
-from drivers.errors import LinkLost, NotAllowed
+from drivers.computer.terminals import (
+    open_pair,
+    output_speed,
+    require_pseudo_terminals,
+    terminal_name,
+)
+from drivers.errors import LinkLost
 from drivers.modbus.timing import sleep_precisely
-
-if sys.platform != "win32":
-    import termios
-    import tty
-
-    _NAMED = {
-        getattr(termios, name): int(name[1:])
-        for name in dir(termios)
-        if name[0] == "B" and name[1:].isdigit()
-    }
-else:
-    _NAMED = {}
-
-#: termios speed codes of this system, for asking which rate the client has set.
-_SPEEDS: dict[int, int] = _NAMED | {
-    # Linux has these rates (asm-generic/termbits.h) and Python's termios names none of them.
-    0o010005: 500_000, 0o010006: 576_000, 0o010007: 921_600, 0o010010: 1_000_000,
-    0o010011: 1_152_000, 0o010012: 1_500_000, 0o010013: 2_000_000, 0o010014: 2_500_000,
-    0o010015: 3_000_000, 0o010016: 3_500_000, 0o010017: 4_000_000,
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,18 +48,16 @@ def open_pty(path: Path) -> tuple[int, int]:
         LinkLost: something that is not a wire of ours is already at the path.
         NotAllowed: the system has no pseudo-terminals (Windows).
     """
-    if sys.platform == "win32":
-        raise NotAllowed("virtual.virtual-serial-drives-need", limit="Linux, macOS")
+    require_pseudo_terminals()
     ours = path.is_symlink() and str(path.readlink()).startswith("/dev/pts/")
     if (path.exists() or path.is_symlink()) and not ours:
         raise LinkLost("virtual.exists-no-virtual-wire", path=str(path))
-    master, slave = os.openpty()
-    tty.setraw(slave)
+    master, slave = open_pair()
     set_blocking(master, False)
     path.parent.mkdir(parents=True, exist_ok=True)
     fresh = path.with_name(f".{path.name}.{os.getpid()}")
     fresh.unlink(missing_ok=True)
-    fresh.symlink_to(os.ttyname(slave))
+    fresh.symlink_to(terminal_name(slave))
     fresh.replace(path)  # at once: a client never sees half a wire
     return master, slave
 
@@ -84,7 +67,7 @@ def close_pty(path: Path, master: int, slave: int) -> None:
 
     A wire that was made later at the same path is not ours to remove.
     """
-    if sys.platform != "win32" and path.is_symlink() and str(path.readlink()) == os.ttyname(slave):
+    if path.is_symlink() and str(path.readlink()) == terminal_name(slave):
         path.unlink()
     os.close(slave)
     os.close(master)
@@ -142,12 +125,7 @@ class PtyWire:
 
     def client_baudrate(self) -> int | None:
         """Baud rate that the client has set, or None if this system has no name for it."""
-        if sys.platform == "win32":
-            return None
-        try:
-            return _SPEEDS.get(termios.tcgetattr(self._master)[5])
-        except termios.error:
-            return None
+        return output_speed(self._master)
 
     def read(self, timeout_s: float) -> bytes:
         """Bytes from the client, at once; empty after ``timeout_s`` without any.

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from backend.station.service import systemd_unit
-from drivers.ethercat.process import permissions
+from drivers.computer import permissions
 
 #: linux/capability.h
 NUMBERS = {"CAP_NET_ADMIN": 12, "CAP_NET_RAW": 13, "CAP_IPC_LOCK": 14, "CAP_SYS_NICE": 23}

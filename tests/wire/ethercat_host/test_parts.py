@@ -12,12 +12,13 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from drivers import errors, scheduling
+from drivers import errors
+from drivers.computer import permissions, scheduling
 from drivers.errors import DriveError, LinkLost, Rejected
 from drivers.ethercat.exchange.cyclic import percentile_us
 from drivers.ethercat.exchange.ring import RING_BYTES, SLOT, VALID, Ring
 from drivers.ethercat.exchange.samples import contiguous
-from drivers.ethercat.process import permissions, protocol
+from drivers.ethercat.process import protocol
 from drivers.ethercat.process.station import Station, _to_preop, change_state
 from drivers.ethercat.wire import esc, sii
 from drivers.ethercat.wire.al_status import AlState, al_status_text, state_name
@@ -255,7 +256,7 @@ def test_short_turns_need_no_permission() -> None:
     """The kernel tells them by sched_getattr(2); in a process of its own, not for these tests."""
     code = """
 import ctypes, os, platform, struct
-from drivers import scheduling
+from drivers.computer import scheduling
 asked = scheduling.short_slice()
 told = ctypes.create_string_buffer(56)
 number = {"x86_64": 315}.get(platform.machine(), 275)

@@ -2203,6 +2203,54 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/preflight": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Look
+         * @description The computer as it is now; verdicts rest on the last measurement of this interface.
+         */
+        get: operations["look"];
+        put?: never;
+        /**
+         * Start Preflight
+         * @description Measure wake-ups, and with an interface frames, at 1 and 4 kHz; the result is kept.
+         */
+        post: operations["start_preflight"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/preflight/fixes": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Apply Fix
+         * @description Change settings of the computer; what was there is kept on the disk and can be restored.
+         */
+        post: operations["apply_fix"];
+        /**
+         * Undo Fixes
+         * @description Restore the settings that the preflight has changed.
+         */
+        delete: operations["undo_fixes"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/profiles": {
         parameters: {
             query?: never;
@@ -3644,6 +3692,12 @@ export interface components {
             lines: components["schemas"]["ChatLine"][];
         };
         /**
+         * Code
+         * @description What hinders.
+         * @enum {string}
+         */
+        Code: "no_interface" | "missing_capability" | "wireless" | "interface_down" | "no_carrier" | "dhcp_on_port" | "port_managed" | "port_carries_ip" | "on_battery" | "busy_core" | "no_real_time" | "stolen_time" | "memory_not_locked" | "deep_idle" | "governor" | "coalescing" | "irq_on_busy_core" | "irq_balanced" | "grouped_frames" | "kernel";
+        /**
          * ConnectRequest
          * @description Make a found station a drive of this bench.
          */
@@ -4221,23 +4275,22 @@ export interface components {
             source: string;
         };
         /**
-         * Finding
-         * @description What the map says, or cannot say, as a code with the figure that it rests on.
+         * Fix
+         * @description Settings that servodeck can change and restore.
+         * @enum {string}
          */
-        Finding: {
+        Fix: "governor" | "idle" | "coalescing" | "grouped_frames" | "interrupts";
+        /**
+         * FixRequest
+         * @description One change of the computer's settings.
+         */
+        FixRequest: {
+            fix: components["schemas"]["Fix"];
             /**
-             * Code
-             * @enum {string}
-             */
-            code: "mapped" | "standstill_not_measured" | "stribeck_not_seen" | "stribeck_not_reached" | "few_speeds" | "ripple_not_asked" | "ripple_needs_revolution" | "ripple_not_seen" | "uneven_speeds" | "fastest_by_travel" | "slowest_by_time" | "model_misfit";
-            /**
-             * Unit
+             * Interface
              * @default
-             * @enum {string}
              */
-            unit: "" | "rpm" | "rev" | "s" | "%";
-            /** Value */
-            value?: number | null;
+            interface: string;
         };
         /**
          * Forcing
@@ -4851,6 +4904,12 @@ export interface components {
              */
             unit: "rev" | "mm" | "°";
         };
+        /**
+         * Grade
+         * @description ``not_measured``: without a measurement nothing is stated of timing.
+         * @enum {string}
+         */
+        Grade: "suitable" | "limited" | "unsuitable" | "not_measured";
         /**
          * GrantView
          * @description What a guest may do, until when, on which axis (null: on all).
@@ -7026,6 +7085,138 @@ export interface components {
             step_time_s: number[];
         };
         /**
+         * PreflightFinding
+         * @description What hinders, the one whose removal would help most first.
+         */
+        PreflightFinding: {
+            code: components["schemas"]["Code"];
+            /** Delay Us */
+            delay_us: number;
+            /**
+             * Effect
+             * @description blocks, interrupts or delays
+             */
+            effect: string;
+            fix: components["schemas"]["Fix"] | null;
+            /** Fix Name */
+            fix_name: string;
+            /** Params */
+            params: {
+                [key: string]: string | number;
+            };
+            /** Remedy */
+            remedy: string;
+            /** What */
+            what: string;
+        };
+        /**
+         * PreflightInfo
+         * @description The computer now, with the last measurement of this interface.
+         */
+        PreflightInfo: {
+            /**
+             * Changed
+             * @description settings that were changed and can be restored
+             */
+            changed: string[];
+            /** Cores */
+            cores: number;
+            /** Findings */
+            findings: components["schemas"]["PreflightFinding"][];
+            /** Interface */
+            interface: string;
+            /** Kernel */
+            kernel: string;
+            /** Measured */
+            measured: string | null;
+            /** Preemption */
+            preemption: string;
+            /** Runs */
+            runs: components["schemas"]["PreflightRun"][];
+            /** Verdicts */
+            verdicts: components["schemas"]["PreflightVerdict"][];
+        };
+        /**
+         * PreflightRequest
+         * @description A measurement. Frames that read one register of all slaves go to ``interface``.
+         */
+        PreflightRequest: {
+            /**
+             * Interface
+             * @description empty: wake-ups alone
+             * @default
+             */
+            interface: string;
+            /**
+             * Seconds
+             * @default 10
+             */
+            seconds: number;
+        };
+        /**
+         * PreflightRun
+         * @description One measured cycle. ``edges_us`` are the upper ends of the classes; one more lies above.
+         */
+        PreflightRun: {
+            /** Cycles */
+            cycles: number;
+            /** Edges Us */
+            edges_us: number[];
+            /** Fifo */
+            fifo: boolean;
+            /** Lateness */
+            lateness: number[];
+            /** Lateness 999 Us */
+            lateness_999_us: number;
+            /** Lateness Median Us */
+            lateness_median_us: number;
+            /** Lateness Most Us */
+            lateness_most_us: number;
+            /** Memory Locked */
+            memory_locked: boolean;
+            /** Missed */
+            missed: number;
+            /** Period Us */
+            period_us: number;
+            /** Round Trip */
+            round_trip: number[] | null;
+            /** Round Trip Median Us */
+            round_trip_median_us: number | null;
+            /** Round Trip Most Us */
+            round_trip_most_us: number | null;
+            /** Unanswered */
+            unanswered: number;
+        };
+        /**
+         * PreflightUndone
+         * @description What was restored, and what somebody had changed since and so was left.
+         */
+        PreflightUndone: {
+            /** Left */
+            left: string[];
+            /** Restored */
+            restored: string[];
+        };
+        /**
+         * PreflightVerdict
+         * @description Whether a purpose can be served, and the figures it rests on.
+         */
+        PreflightVerdict: {
+            /** Allowed */
+            allowed: number | null;
+            grade: components["schemas"]["Grade"];
+            /**
+             * Missed Bound
+             * @description share of missed cycles, 95 % upper bound
+             */
+            missed_bound: number | null;
+            /** Name */
+            name: string;
+            purpose: components["schemas"]["Purpose"];
+            /** Words */
+            words: string;
+        };
+        /**
          * Probe
          * @description One touch probe. ``sources``: value of the source bits of 60B8h to its meaning.
          */
@@ -7219,6 +7410,12 @@ export interface components {
                 [key: string]: string;
             };
         };
+        /**
+         * Purpose
+         * @description What somebody wants to do, and at which cycle.
+         * @enum {string}
+         */
+        Purpose: "parameters" | "scope_1khz" | "response_1khz" | "response_4khz";
         /**
          * Quality
          * @description Counters of one link or station since it was opened.
@@ -9287,6 +9484,7 @@ export type ChangeRecording = components['schemas']['ChangeRecording'];
 export type Chat = components['schemas']['Chat'];
 export type ChatLine = components['schemas']['ChatLine'];
 export type ChatLog = components['schemas']['ChatLog'];
+export type Code = components['schemas']['Code'];
 export type ConnectRequest = components['schemas']['ConnectRequest'];
 export type CountersRequest = components['schemas']['CountersRequest'];
 export type CursorMoved = components['schemas']['CursorMoved'];
@@ -9311,7 +9509,8 @@ export type EthercatSegment = components['schemas']['EthercatSegment'];
 export type ExcitationInfo = components['schemas']['ExcitationInfo'];
 export type FaultHistory = components['schemas']['FaultHistory'];
 export type FaultHistoryInfo = components['schemas']['FaultHistoryInfo'];
-export type Finding = components['schemas']['Finding'];
+export type Fix = components['schemas']['Fix'];
+export type FixRequest = components['schemas']['FixRequest'];
 export type Forcing = components['schemas']['Forcing'];
 export type ForcingInfo = components['schemas']['ForcingInfo'];
 export type ForcingStart = components['schemas']['ForcingStart'];
@@ -9330,6 +9529,7 @@ export type GearPlanInfo = components['schemas']['GearPlanInfo'];
 export type GearValueInfo = components['schemas']['GearValueInfo'];
 export type GearWritten = components['schemas']['GearWritten'];
 export type GenerateRequest = components['schemas']['GenerateRequest'];
+export type Grade = components['schemas']['Grade'];
 export type GrantView = components['schemas']['GrantView'];
 export type Guide = components['schemas']['Guide'];
 export type GuideStep = components['schemas']['GuideStep'];
@@ -9426,6 +9626,12 @@ export type PortInfo = components['schemas']['PortInfo'];
 export type PortRequest = components['schemas']['PortRequest'];
 export type PredictRequest = components['schemas']['PredictRequest'];
 export type PredictionInfo = components['schemas']['PredictionInfo'];
+export type PreflightFinding = components['schemas']['PreflightFinding'];
+export type PreflightInfo = components['schemas']['PreflightInfo'];
+export type PreflightRequest = components['schemas']['PreflightRequest'];
+export type PreflightRun = components['schemas']['PreflightRun'];
+export type PreflightUndone = components['schemas']['PreflightUndone'];
+export type PreflightVerdict = components['schemas']['PreflightVerdict'];
 export type Probe = components['schemas']['Probe'];
 export type ProbeRequest = components['schemas']['ProbeRequest'];
 export type Problem = components['schemas']['Problem'];
@@ -9434,6 +9640,7 @@ export type ProcedureRequest = components['schemas']['ProcedureRequest'];
 export type ProfileInfo = components['schemas']['ProfileInfo'];
 export type ProfileMatch = components['schemas']['ProfileMatch'];
 export type ProfileTexts = components['schemas']['ProfileTexts'];
+export type Purpose = components['schemas']['Purpose'];
 export type Quality = components['schemas']['Quality'];
 export type Quantity = components['schemas']['Quantity'];
 export type ReadAllRequest = components['schemas']['ReadAllRequest'];
@@ -27462,6 +27669,567 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["PeopleList"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    look: {
+        parameters: {
+            query?: {
+                interface?: string;
+                language?: "en" | "zh";
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PreflightInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_preflight: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["PreflightRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    apply_fix: {
+        parameters: {
+            query?: {
+                language?: "en" | "zh";
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["FixRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PreflightInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    undo_fixes: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PreflightUndone"];
                 };
             };
             /** @description Not a request of this interface */

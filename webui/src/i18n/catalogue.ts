@@ -9,6 +9,7 @@ import { notListed } from './texts/notlisted'
 import { motionClass } from './texts/motion-class'
 import { parameters } from './texts/parameters'
 import { people } from './texts/people'
+import { preflight } from './texts/preflight'
 import { recordings } from './texts/recordings'
 import { saidTexts } from './texts/said'
 import { imported } from './texts/imported'
@@ -32,6 +33,7 @@ export const catalogue = {
   ...motionClass,
   ...parameters,
   ...people,
+  ...preflight,
   ...recordings,
   ...library,
   ...notListed,

@@ -11,7 +11,7 @@ import struct
 import time
 from typing import IO
 
-from drivers.computer.sockets import AF_PACKET, AF_UNIX, receive_with_notes
+from drivers.computer.sockets import AF_PACKET, hold_name, receive_with_notes
 from drivers.errors import LinkLost
 from drivers.virtual.wires import netns
 from drivers.virtual.wires.ethercat.control import Control
@@ -33,11 +33,9 @@ class InterfaceLock:
     """
 
     def __init__(self, interface: str) -> None:
-        self._socket = socket.socket(AF_UNIX, socket.SOCK_DGRAM)
         try:
-            self._socket.bind(f"\0servodeck-virtual-segment-{interface}")
+            self._socket = hold_name(f"servodeck-virtual-segment-{interface}")
         except OSError as error:
-            self._socket.close()
             raise LinkLost(
                 "virtual.another-virtual-segment-already", interface=interface
             ) from error

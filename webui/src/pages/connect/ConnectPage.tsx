@@ -12,6 +12,7 @@ import { BenchDrive } from './BenchDrive'
 import { Buses } from './Buses'
 import { ConnectHelp } from './ConnectHelp'
 import { NotListedPanel } from './NotListed'
+import { Preflight } from './Preflight'
 import { Scan } from './Scan'
 import { InterfacePermissions } from './segment/Permissions'
 import { VirtualBench } from './VirtualBench'
@@ -120,6 +121,7 @@ export function ConnectPage() {
       </div>
       <NotListedPanel />
       <Buses />
+      <Preflight url={url.trim()} />
       <ConnectHelp />
     </div>
   )

@@ -8,7 +8,7 @@ import signal
 import sys
 from dataclasses import dataclass
 
-from drivers import scheduling
+from drivers.computer import scheduling
 
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
 _PR_SET_PDEATHSIG = 1
@@ -21,6 +21,7 @@ class RealTime:
 
     fifo_priority: int
     notes: tuple[str, ...]
+    memory_locked: bool = False
 
 
 def claim(*, wanted: bool = True) -> RealTime:
@@ -41,7 +42,8 @@ def claim(*, wanted: bool = True) -> RealTime:
             "the system grants no real-time scheduling (SCHED_FIFO), so single cycles may be some"
             " milliseconds late on a busy computer; CAP_SYS_NICE or an rtprio limit grants it"
         )
-    if libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
+    locked = libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) == 0
+    if not locked:
         notes.append(
             "the system does not let this process lock its memory; CAP_IPC_LOCK or a larger"
             " memlock limit does"
@@ -50,7 +52,7 @@ def claim(*, wanted: bool = True) -> RealTime:
     scheduling.spare_collector()
     gc.disable()
     sys.setswitchinterval(1e-4)
-    return RealTime(priority, tuple(notes))
+    return RealTime(priority, tuple(notes), locked)
 
 
 def die_with_parent() -> None:

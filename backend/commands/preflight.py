@@ -1,0 +1,127 @@
+"""``servodeck preflight``: is this computer punctual enough, and what would help most."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from backend.commands.session import told
+from backend.commands.state import state_folder
+from backend.preflight import kept
+from backend.preflight.findings import Effect, Fix
+from backend.preflight.fixes import Fixes
+from backend.preflight.run import Preflight, preflight
+from backend.preflight.texts import Language, fix_name, purpose_name, verdict_words, words
+from drivers.computer.lateness import EDGES_US, Histogram, Measured
+from drivers.errors import OutOfRange
+
+_BAR = 40
+
+
+@told
+def preflight_command(
+    interface: Annotated[
+        str, typer.Argument(help="Network interface for EtherCAT, as eth0; frames go out there.")
+    ] = "",
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    seconds: Annotated[
+        float, typer.Option(help="How long to measure, up to 60 s; 0: only look.")
+    ] = 10.0,
+    language: Annotated[str, typer.Option(help="en or zh.")] = "en",
+    fix: Annotated[
+        str, typer.Option(help=f"Change a setting: {', '.join(Fix)}. Needs the administrator.")
+    ] = "",
+    undo: Annotated[
+        bool, typer.Option("--undo", help="Restore the settings that --fix has changed.")
+    ] = False,
+    config: Annotated[Path | None, typer.Option(help="state folder of the station")] = None,
+) -> None:
+    """Look at this computer, measure how punctual it is, and name the change that helps most.
+
+    Nothing is written to a drive. Exit code 1 where a purpose is not suitable.
+    """
+    words_in: Language = "zh" if language == "zh" else "en"
+    folder = state_folder(config)
+    if undo:
+        undone = Fixes(folder).undo()
+        for change in undone.restored:
+            print(f"{change.setting}: {change.before}")
+        for change in undone.left:
+            print(f"{change.setting}: left, as it was changed since")
+        return
+    if fix:
+        if fix not in set(Fix):
+            raise OutOfRange(f"{fix!r} is no fix", value=fix, limit=", ".join(Fix))
+        for change in Fixes(folder).apply(Fix(fix), interface):
+            print(f"{change.setting}: {change.before} -> {change.after}")
+        return
+    result = asyncio.run(preflight(interface, seconds))
+    if result.measured:
+        kept.keep(folder, interface, result.measured)
+    if as_json:
+        print(json.dumps(as_data(result, words_in), indent=2, ensure_ascii=False))
+    else:
+        _show(result, words_in)
+    if any(one.grade == "unsuitable" for one in result.verdicts):
+        raise typer.Exit(1)
+
+
+def as_data(result: Preflight, language: Language) -> dict[str, object]:
+    """The result as JSON has it: codes and figures, and the words in one language."""
+    return {
+        "interface": result.interface,
+        "facts": asdict(result.facts) | {"capabilities": sorted(result.facts.capabilities)},
+        "findings": [
+            asdict(one) | {"effect": one.effect.name.lower()} | words(one, language)._asdict()
+            for one in result.findings
+        ],
+        "verdicts": [
+            asdict(one) | {"words": verdict_words(one, language)} for one in result.verdicts
+        ],
+        "edges_us": EDGES_US,
+        "measured": [asdict(one) for one in result.measured.values()],
+    }
+
+
+def _show(result: Preflight, language: Language) -> None:
+    facts = result.facts
+    print(f"Linux {facts.kernel} ({facts.preemption}), {facts.cores} cores")
+    for number, one in enumerate(result.findings):
+        what, remedy = words(one, language)
+        cost = f" [{one.delay_us:.0f} µs]" if one.effect is Effect.DELAYS else ""
+        print(f"{'->' if number == 0 else '  '} {what}{cost}\n      {remedy}")
+        if one.fix is not None:
+            command = f"servodeck preflight {result.interface} --fix {one.fix}"
+            print(f"      {fix_name(one.fix, language)}: {' '.join(command.split())}")
+    for run in result.measured.values():
+        _show_run(run)
+    for verdict in result.verdicts:
+        print(f"{purpose_name(verdict.purpose, language)}: {verdict_words(verdict, language)}")
+
+
+def _show_run(run: Measured) -> None:
+    print(
+        f"cycle {run.period_us} µs: {run.cycles} cycles, {run.missed} missed, SCHED_FIFO"
+        f" {'granted' if run.fifo else 'not granted'}, memory"
+        f" {'locked' if run.memory_locked else 'not locked'}"
+    )
+    _show_histogram("wake-up lateness", run.lateness)
+    if run.round_trip is not None:
+        _show_histogram("frame round trip", run.round_trip)
+    elif run.unanswered:
+        print("  no frame came back: is a drive connected and switched on?")
+
+
+def _show_histogram(name: str, histogram: Histogram) -> None:
+    most = max(histogram.counts)
+    print(f"  {name}: 99.9 % below {histogram.below_us(0.999):.0f} µs,"
+          f" latest {histogram.most_us:.0f} µs")  # fmt: skip
+    for count, edge in zip(histogram.counts, (*EDGES_US, None), strict=True):
+        if count:
+            limit = f"<= {edge:g}" if edge is not None else f"> {EDGES_US[-1]:g}"
+            print(f"  {limit:>12} µs {count:7d} {'#' * max(1, _BAR * count // most)}")

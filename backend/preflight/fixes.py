@@ -1,0 +1,158 @@
+"""Settings of the computer that are changed with a press, and restored with another.
+
+What was there is on the disk before anything is changed (``preflight-restore.json`` in the state
+folder), so that it can be restored after a crash as well. A setting that somebody has changed
+since is left as it is. A restart of the computer restores all of them by itself.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from backend.preflight.findings import Fix
+from drivers.computer.host_facts import HostFacts
+from drivers.computer.host_settings import HostSettings, Setting, affinity, command
+from drivers.errors import NotAllowed
+
+RESTORE_LIST = "preflight-restore.json"
+_QUICK_IDLE_US = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A setting with the value before and the one that was set."""
+
+    fix: Fix
+    setting: Setting
+    before: str
+    after: str
+
+
+@dataclass(frozen=True, slots=True)
+class Undone:
+    """What was restored, and what was left because somebody had changed it since."""
+
+    restored: list[Change]
+    left: list[Change]
+
+
+@dataclass(slots=True)
+class Fixes:
+    """The fixes of one computer, with the restore list in ``folder``."""
+
+    folder: Path
+    settings: HostSettings = field(default_factory=HostSettings)
+
+    def pending(self) -> list[Change]:
+        """What is changed now and can be restored, oldest first."""
+        try:
+            listed = json.loads((self.folder / RESTORE_LIST).read_text("utf-8"))
+            return [_change(one) for one in listed]
+        except FileNotFoundError:
+            return []
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            path = self.folder / RESTORE_LIST
+            raise NotAllowed(
+                f"the list of what the preflight changed cannot be read: {path}",
+                value=str(error),
+                remedy="restart the computer, which restores these settings, and delete the file",
+            ) from error
+
+    def apply(self, fix: Fix, interface: str) -> list[Change]:
+        """Make a change; what is set already is not set again.
+
+        Raises:
+            NotAllowed: not permitted, or the computer does not take it; nothing stays changed.
+        """
+        facts = self.settings.computer.facts(interface)
+        wanted = [
+            Change(fix, setting, before, after)
+            for setting, after in _wanted(fix, facts)
+            if (before := self.settings.read(setting)) != after
+        ]
+        kept = self.pending()
+        self._keep([*kept, *wanted])
+        done: list[Change] = []
+        try:
+            for change in wanted:
+                self.settings.write(change.setting, change.after)
+                done.append(change)
+        except OSError as error:
+            for made in reversed(done):
+                self.settings.write(made.setting, made.before)
+            self._keep(kept)
+            raise NotAllowed(
+                f"{change.setting} cannot be set to {change.after}: {error.strerror or error}",
+                value=change.after,
+                remedy="as the administrator of the computer: "
+                + command(change.setting, change.after),
+            ) from error
+        return wanted
+
+    def undo(self) -> Undone:
+        """Restore everything, the latest change first.
+
+        Raises:
+            NotAllowed: not permitted; what could not be restored stays in the list.
+        """
+        changes, restored, left = self.pending(), [], []
+        while changes:
+            change = changes[-1]
+            if self.settings.read(change.setting) != change.after:
+                left.append(change)
+            else:
+                try:
+                    self.settings.write(change.setting, change.before)
+                except OSError as error:
+                    raise NotAllowed(
+                        f"{change.setting} cannot be restored to {change.before}:"
+                        f" {error.strerror or error}",
+                        value=change.before,
+                        remedy="restart the computer, which restores it",
+                    ) from error
+                restored.append(change)
+            changes.pop()
+            self._keep(changes)
+        return Undone(restored, left)
+
+    def _keep(self, changes: list[Change]) -> None:
+        """On the disk, or an error before anything is changed."""
+        listed = [
+            {"fix": one.fix, "place": one.setting.place, "card": one.setting.card,
+             "before": one.before, "after": one.after}
+            for one in changes
+        ]  # fmt: skip
+        self.folder.mkdir(parents=True, exist_ok=True)
+        fresh = self.folder / f".{RESTORE_LIST}.new"
+        with fresh.open("w", encoding="utf-8") as file:
+            json.dump(listed, file, indent=1)
+            file.flush()
+            os.fsync(file.fileno())
+        fresh.replace(self.folder / RESTORE_LIST)
+
+
+def _change(kept: dict[str, str]) -> Change:
+    setting = Setting(kept["place"], kept["card"])
+    return Change(Fix(kept["fix"]), setting, kept["before"], kept["after"])
+
+
+def _wanted(fix: Fix, facts: HostFacts) -> Iterator[tuple[Setting, str]]:
+    """The settings of a fix with the values that they get."""
+    if fix is Fix.GOVERNOR:
+        yield from ((Setting(file), "performance") for file in facts.governors)
+    elif fix is Fix.IDLE:
+        slow = (one for one in facts.idle_states if one.latency_us > _QUICK_IDLE_US)
+        yield from ((Setting(file), "1") for one in slow for file in one.switches)
+    elif facts.port is not None:
+        port = facts.port
+        if fix is Fix.INTERRUPTS:
+            quiet = min(range(len(facts.busy)), key=lambda core: facts.busy[core], default=0)
+            for number in port.interrupts:
+                yield affinity(number), str(quiet)
+        else:
+            names = ("rx-usecs", "tx-usecs") if fix is Fix.COALESCING else ("gro", "lro")
+            yield from ((Setting(one, port.name), "0") for one in names if one in port.card)

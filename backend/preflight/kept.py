@@ -1,0 +1,55 @@
+"""The last measurement of each interface, kept over restarts in ``preflight.json``."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from drivers.computer.lateness import Measured, from_json
+
+FILE = "preflight.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """``measured`` by period in µs, and when it ended (seconds since the epoch)."""
+
+    measured: Mapping[int, Measured]
+    ended: float
+
+
+def read(folder: Path) -> dict[str, Kept]:
+    """By interface (empty: without one). Nothing where the file is not there or damaged: it is
+    measured anew.
+    """
+    try:
+        listed = json.loads((folder / FILE).read_text("utf-8"))
+        return {
+            interface: Kept(
+                {run["period_us"]: from_json(json.dumps(run)) for run in one["measured"]},
+                float(one["ended"]),
+            )
+            for interface, one in listed.items()
+        }
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {}
+
+
+def keep(folder: Path, interface: str, measured: Mapping[int, Measured]) -> None:
+    """Keep it in place of the one before.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    known = read(folder) | {interface: Kept(measured, time.time())}
+    listed = {
+        name: {"ended": one.ended, "measured": [asdict(run) for run in one.measured.values()]}
+        for name, one in known.items()
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    fresh = folder / f".{FILE}.new"
+    fresh.write_text(json.dumps(listed), "utf-8")
+    fresh.replace(folder / FILE)

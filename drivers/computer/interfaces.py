@@ -1,0 +1,52 @@
+"""The network interfaces of this computer, as the system describes them."""
+
+from __future__ import annotations
+
+import socket
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+_NET = Path("/sys/class/net")
+_ARPHRD_ETHER, _ARPHRD_CAN = 1, 280
+
+
+@dataclass(frozen=True, slots=True)
+class Interface:
+    """One interface; ``up`` is whether it can carry frames now (not reported as down)."""
+
+    name: str
+    up: bool
+    is_wired: bool
+    is_can: bool
+
+
+def network_interfaces(net: Path = _NET) -> list[Interface]:
+    """What the system lists. Only Linux says of what kind each is; elsewhere none is listed,
+    as EtherCAT and SocketCAN are not available there.
+    """
+    if sys.platform != "linux":
+        return []
+    return [_interface(net / name, name) for _, name in socket.if_nameindex()]
+
+
+def _interface(folder: Path, name: str) -> Interface:
+    kind = _number(folder / "type")
+    return Interface(
+        name=name,
+        up=_text(folder / "operstate") not in ("", "down"),
+        is_wired=kind == _ARPHRD_ETHER and not (folder / "wireless").exists(),
+        is_can=kind == _ARPHRD_CAN,
+    )
+
+
+def _text(file: Path) -> str:
+    try:
+        return file.read_text("ascii").strip()
+    except (OSError, UnicodeDecodeError):
+        return ""
+
+
+def _number(file: Path) -> int:
+    text = _text(file)
+    return int(text) if text.isdecimal() else -1

@@ -1,0 +1,172 @@
+"""Measures how late this computer wakes a real-time thread, and how long a frame takes.
+
+Runs as a process of its own under the conditions that the EtherCAT process has, so that nothing of
+the server's own scheduling changes: ``python -m drivers.computer.lateness PERIOD_US SECONDS
+[INTERFACE]`` prints one line of JSON. With an interface each cycle sends one EtherCAT frame that
+reads register 0000h of all slaves (BRD: nothing is written in them) and waits for its return until
+the cycle ends.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import select
+import socket
+import struct
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+from drivers.computer import realtime
+from drivers.computer.sockets import AF_PACKET
+
+#: Upper ends of the classes of the histograms, µs: six to a decade from 1 µs to 1 s.
+EDGES_US = tuple(round(10 ** (step / 6), 2) for step in range(37))
+_ETH_P_ECAT = 0x88A4
+_UNANSWERED = 50
+"""Frames in a row without an answer after which none are sent any more."""
+
+
+@dataclass(slots=True)
+class Histogram:
+    """Counts by `EDGES_US` (one more class above the last), with the largest value in µs."""
+
+    counts: list[int]
+    most_us: float = 0.0
+
+    @classmethod
+    def empty(cls) -> Histogram:
+        """No value yet."""
+        return cls([0] * (len(EDGES_US) + 1))
+
+    def add(self, value_us: float) -> None:
+        """Count one value."""
+        step = 0 if value_us <= 1 else math.ceil(6 * math.log10(value_us) - 1e-3)
+        self.counts[min(step, len(EDGES_US))] += 1
+        self.most_us = max(self.most_us, value_us)
+
+    def below_us(self, share: float) -> float:
+        """The end of the class below which this share of the values lies."""
+        wanted, seen = share * sum(self.counts), 0
+        for count, edge in zip(self.counts, EDGES_US, strict=False):
+            seen += count
+            if seen >= wanted:
+                return min(edge, self.most_us)
+        return self.most_us
+
+
+@dataclass(slots=True)
+class Measured:
+    """One run. ``missed`` cycles were over before thread and frame were through."""
+
+    period_us: int
+    cycles: int
+    missed: int
+    fifo: bool
+    memory_locked: bool
+    lateness: Histogram
+    round_trip: Histogram | None
+    """None where no interface was named or nothing answered."""
+    unanswered: int = 0
+
+
+def from_json(text: str) -> Measured:
+    """What the process has printed."""
+    found = json.loads(text)
+    found["lateness"] = Histogram(**found["lateness"])
+    found["round_trip"] = Histogram(**found["round_trip"]) if found["round_trip"] else None
+    return Measured(**found)
+
+
+def broadcast_read(index: int) -> bytes:
+    """An Ethernet frame with one BRD datagram of 2 bytes at 0000h (ETG.1000.4, clause 5.4.1)."""
+    datagram = struct.pack("<BBHHHH", 7, index & 0xFF, 0, 0, 2, 0) + bytes(2) + bytes(2)
+    header = struct.pack("<H", len(datagram) | 1 << 12)
+    frame = b"\xff" * 6 + b"\x02\x00\x00\x00\x00\x01" + struct.pack(">H", _ETH_P_ECAT)
+    return (frame + header + datagram).ljust(60, b"\0")
+
+
+class Wire:
+    """Sends one frame and waits for it to come back."""
+
+    def __init__(self, interface: str) -> None:
+        self._socket = socket.socket(AF_PACKET, socket.SOCK_RAW, socket.htons(_ETH_P_ECAT))
+        self._socket.bind((interface, _ETH_P_ECAT))
+        self._socket.setblocking(False)
+        self._index = 0
+
+    def round_trip_us(self, until: float) -> float | None:
+        """Time until the frame of this call is back; None where it is not by ``until``."""
+        self._index = (self._index + 1) & 0xFF
+        sent = time.monotonic()
+        self._socket.send(broadcast_read(self._index))
+        while (left := until - time.monotonic()) > 0:
+            if not select.select((self._socket,), (), (), left)[0]:
+                return None
+            frame, address = self._socket.recvfrom(1600)
+            # What goes out is seen as well (PACKET_OUTGOING, packet(7)).
+            if address[2] != 4 and len(frame) > 17 and frame[17] == self._index:
+                return (time.monotonic() - sent) * 1e6
+        return None
+
+
+def measure(period_us: int, seconds: float, interface: str = "") -> Measured:
+    """Wake up at each period and note how late.
+
+    Raises:
+        OSError: the interface cannot be used: no such one, or no permission.
+    """
+    granted = realtime.claim()
+    wire = Wire(interface) if interface else None
+    measured = Measured(
+        period_us, 0, 0, granted.fifo_priority > 0, granted.memory_locked,
+        Histogram.empty(), Histogram.empty() if wire else None,
+    )  # fmt: skip
+    period, in_a_row = period_us / 1e6, 0
+    due = time.monotonic() + 0.05
+    for _ in range(round(seconds / period)):
+        due += period
+        time.sleep(max(0.0, due - time.monotonic()))
+        late_us = (time.monotonic() - due) * 1e6
+        measured.lateness.add(late_us)
+        used_us = late_us
+        if wire is not None and measured.round_trip is not None:
+            trip = wire.round_trip_us(max(due + period, time.monotonic() + 0.2 * period))
+            if trip is None:
+                measured.unanswered, in_a_row = measured.unanswered + 1, in_a_row + 1
+                used_us = math.inf
+                if in_a_row == _UNANSWERED and measured.unanswered == measured.cycles + 1:
+                    return _without_wire(measured, period_us, seconds)
+            else:
+                measured.round_trip.add(trip)
+                used_us, in_a_row = late_us + trip, 0
+        measured.cycles += 1
+        measured.missed += used_us > period_us
+        # A cycle that is over is not made up for: the next one is on the grid again.
+        due += max(0.0, math.floor((time.monotonic() - due) / period) * period)
+    return measured
+
+
+def _without_wire(tried: Measured, period_us: int, seconds: float) -> Measured:
+    """Nothing answers on the wire: the lateness alone."""
+    measured = measure(period_us, seconds)
+    measured.unanswered = tried.unanswered
+    return measured
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Entry point of the process."""
+    period_us, seconds = int(arguments[0]), float(arguments[1])
+    try:
+        measured = measure(period_us, seconds, *arguments[2:3])
+    except OSError as error:
+        sys.stderr.write(f"{error.strerror or error}\n")
+        return 1
+    sys.stdout.write(json.dumps(asdict(measured)) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,47 @@
+import type { Texts } from '../types'
+
+/** Connect page: whether this computer is punctual enough. */
+export const preflight = {
+  'preflight.title': ['Preflight of the computer', '计算机预检'],
+  'preflight.help': [
+    'What hinders punctual EtherCAT on the computer that servodeck runs on, the one whose removal helps most first. The measurement reads one register of all slaves on the interface chosen above; nothing is written to a drive.',
+    '列出运行 servodeck 的计算机上妨碍 EtherCAT 准时运行的因素，改善效果最大的排在最前。测量时只读取上方所选接口上所有从站的一个寄存器，不向驱动器写入任何内容。',
+  ],
+  'preflight.look': ['Look', '查看'],
+  'preflight.measure': ['Measure for 10 s', '测量 10 秒'],
+  'preflight.none': ['Nothing hinders it.', '没有妨碍因素。'],
+  'preflight.first': ['Would help most', '改善效果最大'],
+  'preflight.effect.blocks': ['no frame gets through', '帧无法通过'],
+  'preflight.effect.interrupts': ['the bus can fail in the midst of work', '总线可能在工作中中断'],
+  'preflight.effect.delays': ['up to {delay} µs late', '最多延迟 {delay} µs'],
+  'preflight.purpose': ['Purpose', '用途'],
+  'preflight.verdict': ['Verdict', '结论'],
+  'preflight.measured': ['Measured {when}', '测量于 {when}'],
+  'preflight.cycle': ['Cycle {period} µs', '周期 {period} µs'],
+  'preflight.figures': [
+    '{missed} of {cycles} cycles missed; 99.9 % late by at most {late} µs, the latest {most} µs',
+    '{cycles} 个周期中错过 {missed} 个；99.9 % 的延迟不超过 {late} µs，最大 {most} µs',
+  ],
+  'preflight.trip': [
+    'Frame there and back: {median} µs, at most {most} µs',
+    '帧往返：{median} µs，最多 {most} µs',
+  ],
+  'preflight.unanswered': ['No frame came back.', '没有帧返回。'],
+  'preflight.fifo': ['real-time scheduling granted', '已授予实时调度'],
+  'preflight.noFifo': ['real-time scheduling not granted', '未授予实时调度'],
+  'preflight.histogram': [
+    'Wake-up lateness: number of cycles per class',
+    '唤醒延迟：各区间的周期数',
+  ],
+  'preflight.class': ['up to {edge} µs: {count}', '不超过 {edge} µs：{count}'],
+  'preflight.classAbove': ['more than {edge} µs: {count}', '超过 {edge} µs：{count}'],
+  'preflight.changed': [
+    '{count} settings of the computer are changed and can be restored.',
+    '已更改计算机的 {count} 项设置，可以恢复。',
+  ],
+  'preflight.undo': ['Restore', '恢复'],
+  'preflight.left': [
+    'Left as they are, because they were changed since: {settings}',
+    '以下设置此后被更改过，保持不变：{settings}',
+  ],
+} satisfies Texts
