@@ -56,7 +56,7 @@ async def _recorded(url: str, station: int | None, seconds: float, server: str |
             return answer.content
     async with opened(url) as link:
         if not isinstance(link, RecordsFrames):
-            raise NotAllowed(f"{url}: its frames are not recorded", value=url)
+            raise NotAllowed("command.frames-not-recorded", value=url)
         await link.scan(show_progress, None)
         await asyncio.sleep(seconds)
         return await link.flight(station)

@@ -42,11 +42,7 @@ def doctor(
             async with opened(url) as link:
                 segment = segment_of(link)
                 if segment is None:
-                    raise NotAllowed(
-                        f"{url}: the doctor knows EtherCAT only",
-                        value=url,
-                        remedy="for other buses see the notes of `servodeck scan`",
-                    )
+                    raise NotAllowed("command.doctor-knows-ethercat", value=url)
                 results = await _here(segment, station, profile)
         _show(results, as_json=as_json)
         return all(each["reached"] for each in results)

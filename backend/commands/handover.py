@@ -73,9 +73,7 @@ def export(
     async def work() -> None:
         chosen = _format(form)
         if bool(only) + tuned + not_default > 1:
-            raise NotAllowed(
-                "--only, --tuned and --not-default exclude each other", remedy="give one of them"
-            )
+            raise NotAllowed("command.tuned-not-default-exclude")
         choice: Choice = "tuned" if tuned else "not_default" if not_default else "all"
         keys = [key.strip().upper() for key in only.split(",") if key.strip()]
         contents = [set_of(file) for file in sets]
@@ -99,9 +97,7 @@ def export(
 
 def _format(form: str) -> Format:
     if form not in FORMATS:
-        raise NotAllowed(
-            f"{form!r} is no format", value=form, remedy=f"choose one of {', '.join(FORMATS)}"
-        )
+        raise NotAllowed("command.no-format", value=form, formats=", ".join(FORMATS))
     return next(each for each in get_args(Format) if each == form)
 
 

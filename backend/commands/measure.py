@@ -169,8 +169,7 @@ class Where(NamedTuple):
         """
         if self.url is None:
             if self.server is None or self.axis is None:
-                raise NotAllowed("give a bus URL and --station, or --server and --axis",
-                                 remedy="see --help")  # fmt: skip
+                raise NotAllowed("command.give-bus-url-station")
             return self.server
         return server_for(self.url, self.server)
 
@@ -186,9 +185,9 @@ class Where(NamedTuple):
         drive = next((d for d in drives if self.axis in (d.name, d.id)), None)
         if drive is None:
             names = ", ".join(d.name for d in drives) or "none"
-            raise NotAllowed(f"{at.address} has no drive {self.axis!r}", value=self.axis,
-                             limit=names, remedy="give its name with --axis, or a bus URL and "
-                             "--station")  # fmt: skip
+            raise NotAllowed(
+                "command.no-drive-give-name-2", value=self.axis, limit=names, address=at.address
+            )
         return drive
 
 

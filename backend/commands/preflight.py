@@ -56,7 +56,7 @@ def preflight_command(
         return
     if fix:
         if fix not in set(Fix):
-            raise OutOfRange(f"{fix!r} is no fix", value=fix, limit=", ".join(Fix))
+            raise OutOfRange("command.no-fix", value=fix, limit=", ".join(Fix))
         for change in Fixes(folder).apply(Fix(fix), interface):
             print(f"{change.setting}: {change.before} -> {change.after}")
         return

@@ -57,8 +57,7 @@ def report(
         urls = [each for each in given if "://" in each]
         named = axis is not None or bool(urls)
         if named == (len(given) > len(urls)) or len(urls) > 1:
-            raise NotAllowed("give either measurement files, or a bus URL and --station, or "
-                             "--server and --axis", remedy="see --help")  # fmt: skip
+            raise NotAllowed("command.give-either-measurement-files-bus")
         if named:
             where = Where(urls[0] if urls else None, station, profile, server, axis)
             data = await _from_server(where, form, language.value, about)
@@ -95,12 +94,7 @@ def _from_files(files: list[Path], form: Format, language: LanguageName, about: 
 async def _from_server(where: Where, form: Format, language: str, about: About) -> bytes:
     server = where.asked
     if server is None:
-        raise NotAllowed(
-            "the report of a drive on a bus is made by a running server, which holds its "
-            "measurements", value=where.url,
-            remedy="start `servodeck serve` and give its address with --server, or give "
-            "measurement files",
-        )  # fmt: skip
+        raise NotAllowed("command.report-drive-bus-made", value=where.url)
     body = {"format": form, "language": language, "person": about.person,
             "machine": about.machine, "notes": about.notes}  # fmt: skip
     async with remote(server) as at:

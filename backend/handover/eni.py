@@ -96,10 +96,11 @@ def _places(axes: Sequence[AxisHandover]) -> list[_Place]:
     total = outputs + sum(back for _, back in sizes)
     if total > _FRAME - 100:
         raise NotAllowed(
-            f"the process data of {len(axes)} drives take {total} bytes, one frame holds "
-            f"{_FRAME - 100}",
+            "handover.process-data-drives-take",
             limit=f"{_FRAME - 100} bytes",
-            remedy="export the segment in two parts",
+            axes=len(axes),
+            total_bytes=total,
+            frame=_FRAME - 100,
         )
     places, out_at, in_at = [], 0, outputs
     for position, (axis, (out, back)) in enumerate(zip(axes, sizes, strict=True)):

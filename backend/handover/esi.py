@@ -78,19 +78,11 @@ def controller_of(
     ]
     exact = [device for device in fitting if device.revision == revision]
     if not fitting:
-        raise NotAllowed(
-            f"{name} has no device of vendor 0x{vendor:08X} and product 0x{product:08X}",
-            value=name,
-            remedy="choose the ESI file of this very drive",
-        )
+        raise NotAllowed("handover.no-device-vendor-0x", value=name, vendor=vendor, product=product)
     chosen = max(exact or fitting, key=lambda device: device.revision or 0)
     found = _controller(file.devices[chosen.number], name, report)
     if found.manager("mailbox_out") is None or found.manager("mailbox_in") is None:
-        raise NotAllowed(
-            f"{name}: {chosen.name} has no mailboxes, so no start-up list can be written to it",
-            value=name,
-            remedy="choose the ESI file of this very drive",
-        )
+        raise NotAllowed("handover.no-mailboxes-no-start", value=name, chosen=chosen.name)
     return found
 
 
@@ -108,9 +100,11 @@ def _controller(element: Element, name: str, report: ImportReport) -> SlaveContr
             mailbox and not _SHORTEST_MAILBOX <= length <= _LONGEST
         ):
             raise BadSet(
-                f"{name}: sync manager {number} at 0x{start:04X} of {length} bytes is none",
+                "handover.sync-manager-0x-bytes",
                 value=name,
-                remedy="choose another ESI file of this drive",
+                number=number,
+                start=start,
+                length_bytes=length,
             )
         managers.append(SyncManager(number, kind, start, length if mailbox else 0, control))
     coe = child(child(element, "Mailbox"), "CoE")

@@ -41,9 +41,10 @@ def files_of(
     axes = [what] if isinstance(what, AxisHandover) else list(what)
     if not axes or (len(axes) > 1 and form not in SEGMENT_FORMATS):
         raise NotAllowed(
-            f"{form} holds one drive, not {len(axes)}",
+            "handover.holds-drive-not",
             value=form,
-            remedy=f"export each drive by itself, or choose {', '.join(SEGMENT_FORMATS)}",
+            axes=len(axes),
+            segment_formats=", ".join(SEGMENT_FORMATS),
         )
     for axis in axes:
         _require_bus(axis, form)
@@ -96,10 +97,7 @@ def _require_bus(axis: AxisHandover, form: Format) -> None:
     if form in _ETHERCAT_ONLY and not on_ethercat:
         raise NotAllowed("handover.no-ethercat-drive", profile_title=axis.profile.title, form=form)
     if form == "ros2" and not on_ethercat and axis.profile.link("canopen") is None:
-        raise NotAllowed(
-            f"{axis.profile.title} is on neither EtherCAT nor CANopen, which ros2 is for",
-            remedy="choose csv or python",
-        )
+        raise NotAllowed("handover.neither-ethercat-nor-canopen", profile_title=axis.profile.title)
 
 
 def _list(
@@ -133,10 +131,7 @@ def _list(
 def _ros2(axes: list[AxisHandover], name: str, saved: datetime | None) -> dict[str, bytes]:
     wired = [axis.profile.link("ethercat") is not None for axis in axes]
     if any(wired) and not all(wired):
-        raise NotAllowed(
-            "drives on EtherCAT and on CANopen are no one segment",
-            remedy="export each bus by itself",
-        )
+        raise NotAllowed("handover.drives-ethercat-canopen-no")
     if len(axes) == 1 and all(wired):
         return {name: text_lists.ros2(axes[0])}
     suffix = "yaml" if all(wired) else "dcf"

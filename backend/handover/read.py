@@ -25,6 +25,7 @@ from drivers.errors import DriveError
 from profiles.importer import ImportFailed, ImportReport, is_dcf, read_dcf_values
 from profiles.importer.values import default_value
 from profiles.schema import INTEGER_RANGE, DataType, Parameter, Profile
+from texts.message import text
 
 MAX_BYTES = 8_000_000
 _MAX_WRITES = 20_000
@@ -109,10 +110,7 @@ def _by_contents(data: bytes, profile: Profile, name: str, slave: int | None) ->
         return ControllerList("igh", tuple(_igh(text)))
     if re.search(r"^\s*(sdo|vendor_id)\s*:", text, re.M):
         return ControllerList("ros2", tuple(_ros2(text, profile, slave)))
-    raise BadSet(
-        f"{name} is no start-up list that is known here",
-        remedy="give TwinCAT, CODESYS or ENI, lcec XML, ROS 2 YAML, an ethercat script, DCF or CSV",
-    )
+    raise BadSet("handover.no-start-up-list", name=name)
 
 
 def _number(text: str | None, place: str, *, base: int = 0) -> int:
@@ -156,10 +154,7 @@ def _xml(data: bytes, profile: Profile, name: str, slave: int | None) -> Control
     if root.tag in ("EtherCATMailbox", "EtherCATConfig", "TreeItem"):
         form = "eni" if root.tag == "EtherCATConfig" else "twincat"
         return ControllerList(form, tuple(_init_commands(root, profile, name, slave)))
-    raise BadSet(
-        f"{name} is XML of another kind: its root is {str(root.tag)[:60]}",
-        remedy="give an EtherCATMailbox, EtherCATConfig or lcec masters file",
-    )
+    raise BadSet("handover.xml-another-kind-root", name=name, tag=str(root.tag)[:60])
 
 
 def _chosen(elements: list[Element], what: str, name: str, slave: int | None) -> Element:
@@ -169,8 +164,15 @@ def _chosen(elements: list[Element], what: str, name: str, slave: int | None) ->
     if slave is not None and 1 <= slave <= len(elements):
         return elements[slave - 1]
     raise BadSet(
-        f"{name} has {len(elements)} {what}; one drive is compared at a time",
-        remedy="say which with --slave, counted from 1" if elements else "give another file",
+        "handover.drive-compared-time-2",
+        remedy=(
+            text("handover.try-say-slave-counted")
+            if elements
+            else text("handover.try-give-another-file")
+        ),
+        name=name,
+        elements=len(elements),
+        what=what,
     )
 
 

@@ -50,9 +50,8 @@ class HandoverLog:
                 file.write(json.dumps(row) + "\n")
         except OSError as error:
             raise StorageFailed(
-                f"the hand-over of {drive_id} cannot be noted: {error}",
-                drive=drive_id, remedy="free some space and export again",
-            ) from error  # fmt: skip
+                "handover.hand-over-cannot-noted", drive=drive_id, cause=str(error)
+            ) from error
 
     def read(self, drive_id: str) -> tuple[HandedOver, ...]:
         """All hand-overs, oldest first. A line that a crash cut short is left out."""

@@ -57,9 +57,7 @@ class Fixes:
         except (OSError, ValueError, KeyError, TypeError) as error:
             path = self.folder / RESTORE_LIST
             raise NotAllowed(
-                f"the list of what the preflight changed cannot be read: {path}",
-                value=str(error),
-                remedy="restart the computer, which restores these settings, and delete the file",
+                "preflight.list-preflight-changed-cannot", value=str(error), path=path
             ) from error
 
     def apply(self, fix: Fix, interface: str) -> list[Change]:
@@ -86,10 +84,12 @@ class Fixes:
                 self.settings.write(made.setting, made.before)
             self._keep(kept)
             raise NotAllowed(
-                f"{change.setting} cannot be set to {change.after}: {error.strerror or error}",
+                "preflight.cannot-set",
                 value=change.after,
                 remedy="as the administrator of the computer: "
                 + command(change.setting, change.after),
+                setting=change.setting,
+                strerror=error.strerror or error,
             ) from error
         return wanted
 
@@ -109,10 +109,10 @@ class Fixes:
                     self.settings.write(change.setting, change.before)
                 except OSError as error:
                     raise NotAllowed(
-                        f"{change.setting} cannot be restored to {change.before}:"
-                        f" {error.strerror or error}",
+                        "preflight.cannot-restored",
                         value=change.before,
-                        remedy="restart the computer, which restores it",
+                        setting=change.setting,
+                        strerror=error.strerror or error,
                     ) from error
                 restored.append(change)
             changes.pop()

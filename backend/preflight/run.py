@@ -81,10 +81,7 @@ async def _measured(period_us: int, seconds: float, interface: str) -> Measured:
         try:
             held = hold_name(f"servodeck-ethercat-{interface}")
         except OSError as error:
-            raise Busy(
-                f"an EtherCAT master of servodeck uses {interface}",
-                remedy="close that bus first, or run the preflight without an interface",
-            ) from error
+            raise Busy("preflight.ethercat-master-servodeck-uses", interface=interface) from error
     process = None
     try:
         process = await asyncio.create_subprocess_exec(
@@ -102,7 +99,6 @@ async def _measured(period_us: int, seconds: float, interface: str) -> Measured:
     if process.returncode:
         reason = complaint.decode("utf-8", "replace").strip().rpartition("\n")[2]
         raise LinkLost(
-            f"the measurement on {interface or 'this computer'} failed: {reason}",
-            remedy="run the preflight without an interface, and look at what it names first",
+            "preflight.measurement-failed", interface=interface or "this computer", reason=reason
         )
     return from_json(answer.decode("ascii"))

@@ -76,7 +76,7 @@ def missed_bound(missed: int, cycles: int) -> float:
     share = min(1.0, (missed + 0.5) / cycles)
     centre = share + z * z / (2 * cycles)
     half = z * (share * (1 - share) / cycles + z * z / (4 * cycles * cycles)) ** 0.5
-    return min(1.0, (centre + half) / (1 + z * z / cycles))
+    return float(min(1.0, (centre + half) / (1 + z * z / cycles)))
 
 
 def verdicts(found: Sequence[Finding], measured: Mapping[int, Measured]) -> list[Verdict]:

@@ -46,10 +46,7 @@ def require_linux(what: str) -> None:
     """
     if sys.platform != "linux":
         raise NotAllowed(
-            f"{what} is not available: it looks at what Linux says of itself",
-            value=sys.platform,
-            limit="Linux",
-            remedy="run it on the computer with Linux at the machine",
+            "computer.not-available-looks-linux", value=sys.platform, limit="Linux", what=what
         )
 
 

@@ -106,7 +106,7 @@ class Readiness:
         self._readable: Callable[[float], object]
         self._writable: Callable[[float], object]
         if sys.platform == "win32":
-            raise NotAllowed("a serial port has no file descriptor on Windows", limit="POSIX")
+            raise NotAllowed("computer.serial-port-no-file", limit="POSIX")
         else:  # noqa: RET506 - type checkers follow the branches of a system
             self._readable = _poll(descriptor, select.POLLIN)
             self._writable = _poll(descriptor, select.POLLOUT)
@@ -127,11 +127,7 @@ def require_pseudo_terminals() -> None:
         NotAllowed: the system has none (Windows).
     """
     if sys.platform == "win32":
-        raise NotAllowed(
-            "virtual serial drives need pseudo-terminals, which Windows does not have",
-            limit="Linux, macOS",
-            remedy="run the demo on Linux or macOS; real drives on COM ports work here",
-        )
+        raise NotAllowed("computer.virtual-serial-drives-need", limit="Linux, macOS")
 
 
 def open_pair() -> tuple[int, int]:
@@ -141,7 +137,7 @@ def open_pair() -> tuple[int, int]:
         NotAllowed: the system has none (Windows).
     """
     if sys.platform == "win32":
-        raise NotAllowed("Windows has no pseudo-terminals", limit="Linux, macOS")
+        raise NotAllowed("computer.windows-no-pseudo-terminals", limit="Linux, macOS")
     else:  # noqa: RET506 - type checkers follow the branches of a system
         master, slave = os.openpty()
         tty.setraw(slave)

@@ -89,8 +89,4 @@ class SegmentRecorder:
             await process.wait()
 
     def _gone(self) -> LinkLost:
-        return LinkLost(
-            f"the frames of {self._interface} are not being recorded",
-            remedy="close the bus and open it again; recording needs the same permission for raw"
-            " sockets as the exchange",
-        )
+        return LinkLost("link.frames-not-being-recorded", interface=self._interface)

@@ -54,13 +54,16 @@ async def _set(bench: Bench, drive: Drive, file: str, version: int | None) -> Pa
     except NotAllowed as error:
         if error.kind not in ("not-allowed", "not-found"):
             raise
-        raise NotFound(error.message, value=file, remedy=error.remedy) from error
+        raise NotFound(error.text, value=file, remedy=error.remedy_text) from error
     content = parameter_set.parse(data, file)
     if content.profile != drive.profile.drive:
         raise NotAllowed(
-            f"{file} is of a {content.profile} drive, {drive.name} is a {drive.profile.drive}",
-            drive=drive.name, value=file, remedy="choose a set of the same drive family",
-        )  # fmt: skip
+            "api-handover.drive",
+            drive=drive.name,
+            value=file,
+            profile=content.profile,
+            profile_drive=drive.profile.drive,
+        )
     return content
 
 
@@ -108,7 +111,7 @@ def _made(
         try:
             data = base64.b64decode(request.esi, validate=True)
         except binascii.Error as error:
-            raise BadSet("the ESI file is not base64", remedy="send it again") from error
+            raise BadSet("api-handover.esi-file-not-base64") from error
         axis = with_controller(axis, [(data, "the ESI file")])
     return axis, files_of(axis, request.format, request.file, content.saved)
 
@@ -139,7 +142,7 @@ async def compare_handover(
     async for chunk in request.stream():
         data += chunk
         if len(data) > MAX_BYTES:
-            raise BadSet(f"{file} is larger than {MAX_BYTES} bytes", remedy="choose another file")
+            raise BadSet("api-handover.larger-bytes", file=file, max_bytes=MAX_BYTES)
     listed = await asyncio.to_thread(read_list, bytes(data), drive.profile, file, slave)
     content = None if set_file is None else await _set(bench, drive, set_file, version)
     ours = None if content is None else _raws(content)
@@ -179,8 +182,7 @@ async def changes_since(bench: TheBench, member: TheMember, number: int) -> Hand
     drive = member.drive
     made = await asyncio.to_thread(handover_log(bench).read, drive.id)
     if not 1 <= number <= len(made):
-        raise NotFound(f"{drive.name} has no hand-over {number}", value=number,
-                       remedy="choose one of the list")  # fmt: skip
+        raise NotFound("api-handover.no-hand-over", value=number, drive_name=drive.name)
     ours = made[number - 1].values
     now = await _now(drive, ours)
     changed = changed_since(drive.profile, ours, now)

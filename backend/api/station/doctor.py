@@ -57,9 +57,7 @@ async def ethercat_doctor(
     """
     link = segment_of(bench.buses.opened.get(url))
     if link is None:
-        raise NotFound(
-            f"{url} is no opened EtherCAT bus", value=url, remedy="scan it on the Connect page"
-        )
+        raise NotFound("api-station.no-opened-ethercat-bus", value=url)
     seen = [s.station for s in (await link.survey()).stations if station in (None, s.station)]
     found = []
     for number in seen:

@@ -31,13 +31,9 @@ async def bus_flight(
     """
     link = bench.buses.opened.get(url)
     if link is None:
-        raise NotFound(f"{url} is no opened bus", value=url, remedy="scan it on the Connect page")
+        raise NotFound("api-station.no-opened-bus", value=url)
     if not isinstance(link, RecordsFrames):
-        raise NotAllowed(
-            f"{url}: its frames are not recorded",
-            value=url,
-            remedy="only EtherCAT, CANopen, Modbus and MLink record them",
-        )
+        raise NotAllowed("api-station.frames-not-recorded", value=url)
     data = await link.flight(station)
     headers = {"content-disposition": f'attachment; filename="{file_name(url)}"'}
     return Response(data, media_type="application/octet-stream", headers=headers)

@@ -30,6 +30,7 @@ from backend.station.bench import Bench
 from backend.work.jobs import JobResult, Progress
 from drivers.computer.lateness import EDGES_US, Measured
 from drivers.errors import Busy
+from texts.message import text
 
 router = APIRouter()
 _MEDIAN, _NEARLY_ALL = 0.5, 0.999
@@ -49,10 +50,7 @@ async def look(
 async def start_preflight(bench: TheBench, request: PreflightRequest) -> JobInfo:
     """Measure wake-ups, and with an interface frames, at 1 and 4 kHz; the result is kept."""
     if any(job.kind == "preflight" and job.state == "running" for job in bench.jobs.all()):
-        raise Busy(
-            "a preflight runs already: two would disturb each other",
-            remedy="wait until it has ended, or cancel it",
-        )
+        raise Busy("api-station.preflight-runs-already-two")
 
     async def work(progress: Progress) -> JobResult:
         def shown(fraction: float, period_us: int) -> None:
@@ -62,7 +60,7 @@ async def start_preflight(bench: TheBench, request: PreflightRequest) -> JobInfo
         await asyncio.to_thread(kept.keep, bench.state_folder, request.interface, result.measured)
         return {"verdicts": {one.purpose: one.grade for one in result.verdicts}}
 
-    return convert.job(bench.jobs.start("preflight", "Preflight of this computer", work))
+    return convert.job(bench.jobs.start("preflight", text("api-station.preflight-computer"), work))
 
 
 @router.post("/preflight/fixes")

@@ -148,11 +148,7 @@ def evaluate(data: Map, settings: FrictionSettings, facts: AxisFacts) -> Frictio
         findings.append(Finding(code="ripple_not_seen", value=smallest, unit="%"))
     points = _points(even, ripple, data.sample_rate_hz, inertia, step)
     if not any(p.speed_rpm > 0 for p in points) or not any(p.speed_rpm < 0 for p in points):
-        raise NotAllowed(
-            "no speed was held evenly in both directions, so that there is no friction to map",
-            value=round(max(uneven, default=0.0), 4),
-            remedy="tune the speed loop first, or permit higher speeds",
-        )
+        raise NotAllowed("friction.no-speed-held-evenly", value=round(max(uneven, default=0.0), 4))
     if uneven:
         findings.append(Finding(code="uneven_speeds", value=uneven[-1], unit="rpm"))
     fastest = max(abs(p.speed_rpm) for p in points)

@@ -23,6 +23,7 @@ from backend.tools.moves.go_back import go_back
 from backend.tools.tool import Run, Tool
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
+from texts.message import text
 
 FloatArray = npt.NDArray[np.float64]
 _TURN = 2 * np.pi
@@ -118,11 +119,12 @@ def planned(settings: FrictionSettings, room: Room, units: AxisUnits) -> Plan:
     slowest = (settings.slowest_rpm or min(_SLOWEST_RPM, 0.05 * settings.speed_limit)) / 60.0
     if slowest >= 0.5 * fastest:
         raise OutOfRange(
-            f"between {slowest * 60.0:.3g} rpm and {fastest * 60.0:.3g} rpm, the fastest speed "
-            "that the limits of travel and speed leave, there is nothing to map",
-            value=round(slowest * 60.0, 4), limit=f"{fastest * 60.0:.3g} rpm",
-            remedy="permit more travel or speed, or ask for a lower slowest speed",
-        )  # fmt: skip
+            "friction.between-rpm-rpm-fastest",
+            value=round(slowest * 60.0, 4),
+            limit=f"{fastest * 60.0:.3g} rpm",
+            slowest_rpm=slowest * 60.0,
+            fastest_rpm=fastest * 60.0,
+        )
     ripple = _ripple_stroke(settings, room, slowest)
     lowest, count = slowest, settings.speeds
     while True:
@@ -141,10 +143,11 @@ def planned(settings: FrictionSettings, room: Room, units: AxisUnits) -> Plan:
         lowest *= 1.3
         if lowest >= 0.5 * fastest:
             raise OutOfRange(
-                f"the speeds of a friction map take longer than {room.time_s:g} s",
-                value=settings.speeds, limit=f"{room.time_s:g} s",
-                remedy="allow more time, or ask for fewer speeds",
-            )  # fmt: skip
+                "friction.speeds-friction-map-take",
+                value=settings.speeds,
+                limit=f"{room.time_s:g} s",
+                time_s=room.time_s,
+            )
 
 
 def _ripple_stroke(settings: FrictionSettings, room: Room, slowest_rps: float) -> Stroke | None:
@@ -205,7 +208,7 @@ async def run(run: Run, settings: FrictionSettings) -> FrictionResult:
     units = await axis.require_certain_scales()
     facts = await read_facts(axis, settings.rated_torque_nm)
     home = await axis.position_raw()
-    run.progress(0.0, "a first short move")
+    run.progress(0.0, text("friction.first-short-move"))
     look = await first_look(axis, session, InertiaSettings(envelope), facts, home, None)
     await go_back(axis, session, home, envelope, facts)
     plan = planned(settings, _room(envelope, facts, look.rough), units)
@@ -220,7 +223,7 @@ async def run(run: Run, settings: FrictionSettings) -> FrictionResult:
         done_s += stroke.duration_s
         if stroke is not plan.strokes[-1]:
             await go_back(axis, session, home, envelope, facts)
-    run.progress(0.92, "going back and evaluating")
+    run.progress(0.92, text("friction.going-back-evaluating"))
     found = Map.of(
         [recording for recording, _ in taken], [numbers for _, numbers in taken],
         torque_step_nm=abs(units.torque(1.0)) / 100.0 * facts.rated_torque_nm,
@@ -237,7 +240,7 @@ async def run(run: Run, settings: FrictionSettings) -> FrictionResult:
 
 async def _stroke(
     run: Run, settings: FrictionSettings, facts: AxisFacts, stroke: Stroke,
-    where: tuple[float, float, str],
+    where: tuple[float, float, Text],
 ) -> tuple[Recording, FloatArray]:  # fmt: skip
     """The recording of one speed, and the number of the plateau that each sample counts for."""
     slow_rps = 0.25 * settings.speed_limit / 60.0
@@ -270,12 +273,7 @@ def _require_torque(run: Run, first: Recording, facts: AxisFacts, units: AxisUni
         return
     drive = run.axis.drive
     key = drive.require("torque_actual")
-    raise NotAllowed(
-        f"{drive.name}: its actual torque ({key}) does not change while the axis moves forth and "
-        "back, so that friction cannot be known from it",
-        drive=drive.name, parameter=key,
-        remedy="use a drive or a bus that reports the actual torque with every cycle",
-    )  # fmt: skip
+    raise NotAllowed("friction.actual-torque-not-change", drive=drive.name, parameter=key)
 
 
 TOOL = Tool(

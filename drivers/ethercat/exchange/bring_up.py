@@ -172,13 +172,14 @@ def send_commands(
                 )  # fmt: skip
             except Rejected as error:
                 raise NotAllowed(
-                    f"station {station.number} refuses the command {transition}"
-                    f" {command.index:04X}:{command.subindex:02X} = {command.data.hex()} of its"
-                    f" maker's file: {error.message}",
+                    "ethercat.station-refuses-command-maker",
                     parameter=f"{command.index:04X}:{command.subindex:02X}",
                     value=command.data.hex(),
-                    remedy="import the file of this very revision, or take the command out of"
-                    " bring_up.init_commands in the profile",
+                    station=station.number,
+                    transition=transition,
+                    command_index=command.index,
+                    subindex=command.subindex,
+                    cause=error.text,
                 ) from error
 
 
@@ -194,9 +195,9 @@ def set_watchdog_divider(station: Station, rules: StationBringUp) -> Steps[None]
     yield Write(WATCHDOG_DIVIDER, wanted)
     if (yield from read_again(WATCHDOG_DIVIDER, 2)) != wanted:
         raise NotAllowed(
-            f"station {station.number} does not take the watchdog divider"
-            f" {rules.watchdog_divider} of its file",
-            remedy="cyclic motion is refused: nothing would stop the axis if the computer died",
+            "ethercat.station-not-take-watchdog",
+            station=station.number,
+            watchdog_divider=rules.watchdog_divider,
         )
 
 
@@ -212,7 +213,7 @@ def set_controls(station: Station, rules: StationBringUp) -> Steps[None]:
         base = SYNC_MANAGERS + 8 * number
         manager = yield from read_again(base, 8)
         if manager is None:
-            raise ProtocolError(f"station {station.number} stopped answering")
+            raise ProtocolError("ethercat.station-stopped-answering", station=station.number)
         wanted = control & ~_WATCHDOG_BIT | manager[4] & _WATCHDOG_BIT
         if manager[4] == wanted or not manager[6] & 1:
             continue

@@ -1,4 +1,10 @@
 computer_ethercat-not-available-servodeck = { $value } 上不能使用 EtherCAT：servodeck 仅在 Linux 上运行 EtherCAT
     .remedy = 请在机器旁的 Linux 计算机上运行 servodeck，并从此处打开其页面；本机可使用 Modbus、MLink 和 slcan 的 CANopen
+computer_not-available-looks-linux = { $what } 不可用：它读取 Linux 关于自身的信息
+    .remedy = 请在机器旁装有 Linux 的计算机上运行
+computer_serial-port-no-file = Windows 上的串口没有文件描述符
 computer_shared-memory-not-available = 不能为 { $value } 使用共享内存：servodeck 仅在 Linux 上运行 EtherCAT
     .remedy = 请在机器旁的 Linux 计算机上运行 servodeck
+computer_virtual-serial-drives-need = 虚拟串口驱动器需要伪终端，Windows 没有
+    .remedy = 请在 Linux 或 macOS 上运行演示；此处可使用 COM 口上的真实驱动器
+computer_windows-no-pseudo-terminals = Windows 没有伪终端

@@ -166,9 +166,14 @@ ethercat_station-not-answer-watchdog = station { $station } does not answer for 
 ethercat_station-not-take-process = station { $station } does not take its process-data watchdog
     .remedy = cyclic motion is refused: nothing would stop the axis if the computer died
 ethercat_station-not-take-process-data = station { $station } does not take these process data: { $cause }
+ethercat_station-not-take-watchdog = station { $station } does not take the watchdog divider { $watchdog_divider } of its file
+    .remedy = cyclic motion is refused: nothing would stop the axis if the computer died
 ethercat_station-refuses-al-status = station { $station } refuses { $target } and is in { $state_name }: { $status } (AL status { NUM($al_code, format: "#06x") })
+ethercat_station-refuses-command-maker = station { $station } refuses the command { $transition } { NUM($command_index, format: "04X") }:{ NUM($subindex, format: "02X") } = { $value } of its maker's file: { $cause }
+    .remedy = import the file of this very revision, or take the command out of bring_up.init_commands in the profile
 ethercat_station-still-after-requested = station { $station } is still in { $state_name } after { NUM($limit_s, format: "g") } s, { $target } was requested
     .remedy = the drive may still be starting: try again
+ethercat_station-stopped-answering = station { $station } stopped answering
 ethercat_station-stopped-answering-being = station { $station } stopped answering while it was being set up
 ethercat_station-stopped-answering-left = station { $station } stopped answering: it is left alone
 ethercat_station-sync0-not-started = station { $station }: its SYNC0 could not be started, frames are lost again and again

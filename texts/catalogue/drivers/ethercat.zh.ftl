@@ -166,9 +166,14 @@ ethercat_station-not-answer-watchdog = 站 { $station } 的看门狗设置无应
 ethercat_station-not-take-process = 站 { $station } 不接受其过程数据看门狗
     .remedy = 拒绝循环运动：计算机失效时没有任何措施使轴停下
 ethercat_station-not-take-process-data = 站 { $station } 不接受这些过程数据：{ $cause }
+ethercat_station-not-take-watchdog = 从站 { $station } 不接受其文件中的看门狗分频值 { $watchdog_divider }
+    .remedy = 拒绝循环运动：计算机失效时没有任何措施使轴停下
 ethercat_station-refuses-al-status = 站 { $station } 拒绝 { $target }，处于 { $state_name }：{ $status }（AL 状态 { NUM($al_code, format: "#06x") }）
+ethercat_station-refuses-command-maker = 从站 { $station } 拒绝其厂商文件中的命令 { $transition } { NUM($command_index, format: "04X") }:{ NUM($subindex, format: "02X") } = { $value }：{ $cause }
+    .remedy = 导入正是该版本的文件，或在配置文件的 bring_up.init_commands 中去掉该命令
 ethercat_station-still-after-requested = 站 { $station } 在 { NUM($limit_s, format: "g") } s 后仍处于 { $state_name }，请求的是 { $target }
     .remedy = 驱动器可能仍在启动：请重试
+ethercat_station-stopped-answering = 从站 { $station } 不再应答
 ethercat_station-stopped-answering-being = 站 { $station } 在配置过程中停止应答
 ethercat_station-stopped-answering-left = 站 { $station } 停止应答：不再访问
 ethercat_station-sync0-not-started = 站 { $station }：无法启动其 SYNC0，反复丢帧

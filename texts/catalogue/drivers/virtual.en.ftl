@@ -26,5 +26,3 @@ virtual_no-permission-raw-sockets = no permission for raw sockets
     .remedy = run inside a private network (see drivers.virtual.wires.netns) or as root
 virtual_virtual-segment-ended = the virtual segment has ended: { $reason }
 virtual_virtual-segment-silent = the virtual segment is silent for { NUM($timeout_s, format: ".1f") } s
-virtual_virtual-serial-drives-need = virtual serial drives need pseudo-terminals, which Windows does not have
-    .remedy = run the demo on Linux or macOS; real drives on COM ports work here

@@ -26,5 +26,3 @@ virtual_no-permission-raw-sockets = 没有使用原始套接字的权限
     .remedy = 请在私有网络中运行（见 drivers.virtual.wires.netns）或以 root 运行
 virtual_virtual-segment-ended = 虚拟网段已结束：{ $reason }
 virtual_virtual-segment-silent = 虚拟网段已静默 { NUM($timeout_s, format: ".1f") } s
-virtual_virtual-serial-drives-need = 虚拟串口驱动器需要伪终端，Windows 没有
-    .remedy = 请在 Linux 或 macOS 上运行演示；此处可使用 COM 口上的真实驱动器
