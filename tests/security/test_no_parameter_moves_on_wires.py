@@ -182,12 +182,12 @@ def value_of(parameter: Parameter, turn: int) -> Raw:
     if parameter.type in ("STRING", "OCTETS"):
         return "x"
     if parameter.enum and not parameter.bits:
-        choices: list[Raw] = sorted(parameter.enum)[:8]
+        choices: list[Raw] = [*sorted(parameter.enum)[:8]]
         return choices[(turn + 1) % len(choices)]
     low, high = parameter.raw_limits
     inside = [v for v in (1, high, low, 3) if v is not None and (low is None or v >= low)
               and (high is None or v <= high)]  # fmt: skip
-    values: list[Raw] = list(dict.fromkeys(inside)) or [1]
+    values: list[Raw] = [*dict.fromkeys(inside)] or [1]
     return values[turn % len(values)]
 
 
