@@ -144,7 +144,7 @@ class Trial:
     async def _person(self, person: Person, length: float) -> None:
         end = time.monotonic() + length
         while time.monotonic() < end:
-            with contextlib.suppress(WebSocketException, OSError):
+            with contextlib.suppress(WebSocketException, OSError, httpx.HTTPError):
                 await person.act()
             await asyncio.sleep(person.random.choice([0.0, 0.05, 0.3, 1.0]))
         how = person.random.choice(["close", "cut", "silent", "stop"])

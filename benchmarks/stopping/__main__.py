@@ -49,7 +49,11 @@ def main() -> int:
 def _vertical(families: tuple[str, ...], *, markdown: bool) -> int:
     found = []
     for cell in vertical_cells(families):
-        found.append(one := run_vertical(*cell))
+        try:
+            found.append(one := run_vertical(*cell))
+        except AssertionError as error:
+            print(cell, error)
+            continue
         if not markdown:
             mark = "" if one.held else "  <-- finding"
             print(f"{_NAMES[one.family]:5} {one.motion:19} {one.trouble:18} {_sinking(one)}{mark}",

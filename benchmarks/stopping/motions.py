@@ -7,7 +7,8 @@ from collections.abc import Awaitable, Callable
 
 from backend.axis.axis import Envelope
 from backend.tools.jog.cyclic import jog_cyclic
-from backend.tools.jog.run import Hold, JogSettings, jog
+from backend.tools.jog.hold import Hold
+from backend.tools.jog.run import JogSettings, jog
 from backend.work.jobs import Progress
 from benchmarks.stopping.rig import Rig
 

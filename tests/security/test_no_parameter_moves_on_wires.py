@@ -9,6 +9,7 @@ the wire: the angle of its shaft, whatever units have been written, and its stat
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -23,10 +24,12 @@ from backend.station.connected_drive import Member
 from backend.station.demo import DemoBench
 from drivers import cia402
 from drivers.cia402 import State
+from drivers.errors import LinkTimeout
 from drivers.virtual.wires.netns import unavailable
 from profiles.schema import Parameter, Raw
 from tests.support.guarded import GuardedServer
 from tests.support.imported import EDS_DRIVE, ESI_DRIVE, import_both
+from tests.support.station import HANG_S
 
 ETHERCAT = "ethercat://virtual0"
 CAN, MODBUS, MLINK = "canopen://virtual0", "modbus://virtual0", "mlink://virtual0"
@@ -43,15 +46,23 @@ class Place:
     slave: int | None = None
 
 
-_SEGMENT = ("mms7", "m6l", "r6l", "ep3e", "generic402", ESI_DRIVE)
-PLACES = (
-    *(Place(f"E{n}", family, ETHERCAT, n + 1, n) for n, family in enumerate(_SEGMENT)),
-    Place("L1", "mms7", MLINK, 1),
-    Place("C1", "ds_c", CAN, 1),
-    Place("C2", "generic402", CAN, 2),
-    Place("C3", EDS_DRIVE, CAN, 3),
-    Place("M1", "ds_c", MODBUS, 1),
-)
+_SEGMENTS = (("mms7", "m6l", "r6l"), ("ep3e", "generic402", ESI_DRIVE))
+#: What runs at once: a computer with little time carries no more drives in real time.
+PLACES: dict[str, tuple[Place, ...]] = {
+    **{
+        f"ethercat {' '.join(segment)}": tuple(
+            Place(f"E{n}", family, ETHERCAT, n + 1, n) for n, family in enumerate(segment)
+        )
+        for segment in _SEGMENTS
+    },
+    "serial and CAN": (
+        Place("L1", "mms7", MLINK, 1),
+        Place("C1", "ds_c", CAN, 1),
+        Place("C2", "generic402", CAN, 2),
+        Place("C3", EDS_DRIVE, CAN, 3),
+        Place("M1", "ds_c", MODBUS, 1),
+    ),
+}
 #: A shaft that moved by more than this part of a revolution was moved.
 STILL_REV = 1e-3
 #: Written last, since what comes after them may find the drive away: restarts and restores.
@@ -65,9 +76,10 @@ ATTACK: tuple[tuple[str, int], ...] = (
 class Wires:
     """A guarded server on virtual drives behind real wires, and its callers."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, places: tuple[Place, ...]) -> None:
+        self.places = places
         file = folder / "bench.toml"
-        file.write_text("".join(_axis(place) for place in PLACES), "utf-8")
+        file.write_text("".join(_axis(place) for place in places), "utf-8")
         self.drives = DemoBench(file, folder / "wires", folder / "nvm", steady=True)
         self.drives.start()
         assert not self.drives.problems, self.drives.problems
@@ -86,12 +98,12 @@ class Wires:
             "token look+parameters": script,
             "administrator": self.server.log_in(Role.ADMINISTRATOR),
         }
-        self.start = {place: self.shaft_rev(place) for place in PLACES}
+        self.start = {place: self.shaft_rev(place) for place in places}
 
     async def _bench(self, folder: Path) -> tuple[Bench, Member]:
         bench = Bench(folder, dict(self.drives.wires))
         members = []
-        for place in PLACES:
+        for place in self.places:
             member = await bench.connect(place.url, place.station, place.family, place.name)
             await member.monitor.close()
             self.ids[place.name] = member.drive.id
@@ -110,7 +122,14 @@ class Wires:
     def _ask(self, place: Place, do: str, **what: object) -> Any:
         if place.slave is None:
             return self.drives.command(do=do, axis=place.name, **what)
-        return self.drives.segments[place.url].command(do, slave=place.slave, **what)
+        segment = self.drives.segments[place.url]
+        end = time.monotonic() + HANG_S
+        while True:
+            try:
+                return segment.command(do, slave=place.slave, **what)
+            except LinkTimeout:  # a busy computer: it computes the drives' time first
+                if time.monotonic() > end:
+                    raise
 
     def shaft_rev(self, place: Place) -> float:
         """Angle of the motor."""
@@ -141,14 +160,17 @@ def _axis(place: Place) -> str:
     )
 
 
-@pytest.fixture(scope="module")
-def wires(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Wires]:
-    if why := unavailable():
+@pytest.fixture(scope="module", params=PLACES)
+def wires(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Wires]:
+    places = PLACES[request.param]
+    if (why := unavailable()) and any(place.url == ETHERCAT for place in places):
         pytest.skip(why)
     folder = Path(tmp_path_factory.mktemp("wires"))
     with pytest.MonkeyPatch.context() as patch:
         import_both(folder / "mine", patch)
-        found = Wires(folder)
+        found = Wires(folder, places)
         try:
             yield found
         finally:
@@ -160,12 +182,12 @@ def value_of(parameter: Parameter, turn: int) -> Raw:
     if parameter.type in ("STRING", "OCTETS"):
         return "x"
     if parameter.enum and not parameter.bits:
-        choices: list[Raw] = sorted(parameter.enum)[:8]
+        choices: list[Raw] = [*sorted(parameter.enum)[:8]]
         return choices[(turn + 1) % len(choices)]
     low, high = parameter.raw_limits
     inside = [v for v in (1, high, low, 3) if v is not None and (low is None or v >= low)
               and (high is None or v <= high)]  # fmt: skip
-    values: list[Raw] = list(dict.fromkeys(inside)) or [1]
+    values: list[Raw] = [*dict.fromkeys(inside)] or [1]
     return values[turn % len(values)]
 
 
@@ -202,10 +224,9 @@ def require_refused(problem: dict[str, Any], key: str) -> None:
     assert "/api/v1/drives/" in problem["remedy"], problem
 
 
-@pytest.mark.parametrize("url", [ETHERCAT, MLINK, CAN, MODBUS])
-def test_no_write_moves_an_axis_on_a_real_wire(wires: Wires, url: str) -> None:
-    """The drives of one bus at once, as pages of several people would."""
-    places = [place for place in PLACES if place.url == url]
+def test_no_write_moves_an_axis_on_a_real_wire(wires: Wires) -> None:
+    """All drives at once, as pages of several people would."""
+    places = wires.places
     with ThreadPoolExecutor(len(places)) as pool:
         for place, sent in zip(places, pool.map(lambda p: attack(wires, p), places), strict=True):
             assert sent > 20, (place, sent)

@@ -16,7 +16,7 @@ from benchmarks.stopping.vertical import GRAVITY_NM, VERTICAL, Row, lead_s, sink
 
 PART = [
     ("mms7", "raising", "605Ah tampered"),
-    ("mms7", "jog by process data", "process data lost"),
+    ("mms7", "homing", "none"),
     ("m6l", "torque", "none"),
     ("m6l", "lowering", "605Ah tampered"),
     ("r6l", "profile position", "none"),
