@@ -8,6 +8,7 @@ only made to refuse with the AL status code that the cause has in ETG.1020 ("cod
 
 from __future__ import annotations
 
+import argparse
 import asyncio
 import sys
 from collections.abc import Callable
@@ -162,12 +163,17 @@ async def table(namespace: Namespace, cases: tuple[Case, ...] = CASES) -> list[t
 
 def main() -> int:
     """Print the table; 1 where too few first diagnoses are right."""
+    parser = argparse.ArgumentParser(description="the doctor's first cause against injected ones")
+    parser.add_argument("--first", type=int, default=1, help="number of the first case")
+    parser.add_argument("--count", type=int, default=len(CASES), help="how many cases")
+    options = parser.parse_args()
+    cases = CASES[options.first - 1 :][: options.count]
     reason = unavailable()
     if reason is not None:
         print(reason, file=sys.stderr)
         return 2
     with Namespace.create() as namespace:
-        found = asyncio.run(table(namespace))
+        found = asyncio.run(table(namespace, cases))
     right = sum(told == case.cause for case, told in found)
     real = [(case, told) for case, told in found if case.how == "real"]
     print(f"{right} of {len(found)} first diagnoses are right "
