@@ -196,8 +196,11 @@ class DirectLink:
         await self.stop()
         time.monotonic = self._ordinary_time
 
-    async def scan(self, progress: Progress, stations: Sequence[int] | None = None) -> list[Found]:
-        del progress, stations
+    async def scan(
+        self, progress: Progress, stations: Sequence[int] | None = None,
+        stop_after: int | None = None,
+    ) -> list[Found]:  # fmt: skip
+        del progress, stations, stop_after
         return [Found(STATION)]
 
     def pass_s(self, seconds: float) -> None:

@@ -5,6 +5,7 @@ The measurement itself is that of other tests; here its way there and back count
 
 from __future__ import annotations
 
+import asyncio
 import inspect
 import json
 import re
@@ -114,8 +115,16 @@ def test_a_report_of_a_drive_at_a_bus_url(asked: list[InertiaSettings], tmp_path
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.usefixtures("asked")
 def test_ctrl_c_ends_with_130(monkeypatch: pytest.MonkeyPatch, number: signal.Signals) -> None:
+    ended: list[bool] = []
+
     async def interrupted(*_: object) -> object:
-        signal.raise_signal(number)
+        try:
+            # The command is told first that its job has begun.
+            await asyncio.sleep(1.0)
+            signal.raise_signal(number)
+            await asyncio.sleep(3600.0)
+        finally:
+            ended.append(True)
         return FOUND
 
     monkeypatch.setattr(inertia_run, "inertia", interrupted)
@@ -123,6 +132,7 @@ def test_ctrl_c_ends_with_130(monkeypatch: pytest.MonkeyPatch, number: signal.Si
     assert code == 130, err
     assert "cancelled" in err
     assert not out
+    assert ended, "the server's job is cancelled with it"
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ const outcome = (result: unknown): ToolOutcome | null =>
 
 /** The result of a job that is no tool with a result of its own. */
 export function plainResult(result: JobInfo['result'] | undefined): Record<string, unknown> {
-  return outcome(result) || !result ? {} : (result as Record<string, unknown>)
+  return outcome(result) || !result ? {} : result
 }
 
 /** The result of a friction map, or null where it is something else. */

@@ -164,7 +164,11 @@ export function InertiaResult({ result }: { result: Inertia }) {
                 <td>{t(text)}</td>
                 <td className="right">
                   {amount(result[name] ?? null, si ? unit : '')}
-                  <small className="dim interval">{interval(name in result.ci95 ? result.ci95[name as keyof Inertia['ci95']] : null)}</small>
+                  <small className="dim interval">
+                    {interval(
+                      name in result.ci95 ? result.ci95[name as keyof Inertia['ci95']] : null,
+                    )}
+                  </small>
                 </td>
               </tr>
             ))}
