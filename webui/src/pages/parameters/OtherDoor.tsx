@@ -14,7 +14,7 @@ export function OtherDoor({ drive, row }: { drive: string; row: ParameterRow }) 
     <div className="note warn">
       <p>{t('motion.energises')}</p>
       {page === 'motion' || page === 'io' ? (
-        <a className="door" href={`#/axis/${encodeURIComponent(drive)}/${page}`}>
+        <a className="page-door" href={`#/axis/${encodeURIComponent(drive)}/${page}`}>
           {t(page === 'io' ? 'motion.goIo' : 'motion.goMotion')}
         </a>
       ) : page === 'parameters' ? (
