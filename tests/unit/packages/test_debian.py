@@ -46,7 +46,8 @@ class Root:
     def dpkg(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
             ["dpkg", f"--root={self.folder}", f"--log={self.folder}/log",
-             "--force-script-chrootless", "--force-depends", "--force-not-root", "--force-bad-path", *arguments],
+             "--force-script-chrootless", "--force-depends", "--force-not-root",
+             "--force-bad-path", *arguments],
             capture_output=True, text=True, check=False,
         )  # fmt: skip
 
