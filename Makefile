@@ -10,7 +10,7 @@ PAGE := webui/dist/index.html
 PAGE_SOURCES := $(shell find webui/src webui/public -type f 2>/dev/null) webui/index.html \
 	webui/package.json webui/package-lock.json webui/vite.config.ts
 
-.PHONY: install run test bench fmt docs page clean check-python supply-chain wheels audit
+.PHONY: install run test bench fmt docs page clean check-python supply-chain wheels packages audit
 
 install: $(VENV)/.installed $(PAGE) ## the virtual environment with the product in it
 
@@ -40,6 +40,12 @@ supply-chain: $(VENV)/.dev webui/node_modules/.package-lock.json ## locks, bill 
 
 wheels: $(VENV)/.dev ## whether every package comes as a wheel for every system; asks the package index
 	$(BIN)/python -m supply.wheels
+
+packages: $(VENV)/.dev $(PAGE) ## wheel with the page, all wheels that it needs, and the Debian package, in dist/
+	rm -rf dist/wheels
+	$(BIN)/python -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir dist/wheels .
+	$(BIN)/python -m pip download --quiet --require-hashes --only-binary :all: --dest dist/wheels -r supply/run.txt
+	$(BIN)/python -m supply.debian dist/wheels dist
 
 audit: $(VENV)/.dev ## known weaknesses of the locked packages; asks their registries
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check pip-audit

@@ -88,8 +88,8 @@ class Fixes:
                 value=change.after,
                 remedy="as the administrator of the computer: "
                 + command(change.setting, change.after),
-                setting=change.setting,
-                strerror=error.strerror or error,
+                setting=change.setting.value if hasattr(change.setting, 'value') else str(change.setting),
+                strerror=error.strerror or str(error),
             ) from error
         return wanted
 
@@ -111,8 +111,8 @@ class Fixes:
                     raise NotAllowed(
                         "preflight.cannot-restored",
                         value=change.before,
-                        setting=change.setting,
-                        strerror=error.strerror or error,
+                        setting=change.setting.value if hasattr(change.setting, 'value') else str(change.setting),
+                        strerror=error.strerror or str(error),
                     ) from error
                 restored.append(change)
             changes.pop()

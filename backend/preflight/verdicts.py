@@ -9,6 +9,7 @@ step from sample to sample is at most 2·sin(π/10) = 0.62 of its amplitude, the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -75,8 +76,8 @@ def missed_bound(missed: int, cycles: int) -> float:
     z = 1.645
     share = min(1.0, (missed + 0.5) / cycles)
     centre = share + z * z / (2 * cycles)
-    half = z * (share * (1 - share) / cycles + z * z / (4 * cycles * cycles)) ** 0.5
-    return float(min(1.0, (centre + half) / (1 + z * z / cycles)))
+    half = z * math.sqrt(share * (1 - share) / cycles + z * z / (4 * cycles * cycles))
+    return min(1.0, (centre + half) / (1 + z * z / cycles))
 
 
 def verdicts(found: Sequence[Finding], measured: Mapping[int, Measured]) -> list[Verdict]:

@@ -217,7 +217,7 @@ async def run(run: Run, settings: FrictionSettings) -> FrictionResult:
     done_s = 0.0
     for stroke in plan.strokes:
         low, high = (0.05 + 0.85 * s / total_s for s in (done_s, done_s + stroke.duration_s))
-        step = f"{stroke.speed_rps * 60.0:.3g} rpm, both directions"
+        step = text("friction.speed-both-directions", speed_rpm=stroke.speed_rps * 60.0)
         taken.append(await _stroke(run, settings, facts, stroke, (low, high, step)))
         _require_torque(run, taken[0][0], facts, units)
         done_s += stroke.duration_s

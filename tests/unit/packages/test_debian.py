@@ -1,0 +1,95 @@
+"""The Debian package is installed, upgraded, removed and purged by dpkg in a root of its own."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from backend.station.service import systemd_unit
+from drivers.computer.permissions import NEEDED, USEFUL
+from supply import debian
+
+ROOT = Path(__file__).resolve().parents[3]
+
+pytestmark = pytest.mark.skipif(shutil.which("dpkg-deb") is None, reason="no dpkg here")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """servodeck itself, from a wheel; the packages that it needs are those of this Python."""
+    folder = Path(tmp_path_factory.mktemp("site"))
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)],
+        cwd=ROOT, check=True, capture_output=True,
+        env={"SERVODECK_NO_PAGE": "1", "PATH": "/usr/bin:/bin"},
+    )  # fmt: skip
+    (wheel,) = folder.glob("servodeck-*.whl")
+    with zipfile.ZipFile(wheel) as packed:
+        packed.extractall(folder / "site")
+    return folder / "site"
+
+
+class Root:
+    """A system that is not running, with dpkg's own database."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        (folder / "var/lib/dpkg").mkdir(parents=True)
+        (folder / "var/lib/dpkg/status").touch()
+
+    def dpkg(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            ["dpkg", f"--root={self.folder}", f"--log={self.folder}/log",
+             "--force-script-chrootless", "--force-depends", "--force-not-root",
+             "--force-bad-path", *arguments],
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+
+    def done(self, *arguments: str) -> str:
+        result = self.dpkg(*arguments)
+        assert result.returncode == 0, result.stderr
+        return result.stdout + result.stderr
+
+
+def test_from_installing_to_purging(tmp_path: Path, site: Path) -> None:
+    first, second = (debian.build(site, tmp_path, version) for version in ("0.1.0", "0.2.0"))
+    root = Root(tmp_path / "root")
+    root.done("--install", str(first))
+    state = root.folder / "var/lib/servodeck"
+    assert state.stat().st_mode & 0o777 == 0o700
+    assert (root.folder / debian.UNIT).read_text() == systemd_unit()
+    launched = subprocess.run(
+        [root.folder / "opt/servodeck/bin/servodeck", "station", "unit"],
+        capture_output=True, text=True, check=False, cwd=tmp_path,
+        env={"PATH": f"{Path(sys.executable).parent}:/usr/bin:/bin"},
+    )  # fmt: skip
+    assert launched.stdout == systemd_unit(), launched.stderr
+
+    (state / "bench.json").write_text("{}")
+    root.done("--install", str(second))
+    assert (state / "bench.json").read_text() == "{}"
+
+    refused = root.dpkg("--install", str(first))
+    assert refused.returncode != 0
+    assert "0.1.0 is older and does not understand its" in refused.stderr
+    assert "0.2.0" in root.done("--status", "servodeck")
+
+    assert "/var/lib/servodeck" in root.done("--remove", "servodeck")
+    assert (state / "bench.json").exists()
+    assert not (root.folder / "opt/servodeck").exists()
+    root.done("--purge", "servodeck")
+    assert not state.exists()
+
+
+def test_the_container_declares_the_capabilities_that_are_needed_and_no_others() -> None:
+    text = (ROOT / "supply/Containerfile").read_text()
+    declared = re.search(r'servodeck\.capabilities="([^"]*)"', text)
+    assert declared is not None
+    assert declared[1].split() == [*NEEDED, *USEFUL]
+    assert {f"CAP_{name}" for name in re.findall(r"--cap-add (\w+)", text)} == {*NEEDED, *USEFUL}
