@@ -332,10 +332,13 @@ def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tupl
     if found.torque_dropped:
         words.append(_DROPPED)
     if found.by_place is not None:
-        about = f", about ±{found.by_place.amplitude_kgm2:.2g} kg·m²" if facts.torque_known else ""
         words.append(
-            f"the inertia or the torque depends on the place (once per revolution of the motor"
-            f"{about}), as with a crank, a cam or a load off its axis: the band holds every place"
+            "the inertia or the torque depends on the place (once per revolution of the motor, "
+            f"about ±{found.by_place.amplitude_kgm2:.2g} kg·m²), as with a crank, a cam or a load "
+            "off its axis: the band holds every place"
+            if facts.torque_known
+            else "the inertia or the torque depends on the place (once per revolution of the "
+            "motor), as with a crank, a cam or a load off its axis: the band holds every place"
         )
     if saturated > 0.02:
         words.append(
