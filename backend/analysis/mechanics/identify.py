@@ -86,6 +86,8 @@ _STEP, _SETTLED, _LONGEST_STEP = 0.02, 0.2, 0.1
 #: filtered or copied torques left about 1.4 to 10 times the misfit. Those that leave less than 1.3
 #: times are not noticed by this; what right ones leave was not tabulated.
 _BY_MOTION, _CLEARLY = 60.0, 0.77
+#: So much better, and so much smaller, it is taken before the path by the torque is fitted anew.
+_BY_FAR, _FAR_CLEARLY = 600.0, 0.4
 _MOTION_PASSES = 3
 #: A median misfit (relative) that a path by the motion leaves where it is right.
 _EXPLAINED = 0.0035
@@ -173,9 +175,10 @@ def identify_with_path(
         paths = find_paths(task.records, path, loop_closed=closed, hold_known=hold_known)
     else:
         paths = (replace(loop.path, response_bandwidth_hz=path.response_bandwidth_hz),)
-    trials, dropped = task.trials(paths), False
-    if not closed:
-        task, trials, dropped = _by_motion(task, trials, path, corner_known)
+    if closed:
+        trials, dropped = task.trials(paths), False
+    else:
+        task, trials, dropped = _by_motion(task, paths, corner_known)
     best = trials[0]
 
     def again(fit: SampledFit) -> SignalPath:  # only beside a closed loop
@@ -204,48 +207,69 @@ def identify_with_path(
 
 
 def _by_motion(
-    task: _Task, trials: list[_Trial], path: SignalPath, corner_known: bool
+    task: _Task, paths: tuple[SignalPath, ...], corner_known: bool
 ) -> tuple[_Task, list[_Trial], bool]:
-    """The same without the reported torque, where that cannot be the mechanics' input.
+    """Trials without the reported torque, where that cannot be the mechanics' input; else with it.
 
     A torque that is reported late, or a copy of the demand, tells another path than the one to the
     mechanics. Collocated mechanics are passive, which the model's are by construction: a lag that
     is not there leaves them unexplained. So both holds are tried with ordinary paths that the
     motion alone moves, and taken where that explains the motion clearly better. The last value
     tells whether they were.
+
+    A path that is odd by itself is tried from the motion's mechanics first: a search from nothing
+    with a wrong path finds no end for long.
     """
-    if not _suspect(task, trials[0], corner_known):
+    odd = _odd(task, paths[0], corner_known)
+    trials = [] if odd else task.trials(paths)
+    if trials and not _suspect(task, trials[0], corner_known):
         return task, trials, False
     alone = replace(task, records=tuple(replace(record, torque=None) for record in task.records))
-    told = path.current_bandwidth_hz if corner_known else None
+    likeliest = trials[0].path if trials else paths[0]
+    told = likeliest.current_bandwidth_hz if corner_known else None
     found: list[_Trial] = []
     for corner in (told or USUAL_CURRENT_HZ, _SLOW_HZ):
-        begun = replace(trials[0].path, current_bandwidth_hz=corner)
+        begun = replace(likeliest, current_bandwidth_hz=corner)
         found += [alone.at_cycles(begun, hold) for hold in _HOLDS]
         found.sort(key=_rank)
         found[0] = alone.by_motion(found[0])
         if found[0].fit.error < _EXPLAINED:
             break
     found.sort(key=_rank)
-    best, by_torque = found[0].fit, trials[0].fit
-    better = best.score < by_torque.score - _BY_MOTION
-    if better and best.error < _CLEARLY * by_torque.error:
+    best = found[0].fit
+    if not trials:
+        begun_there = [task.trial(each, None, None, found[0].solution) for each in paths]
+        if _explains(best, min(begun_there, key=_rank).fit, _BY_FAR, _FAR_CLEARLY):
+            return alone, found, True
+        trials = task.trials(paths)
+    if _explains(best, trials[0].fit, _BY_MOTION, _CLEARLY):
         return alone, found, True
     return task, trials, False
 
 
-def _suspect(task: _Task, trial: _Trial, corner_known: bool) -> bool:
-    """Whether the reported torque may be another one than what drives the mechanics."""
+def _explains(one: SampledFit, other: SampledFit, by: float, share: float) -> bool:
+    """Whether a fit is better than another by this much, and its misfit this share of it."""
+    return one.score < other.score - by and one.error < share * other.error
+
+
+def _odd(task: _Task, path: SignalPath, corner_known: bool) -> bool:
+    """Whether the path that the reported torque tells is none of a torque that acts."""
     if any(record.torque is None for record in task.records):
         return False
-    path, fit = trial.path, trial.fit
     corner = path.current_bandwidth_hz or USUAL_CURRENT_HZ
     odd = not corner_known and not _ORDINARY_HZ[0] < corner < _ORDINARY_HZ[1]
     left = torque_left(task.records, path)
-    late = abs(fit.delay_s) > _LEFT_BY_TORQUE_S
     # Parts of a cycle are no reason where they explain the torque to its rounding.
     parts = not at_whole_cycles(path) and left > _ROUNDED
-    return odd or late or parts or left > _TORQUE_LEFT or _beyond_passive(trial)
+    return odd or parts or left > _TORQUE_LEFT
+
+
+def _suspect(task: _Task, trial: _Trial, corner_known: bool) -> bool:
+    """Whether the motion shows that the reported torque may be another than what drives it."""
+    if any(record.torque is None for record in task.records):
+        return False
+    late = abs(trial.fit.delay_s) > _LEFT_BY_TORQUE_S
+    return late or _odd(task, trial.path, corner_known) or _beyond_passive(trial)
 
 
 def _beyond_passive(trial: _Trial) -> bool:

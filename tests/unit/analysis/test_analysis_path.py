@@ -7,7 +7,9 @@ import pytest
 from drive_sim import TURN, Drive, Mechanics
 from random_axes import RATED_NM, Case, errors, played, result_of
 from scipy.optimize import least_squares
+from scipy.signal import lfilter
 
+from backend.analysis.mechanics import identify
 from backend.analysis.mechanics.identify import (
     Identification,
     _Task,
@@ -226,3 +228,28 @@ def test_what_else_may_be_true_widens_the_band():
     left = unexplained(frf, best.solution, 0)
     assert np.all(left.std_deg >= 180.0 * frf.frequency_hz / 1000.0)
     assert left.valid_band_hz[1] == pytest.approx(100.0)
+
+
+def test_a_filtered_torque_costs_no_search_with_its_own_path(monkeypatch):
+    """6077h behind 1 ms: its lag is no current loop's, and mechanics behind it explain nothing."""
+    case = case_of(1000.0, late_steps=0, current_hz=1000.0)
+    filtered = tuple(
+        replace(r, torque=lfilter([1 - np.exp(-1.0)], [1.0, -np.exp(-1.0)], r.torque))
+        for r in records_of(case)
+    )
+    searched = []
+    fit = identify.fit_sampled_model
+
+    def fitted(raw, path, **given):
+        if given.get("start") is None:
+            searched.append(path)
+        return fit(raw, path, **given)
+
+    monkeypatch.setattr(identify, "fit_sampled_model", fitted)
+    found = identify_with_path(filtered, SignalPath(1000.0), "torque_mode", hold_known=False)
+    assert found.torque_dropped
+    assert {path.hold for path in searched} == {"zero", "linear"}
+    assert min(path.current_bandwidth_hz for path in searched) > 900.0
+    e = errors(found.direct, ONE, 5.0, 250.0)
+    assert e.magnitude_db < 0.1
+    assert e.phase_deg < 0.5
