@@ -8,3 +8,4 @@ friction_no-speed-held-evenly = no speed was held evenly in both directions, so 
     .remedy = tune the speed loop first, or permit higher speeds
 friction_speeds-friction-map-take = the speeds of a friction map take longer than { NUM($time_s, format: "g") } s
     .remedy = allow more time, or ask for fewer speeds
+friction_speed-both-directions = { NUM($speed_rpm, format: ".3g") } rpm, both directions
