@@ -9,50 +9,31 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
-from backend.handover.esi import SlaveController, SyncManager
+from backend.handover.eni_registers import (
+    ADDRESS,
+    AL_STATUS,
+    FMMU,
+    LOGICAL,
+    SYNC_MANAGERS,
+    Place,
+    register_command,
+    slave_registers,
+)
+from backend.handover.esi import SlaveController
 from backend.handover.model import AxisHandover, MappedEntry, MappedPdo
 from backend.handover.xml_lists import child, file_of, init_command, init_commands, note
 from drivers.errors import NotAllowed
 
 #: Datagram commands (ETG.1000.4 clause 5.4).
-_APRD, _APWR, _FPRD, _FPWR, _BRD, _BWR, _LRW, _ARMW = 1, 2, 4, 5, 7, 8, 12, 13
-_FIRST_ADDRESS, _LOGICAL = 1001, 0x0100_0000
+_BRD, _BWR, _LRW, _ARMW = 7, 8, 12, 13
 _ETHERNET_AND_HEADER, _DATAGRAM, _COUNTER, _FRAME = 16, 10, 2, 1514
-_AL_CONTROL, _AL_STATUS, _ADDRESS, _EEPROM = 0x120, 0x130, 0x10, 0x500
-_FMMU, _SM, _DC_TIME = 0x600, 0x800, 0x910
-#: 100 µs times 1000: the controllers' own default (ETG.1000.4 clause 6.3), written out.
-_WATCHDOG = ((0x400, 2498), (0x420, 1000))
-_TIMEOUTS_MS = {1: 3000, 2: 3000, 4: 10000, 8: 10000}
-_DOWNWARD = ("SI", "OI", "SP", "OP")
+_DC_TIME = 0x910
 _TYPES = {
     "BOOL": "BOOL", "INT8": "SINT", "UINT8": "USINT", "INT16": "INT", "UINT16": "UINT",
     "INT32": "DINT", "UINT32": "UDINT", "INT64": "LINT", "UINT64": "ULINT", "REAL32": "REAL",
 }  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class _Place:
-    """A slave's place in segment and frame; offsets are bytes within the LRW datagram."""
-
-    axis: AxisHandover
-    position: int
-    out_at: int
-    out_bytes: int
-    in_at: int
-    in_bytes: int
-
-    @property
-    def address(self) -> int:
-        """Configured station address."""
-        return _FIRST_ADDRESS + self.position
-
-    @property
-    def auto_increment(self) -> int:
-        """Position address: 0, 65535, 65534…"""
-        return -self.position & 0xFFFF
 
 
 def is_complete(axes: Sequence[AxisHandover]) -> bool:
@@ -90,7 +71,7 @@ def eni(axes: Sequence[AxisHandover]) -> bytes:
     return file_of(root)
 
 
-def _places(axes: Sequence[AxisHandover]) -> list[_Place]:
+def _places(axes: Sequence[AxisHandover]) -> list[Place]:
     sizes = [(_bytes_of(axis, "rx"), _bytes_of(axis, "tx")) for axis in axes]
     outputs = sum(out for out, _ in sizes)
     total = outputs + sum(back for _, back in sizes)
@@ -104,7 +85,7 @@ def _places(axes: Sequence[AxisHandover]) -> list[_Place]:
         )
     places, out_at, in_at = [], 0, outputs
     for position, (axis, (out, back)) in enumerate(zip(axes, sizes, strict=True)):
-        places.append(_Place(axis, position, out_at, out, in_at, back))
+        places.append(Place(axis, position, out_at, out, in_at, back))
         out_at += out
         in_at += back
     return places
@@ -138,15 +119,15 @@ def _master(config: Element, *, complete: bool) -> None:
         return
     commands = child(master, "InitCmds")
     for comment, register, data in (
-        ("clear configured addresses", _ADDRESS, b"\0\0"),
-        ("clear fmmu", _FMMU, bytes(256)),
-        ("clear sm", _SM, bytes(256)),
+        ("clear configured addresses", ADDRESS, b"\0\0"),
+        ("clear fmmu", FMMU, bytes(256)),
+        ("clear sm", SYNC_MANAGERS, bytes(256)),
         ("clear dc system time", _DC_TIME, bytes(32)),
         ("clear dc cycle cfg", 0x981, b"\0"),
         ("reset dc speed", 0x930, struct.pack("<H", 0x1000)),
         ("configure dc filter", 0x934, struct.pack("<H", 0x0C00)),
     ):
-        command = _register(commands, ("IP",), comment, _BWR, 0, register, data)
+        command = register_command(commands, ("IP",), comment, _BWR, 0, register, data)
         command.insert(1, _element("BeforeSlave", "1"))
 
 
@@ -159,7 +140,7 @@ def _element(tag: str, text: str) -> Element:
 # --- one slave --------------------------------------------------------------------------
 
 
-def _slave(config: Element, place: _Place, start: int, cycle_us: int, *, complete: bool) -> None:
+def _slave(config: Element, place: Place, start: int, cycle_us: int, *, complete: bool) -> None:
     axis, controller = place.axis, place.axis.controller
     vendor, product = axis.identity()
     slave = child(config, "Slave")
@@ -193,11 +174,11 @@ def _slave(config: Element, place: _Place, start: int, cycle_us: int, *, complet
     for write in axis.writes:
         init_command(commands, write)
     if complete and controller is not None:
-        _registers(child(slave, "InitCmds"), place, controller, cycle_us)
+        slave_registers(child(slave, "InitCmds"), place, controller, cycle_us)
     _dc(slave, place, cycle_us, complete=complete)
 
 
-def _dc(slave: Element, place: _Place, cycle_us: int, *, complete: bool) -> None:
+def _dc(slave: Element, place: Place, cycle_us: int, *, complete: bool) -> None:
     if not (_clock(place.axis) if complete else place.axis.distributed_clock):
         return
     clock = child(slave, "DC")
@@ -241,7 +222,7 @@ def _assignment(commands: Element, axis: AxisHandover, controller: SlaveControll
         write(f"pdo 0x{assign:04X} count", assign, 0, bytes([len(pdos)]))
 
 
-def _process_data(data: Element, place: _Place, start: int) -> None:
+def _process_data(data: Element, place: Place, start: int) -> None:
     axis, controller = place.axis, place.axis.controller
     for tag, at, count in (
         ("Send", place.out_at, place.out_bytes), ("Recv", place.in_at, place.in_bytes),
@@ -284,124 +265,10 @@ def _type(entry: MappedEntry) -> str:
     return _TYPES.get(entry.type or "", f"BIT{entry.bits}")
 
 
-# --- registers --------------------------------------------------------------------------
-
-
-def _register(
-    commands: Element, when: Sequence[str], comment: str, command: int, adp: int, ado: int,
-    data: bytes, *, count: int | None = None, validate: tuple[bytes, bytes, int] | None = None,
-) -> Element:  # fmt: skip
-    made = child(commands, "InitCmd")
-    for transition in when:
-        child(made, "Transition", transition)
-    child(made, "Comment", comment)
-    child(made, "Requires", "cycle")
-    child(made, "Cmd", command)
-    child(made, "Adp", adp)
-    child(made, "Ado", ado)
-    child(made, "Data", data.hex())
-    if count is not None:
-        child(made, "Cnt", count)
-    child(made, "Retries", 3)
-    if validate is not None:
-        wanted, mask, timeout_ms = validate
-        element = child(made, "Validate")
-        child(element, "Data", wanted.hex())
-        child(element, "DataMask", mask.hex())
-        child(element, "Timeout", timeout_ms)
-    return made
-
-
-def _registers(
-    commands: Element, place: _Place, controller: SlaveController, cycle_us: int
-) -> None:
-    """Register writes of every transition, in the order in which a master sends them."""
-    position, address = place.auto_increment, place.address
-    vendor, product = place.axis.identity()
-    _state(commands, ("PI", "SI", "OI", "IP"), _APWR, position, 1)
-    _register(commands, ("IP",), "assign EEPROM to ECAT", _APWR, position, _EEPROM, b"\0", count=1)
-    for word, name, value in ((8, "vendor id", vendor), (10, "product code", product)):
-        ask = struct.pack("<HI", 0x0100, word)
-        _register(commands, ("IP",), f"check {name}", _APWR, position, 0x502, ask, count=1)
-        _register(
-            commands, ("IP",), f"check {name}", _APRD, position, 0x508, bytes(4), count=1,
-            validate=(struct.pack("<I", value), b"\xff" * 4, 100),
-        )  # fmt: skip
-    own = struct.pack("<H", address)
-    _register(commands, ("IP",), "set physical address", _APWR, position, _ADDRESS, own, count=1)
-    for register, value in _WATCHDOG:
-        data = struct.pack("<H", value)
-        _register(commands, ("IP",), "set watchdog", _FPWR, address, register, data, count=1)
-    for manager in controller.sync_managers:
-        if manager.kind.startswith("mailbox"):
-            _manager(commands, "IP", address, manager, manager.length)
-    _register(commands, ("IP", *_DOWNWARD), "clear DC activation", _FPWR, address, 0x980, b"\0\0")
-    _state(commands, ("IP",), _FPWR, address, 2)
-    for manager in controller.sync_managers:
-        size = {"outputs": place.out_bytes, "inputs": place.in_bytes}.get(manager.kind)
-        if size:
-            _manager(commands, "PS", address, manager, size)
-    _fmmus(commands, place, controller)
-    if controller.assign_activate:
-        _sync(commands, address, controller, cycle_us)
-    _state(commands, ("PS", "OS"), _FPWR, address, 4)
-    _state(commands, ("SO",), _FPWR, address, 8)
-    _state(commands, ("SP", "OP"), _FPWR, address, 2)
-
-
-def _state(commands: Element, when: Sequence[str], command: int, address: int, state: int) -> None:
-    """Ask for a state, acknowledging an error on the way up from Init, and wait for it."""
-    name = {1: "INIT", 2: "PREOP", 4: "SAFEOP", 8: "OP"}[state]
-    data = bytes([state | (0x10 if state <= 2 else 0), 0])
-    text = f"device state {name}"
-    _register(commands, when, f"set {text}", command, address, _AL_CONTROL, data, count=1)
-    read = _APRD if command == _APWR else _FPRD
-    wanted = bytes([state, 0, 0, 0, 0, 0])
-    _register(
-        commands, when, f"check {text}", read, address, _AL_STATUS, bytes(6), count=1,
-        validate=(wanted, b"\x1f\0\0\0\0\0", _TIMEOUTS_MS[state]),
-    )  # fmt: skip
-
-
-def _manager(commands: Element, when: str, address: int, manager: SyncManager, length: int) -> None:
-    data = struct.pack("<HHBBBB", manager.start, length, manager.control, 0, 1, 0)
-    text = f"set sm {manager.number} ({manager.kind.replace('_', ' ')})"
-    register = _SM + 8 * manager.number
-    _register(commands, (when,), text, _FPWR, address, register, data, count=1)
-
-
-def _fmmus(commands: Element, place: _Place, controller: SlaveController) -> None:
-    """Logical to physical memory (ETG.1000.4 clause 6.6): type 2 is written, type 1 is read."""
-    for number, (kind, at, size, way) in enumerate(
-        (("outputs", place.out_at, place.out_bytes, 2), ("inputs", place.in_at, place.in_bytes, 1))
-    ):
-        manager = controller.manager("outputs" if kind == "outputs" else "inputs")
-        if manager is None or not size:
-            continue
-        data = struct.pack(
-            "<IHBBHBBB3x", _LOGICAL + at, size, 0, 7, manager.start, 0, way, 1
-        )  # fmt: skip
-        register = _FMMU + 16 * number
-        text = f"set fmmu {number} ({kind})"
-        _register(commands, ("PS",), text, _FPWR, place.address, register, data, count=1)
-
-
-def _sync(commands: Element, address: int, controller: SlaveController, cycle_us: int) -> None:
-    """SYNC0 (ETG.1000.4 clause 6.8). The master fills in a start time of 0."""
-    cycle = struct.pack("<II", cycle_us * 1000, 0)
-    activate = struct.pack("<H", controller.assign_activate)
-    for text, register, data in (
-        ("set DC cycle time", 0x9A0, cycle),
-        ("set DC start time", 0x990, bytes(8)),
-        ("set DC activation", 0x980, activate),
-    ):
-        _register(commands, ("PS",), text, _FPWR, address, register, data, count=1)
-
-
 # --- cyclic frame -----------------------------------------------------------------------
 
 
-def _frame(frame: Element, places: Sequence[_Place], clocked: Sequence[_Place]) -> int:
+def _frame(frame: Element, places: Sequence[Place], clocked: Sequence[Place]) -> int:
     """Datagrams of one cycle; returns the size of the frame."""
     at = _ETHERNET_AND_HEADER
     if clocked:
@@ -411,9 +278,9 @@ def _frame(frame: Element, places: Sequence[_Place], clocked: Sequence[_Place]) 
     total = sum(place.out_bytes + place.in_bytes for place in places)
     # ETG.1000.4 clause 5.4: in a read-write command reading counts 1 and writing 2.
     count = sum(2 * bool(place.out_bytes) + bool(place.in_bytes) for place in places)
-    at = _command(frame, ("SAFEOP", "OP"), _LRW, at, total, address=_LOGICAL, count=count)
+    at = _command(frame, ("SAFEOP", "OP"), _LRW, at, total, address=LOGICAL, count=count)
     states = ("PREOP", "SAFEOP", "OP")
-    return _command(frame, states, _BRD, at, 2, adp=0, ado=_AL_STATUS, count=len(places))
+    return _command(frame, states, _BRD, at, 2, adp=0, ado=AL_STATUS, count=len(places))
 
 
 def _command(
@@ -438,7 +305,7 @@ def _command(
     return at + _DATAGRAM + length + _COUNTER
 
 
-def _process_image(config: Element, places: Sequence[_Place], start: int, size: int) -> None:
+def _process_image(config: Element, places: Sequence[Place], start: int, size: int) -> None:
     image = child(config, "ProcessImage")
     for tag, direction in (("Inputs", "tx"), ("Outputs", "rx")):
         side = child(image, tag)

@@ -65,7 +65,8 @@ def test_export_compare_and_what_changed(
     row = compare.get_by_role("row").filter(has_text=GAIN)
     expect(row).to_contain_text("gain")
     expect(row).to_contain_text("The controller will undo your tuning of")
-    expect(row).to_contain_text(str(held + 9))
+    # In steps of 0.1 Hz (manual 004, 2005:03).
+    expect(row).to_contain_text(f"{(held + 9) / 10:g}")
     assert fits(page)
 
     # What is no list gets one clear error.
@@ -83,7 +84,9 @@ def test_export_compare_and_what_changed(
     try:
         check.click()
         expect(earlier).to_contain_text("1 value has changed since the hand-over.")
-        expect(earlier.get_by_role("row").filter(has_text=GAIN)).to_contain_text(str(held + 4))
+        expect(earlier.get_by_role("row").filter(has_text=GAIN)).to_contain_text(
+            f"{(held + 4) / 10:g}"
+        )
     finally:
         bench.write(GAIN, held)
     assert fits(page)

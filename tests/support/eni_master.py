@@ -217,6 +217,7 @@ def over(interface: str) -> Exchange:
 def main() -> int:
     """Entry point of the script."""
     root = parse(Path(sys.argv[1])).getroot()
+    assert root is not None
     master = EniMaster(root, over(sys.argv[2]))
     try:
         master.start()

@@ -336,6 +336,7 @@ def test_a_segment_is_one_file_or_one_for_each_drive() -> None:
 
 def test_a_name_with_control_characters_makes_no_broken_file() -> None:
     axis = replace(axis_of("mms7"), name="axis \x01\x0b <one> -- \n two")
-    for form in ("eni", "lcec", "ros2", "igh"):
-        files = files_of(axis, form, "list", None)  # type: ignore[arg-type]
+    forms: tuple[Format, ...] = ("eni", "lcec", "ros2", "igh")
+    for form in forms:
+        files = files_of(axis, form, "list", None)
         assert read_list(files["list"], axis.profile).writes

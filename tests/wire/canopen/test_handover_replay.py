@@ -99,7 +99,7 @@ def test_the_concise_dcf_is_what_a_manager_downloads(family: str, tmp_path: Path
     (count,) = struct.unpack_from("<I", data)
     at = 4
     with on_can(profile, tmp_path) as bus:
-        client = bus.client(canopen.ObjectDictionary())
+        client = bus.client(canopen.ObjectDictionary())  # type: ignore[no-untyped-call]
         assert bus.node.state == 127
         for _ in range(count):
             index, subindex, size = struct.unpack_from("<HBI", data, at)
