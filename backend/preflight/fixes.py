@@ -88,7 +88,7 @@ class Fixes:
                 value=change.after,
                 remedy="as the administrator of the computer: "
                 + command(change.setting, change.after),
-                setting=change.setting.value if hasattr(change.setting, 'value') else str(change.setting),
+                setting=change.setting.place,
                 strerror=error.strerror or str(error),
             ) from error
         return wanted
@@ -111,7 +111,7 @@ class Fixes:
                     raise NotAllowed(
                         "preflight.cannot-restored",
                         value=change.before,
-                        setting=change.setting.value if hasattr(change.setting, 'value') else str(change.setting),
+                        setting=change.setting.place,
                         strerror=error.strerror or str(error),
                     ) from error
                 restored.append(change)
