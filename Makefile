@@ -36,37 +36,37 @@ check-python:
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "Python has no venv module: apt-get install python3-venv"; exit 1; }
 
 supply-chain: $(VENV)/.dev webui/node_modules/.package-lock.json ## locks, bill of materials (CycloneDX) and NOTICE, made anew
-	$(BIN)/python -m supply
+	$(BIN)/python .ci/supply
 
 wheels: $(VENV)/.dev ## whether every package comes as a wheel for every system; asks the package index
-	$(BIN)/python -m supply.wheels
+	$(BIN)/python .ci/supply/wheels.py
 
 packages: $(VENV)/.dev $(PAGE) ## wheel with the page, all wheels that it needs, and the Debian package, in dist/
 	rm -rf dist/wheels
 	$(BIN)/python -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir dist/wheels .
-	$(BIN)/python -m pip download --quiet --require-hashes --only-binary :all: --dest dist/wheels -r supply/run.txt
-	$(BIN)/python -m supply.debian dist/wheels dist
+	$(BIN)/python -m pip download --quiet --require-hashes --only-binary :all: --dest dist/wheels -r .ci/supply/run.txt
+	$(BIN)/python .ci/supply/debian.py dist/wheels dist
 
 audit: $(VENV)/.dev ## known weaknesses of the locked packages; asks their registries
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check pip-audit
-	$(BIN)/pip-audit --require-hashes --disable-pip -r supply/run.txt
+	$(BIN)/pip-audit --require-hashes --disable-pip -r .ci/supply/run.txt
 	cd webui && $(NPM) audit
 
 # Everything from the locks, by its hash; servodeck itself without asking for anything else.
 LOCKED := $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes
 ITSELF := SERVODECK_NO_PAGE=1 $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps --editable .
 
-$(VENV)/.installed: pyproject.toml supply/run.txt supply/build.txt | check-python
+$(VENV)/.installed: pyproject.toml .ci/supply/run.txt .ci/supply/build.txt | check-python
 	@echo "== making the virtual environment and installing servodeck"
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(LOCKED) -r supply/build.txt
-	$(LOCKED) -r supply/run.txt
+	$(LOCKED) -r .ci/supply/build.txt
+	$(LOCKED) -r .ci/supply/run.txt
 	$(ITSELF)
 	@touch $@
 
-$(VENV)/.dev: pyproject.toml supply/dev.txt $(VENV)/.installed
+$(VENV)/.dev: pyproject.toml .ci/supply/dev.txt $(VENV)/.installed
 	@echo "== installing what the tests need"
-	$(LOCKED) -r supply/dev.txt
+	$(LOCKED) -r .ci/supply/dev.txt
 	@touch $@
 
 webui/node_modules/.package-lock.json: webui/package-lock.json $(VENV)/.installed

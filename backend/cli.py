@@ -15,7 +15,7 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from texts.message import Language, language_of, speak
+from drivers.texts.message import Language, language_of, speak
 
 COMMANDS = {
     "serve": ("start:serve", "Start the server and the web page."),

@@ -23,7 +23,7 @@ from __future__ import annotations
 from enum import Enum
 
 from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted
-from texts.message import Param, Text, as_text
+from drivers.texts.message import Param, Text, as_text
 
 
 class DriveError(Exception):

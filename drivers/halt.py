@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Literal, NamedTuple
 
-from texts.message import Text, as_text, text
+from drivers.texts.message import Text, as_text, text
 
 Quantity = Literal["position", "speed", "torque", "following error"]
 

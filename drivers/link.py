@@ -20,8 +20,8 @@ from drivers.dictionary import Described
 from drivers.errors import DriveError, NotAllowed
 from drivers.halt import LoopState
 from drivers.motion.feedback import FeedbackScale
+from drivers.texts.message import Text
 from profiles.schema import DataType, LinkKind, Profile
-from texts.message import Text
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ ETG.1000.6 table 41.
 from __future__ import annotations
 
 from drivers.errors import Rejected
-from texts.message import Text, text
+from drivers.texts.message import Text, text
 
 _KNOWN = frozenset(
     {

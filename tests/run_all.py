@@ -87,7 +87,7 @@ QUICK = [
     Check("page: types and lint", [*NPM, "run", "--silent", "check"], ROOT / "webui"),
     Check("page: unit tests", [*NPM, "run", "--silent", "test"], ROOT / "webui"),
     Check("client drift", [sys.executable, "tests/client_drift.py"]),
-    Check("supply chain", [sys.executable, "-m", "supply", "--check"]),
+    Check("supply chain", [sys.executable, ".ci/supply", "--check"]),
 ]
 TIMED = [
     pytest("tests", *TWO, "-m", "not browser", "tests", *ignoring(REAL_TIME), *ignoring(PATIENT)),

@@ -1,12 +1,12 @@
 """What servodeck is built from: locked versions with hashes, a bill of materials, a notice.
 
-    python -m supply            make them anew (the locks ask a package index)
-    python -m supply --check    fail where one of them is not what the project says; no network
+    python .ci/supply            make them anew (the locks ask a package index)
+    python .ci/supply --check    fail where one of them is not what the project says; no network
 
-``supply/run.txt``, ``dev.txt`` and ``build.txt`` lock the Python packages for CPython 3.11 to 3.13
-on every system, each with the hashes of its files. ``supply/sbom.cdx.json`` (CycloneDX 1.6) and
-``NOTICE`` follow from these, from ``webui/package-lock.json`` and from ``supply/licences.json``,
-which keeps what the packages say of their licence.
+``run.txt``, ``dev.txt`` and ``build.txt`` beside this file lock the packages of CPython 3.11
+to 3.13 on every system, each with the hashes of its files. ``sbom.cdx.json`` (CycloneDX 1.6) and
+``NOTICE`` follow from these, from ``webui/package-lock.json`` and from ``licences.json``, which
+keeps what the packages say of their licence.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import subprocess
 import sys
 import tomllib
 
-from supply import materials
-from supply.materials import FOLDER, LOCKS, ROOT
+import materials
+from materials import FOLDER, LOCKS, ROOT
 
 SBOM, NOTICE = FOLDER / "sbom.cdx.json", ROOT / "NOTICE"
 _PROJECT = ROOT / "pyproject.toml"
@@ -94,7 +94,7 @@ def problems() -> list[str]:
 
 def main() -> int:
     """The command."""
-    parser = argparse.ArgumentParser(prog="python -m supply", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python .ci/supply", description=__doc__)
     parser.add_argument("--check", action="store_true", help="change nothing")
     parser.add_argument("--keep-locks", action="store_true", help="make only the documents anew")
     options = parser.parse_args()

@@ -1,9 +1,9 @@
 """Builds the Debian package of a station: program, service, user, udev rule, capabilities.
 
-    python -m supply.debian WHEELS OUTPUT
+    python .ci/supply/debian.py WHEELS OUTPUT
 
 WHEELS is a folder with the wheel of servodeck (the page inside) and of every package of
-``supply/run.txt``, as ``pip download`` or ``pip wheel`` leaves them; nothing is asked of any
+``.ci/supply/run.txt``, as ``pip download`` or ``pip wheel`` leaves them; nothing is asked of any
 index. The wheels are unpacked at build time into ``/opt/servodeck/site``, so that installing
 needs no network, no compiler and no pip. The package fits the CPython that builds it.
 

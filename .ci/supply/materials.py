@@ -19,8 +19,8 @@ from packaging.licenses import InvalidLicenseExpression, canonicalize_license_ex
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-ROOT = Path(__file__).resolve().parents[1]
-FOLDER = ROOT / "supply"
+ROOT = Path(__file__).resolve().parents[2]
+FOLDER = ROOT / ".ci" / "supply"
 LOCKS = {"run": "run.txt", "dev": "dev.txt", "build": "build.txt"}
 LICENCES = FOLDER / "licences.json"
 PAGE_LOCK = ROOT / "webui" / "package-lock.json"

@@ -1,6 +1,6 @@
 """Whether every package that servodeck runs with comes as a wheel for every system.
 
-    python -m supply.wheels
+    python .ci/supply/wheels.py
 
 Asks the package index by ``uv``; installs and builds nothing. Prints a matrix and ends with 1
 where a package would have to be built by a compiler that a field computer does not have.
@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 
-from supply.materials import FOLDER
+from materials import FOLDER
 
 SYSTEMS = {
     "win_amd64": "x86_64-pc-windows-msvc",

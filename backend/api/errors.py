@@ -23,7 +23,7 @@ from drivers.errors import (
     ProtocolError,
     Rejected,
 )
-from texts.message import Param, Text, as_text, language, text
+from drivers.texts.message import Param, Text, as_text, language, text
 
 log = logging.getLogger(__name__)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from texts.message import language_of, speaking
+from drivers.texts.message import language_of, speaking
 
 
 class Spoken:

@@ -26,8 +26,8 @@ from backend.stopping.quick_stop import quick_stop_keys, raise_quick_stop
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, OutOfRange, ProtocolError
+from drivers.texts.message import text
 from profiles.schema import Raw
-from texts.message import text
 
 __all__ = ["Axis", "Envelope"]
 

@@ -9,7 +9,7 @@ from backend.scales.units import AxisUnits
 from backend.scales.words import halt_remedy, halt_words
 from drivers.errors import motion_halted
 from drivers.motion.guard import SpeedGuard
-from texts.message import text
+from drivers.texts.message import text
 
 _WINDOW_S = 0.5
 """Polls come every 20 to 60 ms, and not evenly."""

@@ -28,8 +28,8 @@ from drivers.codec import encode
 from drivers.dialect import dialect_of
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError
 from drivers.link import OwnsPowerState
+from drivers.texts.message import text
 from profiles.schema import Fault
-from texts.message import text
 
 #: Longest time that one change of the power state may take (brake and bus included).
 STATE_TIMEOUT_S = 3.0

@@ -10,8 +10,8 @@ from contextlib import asynccontextmanager
 from backend.drive.drive import Drive
 from backend.drive.identity import confirm_identity
 from drivers.errors import DriveError, LinkTimeout
+from drivers.texts.message import joined, parts_of
 from profiles.schema import Raw
-from texts.message import joined, parts_of
 
 #: Deadline of a cleanup.
 CLEANUP_TIMEOUT_S = 5.0

@@ -20,8 +20,8 @@ from backend.api.models import JobInfo, Problem
 from backend.api.station.models import Bus, DriveSummary, FoundDrive
 from backend.commands.session import show_progress
 from drivers.errors import DriveError, LinkLost, NotAllowed, ProtocolError
+from drivers.texts.message import Text, language
 from drivers.urls import parse_url
-from texts.message import Text, language
 
 T = TypeVar("T")
 

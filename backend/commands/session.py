@@ -21,9 +21,9 @@ from backend.work.jobs import Progress
 from drivers.computer import signals
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import Found, Link
+from drivers.texts.message import Text, language
 from drivers.urls import link_for
 from profiles.loader import ProfileError
-from texts.message import Text, language
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -12,7 +12,6 @@ from typing import Annotated, Any, Literal
 import typer
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticUndefined
 
 from backend.commands import measure
 from backend.commands.options import Json, Server
@@ -86,7 +85,7 @@ def _options(tool: AnyTool) -> Iterator[tuple[str, tuple[Any, object]]]:
         option = next((each for each in field.metadata if isinstance(each, Option)), Option())
         names = option.names or (f"--{name.replace('_', '-')}",)
         text = field.description or tool.text(f"field.{name}")
-        default = field.default if field.default is not PydanticUndefined else option.default
+        default = option.default if field.is_required() else field.default
         kind = _kind(tool, name, field, pair=len(names) > 1)
         for number, flag in enumerate(names):
             key = name if len(names) == 1 else f"{name}_{number}"

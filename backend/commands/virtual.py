@@ -14,9 +14,9 @@ from backend.commands.session import until_interrupted
 from backend.station.demo import DemoBench
 from drivers.computer.signals import until_asked_to_end
 from drivers.errors import NotAllowed
+from drivers.texts.message import prose
 from drivers.urls import parse_url
 from drivers.virtual.mechanics.spec import load_mechanics, standard_mechanics
-from texts.message import prose
 
 
 def virtual(

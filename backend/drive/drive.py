@@ -34,8 +34,8 @@ from drivers.errors import (
     OutOfRange,
 )
 from drivers.link import Found, LinkQuality
+from drivers.texts.message import Text, text
 from profiles.schema import Parameter, Profile, Raw
-from texts.message import Text, text
 
 #: States in which the motor has power (CiA 402-2 table 28).
 _POWERED = frozenset({

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from drivers.codec import encode
 from drivers.errors import DriveError, NotAllowed, OutOfRange
+from drivers.texts.message import text
 from profiles.schema import Parameter, Raw
-from texts.message import text
 
 
 def checked(drive: str, parameter: Parameter, raw: Raw) -> Raw:

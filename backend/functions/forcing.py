@@ -23,8 +23,8 @@ from backend.people.lease import Leases
 from backend.work.jobs import Job, JobResult, JobRunner, Progress
 from drivers.cia402 import State
 from drivers.errors import NotAllowed, OutOfRange, Rejected
+from drivers.texts.message import Text, text
 from profiles.functions import Forcing, TerminalBits
-from texts.message import Text, text
 
 #: A session ends when its page has not renewed it for this long.
 SILENT_S = 5.0

@@ -11,8 +11,8 @@ from backend.scales.gear_calculator import GearPlan, GearValue, Mechanics, plan_
 from backend.scales.units import encoder_counts
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed, Rejected
+from drivers.texts.message import Text, joined, text
 from profiles.schema import Raw
-from texts.message import Text, joined, text
 
 #: Numbers that keep their value and so change their meaning with the gear.
 _COUNTED_ROLES = (

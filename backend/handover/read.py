@@ -22,10 +22,10 @@ from defusedxml.ElementTree import fromstring
 from backend.parameters.set_file import BadSet
 from drivers.codec import encode, size_of
 from drivers.errors import DriveError
+from drivers.texts.message import text
 from profiles.importer import ImportFailed, ImportReport, is_dcf, read_dcf_values
 from profiles.importer.values import default_value
 from profiles.schema import INTEGER_RANGE, DataType, Parameter, Profile
-from texts.message import text
 
 MAX_BYTES = 8_000_000
 _MAX_WRITES = 20_000

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drivers.errors import NotAllowed
-from texts.message import Param, Text, as_text, text
+from drivers.texts.message import Param, Text, as_text, text
 
 
 class NotLoggedIn(NotAllowed):

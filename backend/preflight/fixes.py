@@ -57,7 +57,7 @@ class Fixes:
         except (OSError, ValueError, KeyError, TypeError) as error:
             path = self.folder / RESTORE_LIST
             raise NotAllowed(
-                "preflight.list-preflight-changed-cannot", value=str(error), path=path
+                "preflight.list-preflight-changed-cannot", value=str(error), path=str(path)
             ) from error
 
     def apply(self, fix: Fix, interface: str) -> list[Change]:

@@ -20,7 +20,7 @@ from backend.store.files import StorageFailed
 from backend.work.jobs import Job, JobResult, Progress
 from backend.work.journal import Entry
 from drivers.errors import Busy, NotAllowed
-from texts.message import text
+from drivers.texts.message import text
 
 #: Running at once; each has a file and a thread.
 MAX_RUNNING = 8

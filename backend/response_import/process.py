@@ -23,7 +23,7 @@ from backend.response_import.evaluation import ImportSettings, evaluate_signals,
 from backend.response_import.preview import preview
 from backend.response_import.stored import pack_import
 from drivers.computer.processes import limit_memory
-from texts.message import Text, text
+from drivers.texts.message import Text, text
 
 #: An evaluation that takes longer is ended: the largest file takes a fraction of it.
 LIMIT_S = 120.0

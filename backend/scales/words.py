@@ -5,7 +5,7 @@ from __future__ import annotations
 from backend.scales.units import AxisUnits
 from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted, quantity_key
 from drivers.motion.feedback import Disagreement, disagreement
-from texts.message import Text, text
+from drivers.texts.message import Text, text
 
 _MEANING = {
     Disagreement.SCALE: "scales.speed-scale-wrong",

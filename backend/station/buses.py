@@ -11,8 +11,8 @@ from backend.drive.ports import Port
 from backend.people.identity import by_itself
 from drivers.errors import Busy, NotAllowed
 from drivers.link import Found, Link, LinkEvent
+from drivers.texts.message import Text
 from drivers.urls import link_for
-from texts.message import Text
 
 if TYPE_CHECKING:
     from backend.station.bench import Bench

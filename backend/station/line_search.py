@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from backend.station.bench import Bench
 from drivers.errors import Busy, NotAllowed
 from drivers.modbus.search import LineFound, search_line_settings
+from drivers.texts.message import Text
 from drivers.urls import bus_kind, parse_url
-from texts.message import Text
 
 
 async def search_line(

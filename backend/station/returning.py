@@ -17,7 +17,7 @@ from backend.work.jobs import Job, JobResult, Progress
 from drivers.cia402 import State
 from drivers.errors import Busy, NotAllowed
 from drivers.link import Found
-from texts.message import text
+from drivers.texts.message import text
 
 if TYPE_CHECKING:
     from backend.station.bench import Bench

@@ -18,8 +18,8 @@ from backend.parameters.set_file import ParameterSet
 from backend.work.jobs import JobResult
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed
 from drivers.link import Progress
+from drivers.texts.message import text
 from profiles.schema import Raw
-from texts.message import text
 
 #: Tag of the sets that are made before something is loaded.
 UNDO = "undo"

@@ -13,7 +13,7 @@ from typing import Literal
 
 from backend.people.identity import Actor, acting, acting_person
 from drivers.errors import Busy, DriveError
-from texts.message import Text, as_text, prose
+from drivers.texts.message import Text, as_text, prose
 
 JobState = Literal["running", "done", "failed", "cancelled"]
 JobResult = dict[str, object]

@@ -41,8 +41,8 @@ from drivers.link import (
     Unsubscribe,
     lists_nothing,
 )
+from drivers.texts.message import text
 from profiles.schema import LinkKind, Profile
-from texts.message import text
 
 T = TypeVar("T")
 

@@ -22,7 +22,7 @@ from drivers.halt import HaltCause, Halted
 from drivers.link import LinkEvent, ScopeBlock
 from drivers.motion.playback import AxisLoop
 from drivers.motion.setpoint_plan import Motion, Phase
-from texts.message import text
+from drivers.texts.message import text
 
 _BLOCK_S = 0.025
 _HEARTBEAT_S = 0.05

@@ -46,9 +46,9 @@ from drivers.modbus.registers import (
     to_words,
 )
 from drivers.modbus.thread import BusThread
+from drivers.texts.message import Text, text
 from drivers.urls import bus_kind
 from profiles.schema import LinkKind, Profile
-from texts.message import Text, text
 
 T = TypeVar("T")
 

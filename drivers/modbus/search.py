@@ -9,8 +9,8 @@ from drivers.bus import BusUrl
 from drivers.errors import OutOfRange
 from drivers.link import Found, Progress
 from drivers.modbus.port import Parity, is_pseudo_terminal
+from drivers.texts.message import Text, text
 from drivers.urls import bus_kind, link_for, parse_url
-from texts.message import Text, text
 
 
 @dataclass(frozen=True, slots=True)

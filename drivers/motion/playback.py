@@ -35,7 +35,7 @@ from drivers.motion.setpoint_plan import (
     Motion,
     Phase,
 )
-from texts.message import text
+from drivers.texts.message import text
 
 STOP_S = 0.1
 """From any speed to standstill; shorter than the 200 ms in which a lost setpoint must end."""

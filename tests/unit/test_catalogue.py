@@ -14,8 +14,8 @@ from fluent.syntax import parse
 from fluent.syntax.visitor import Visitor
 
 from drivers.errors import DriveError
-from texts.message import REMEDY, Language, Text, is_code
-from texts.render import bundle, files, identifier, render
+from drivers.texts.message import REMEDY, Language, Text, is_code
+from drivers.texts.render import bundle, files, identifier, render
 
 ROOT = Path(__file__).parents[2]
 LANGUAGES: tuple[Language, ...] = ("en", "zh")

@@ -38,8 +38,8 @@ from backend.scales.units import gentlest_ramp_rpm_s
 from backend.station.connected_drive import Member
 from backend.tools.moves import identification
 from drivers.errors import DriveError
+from drivers.texts.message import text
 from profiles.functions import FaultHistory, Functions
-from texts.message import text
 
 router = APIRouter()
 _DRIVE = "/drives/{drive_id}"

@@ -48,8 +48,8 @@ from backend.tools.moves import homing, move, procedures
 from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
+from drivers.texts.message import text
 from profiles.schema import Parameter, Raw
-from texts.message import text
 
 router = APIRouter(prefix="/drives/{drive_id}")
 

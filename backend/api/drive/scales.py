@@ -27,7 +27,7 @@ from backend.station.measuring import EXCHANGE_ENDS_S, exchange_for
 from backend.tools.moves.small_move import SmallMoveSettings, longest_allowed, small_move
 from backend.work.jobs import JobResult, Progress
 from drivers.errors import DriveError
-from texts.message import text
+from drivers.texts.message import text
 
 router = APIRouter(prefix="/drives/{drive_id}")
 _UNITS = {"position": "rev", "velocity": "rpm", "acceleration": "rpm/s"}

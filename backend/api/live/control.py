@@ -20,7 +20,7 @@ from backend.people.rights import GRANTABLE, Right
 from backend.people.station import People
 from backend.station.bench import Bench
 from drivers.errors import NotAllowed
-from texts.message import text
+from drivers.texts.message import text
 
 
 class PeopleControl:

@@ -16,7 +16,7 @@ from backend.tools.jog.hold import Hold
 from backend.tools.jog.run import jog
 from backend.work.jobs import JobResult, Progress
 from drivers.errors import DriveError
-from texts.message import text
+from drivers.texts.message import text
 
 
 class Jogs:

@@ -28,6 +28,7 @@ from backend.station.second_port import missing_ports
 from backend.work.jobs import JobResult, Progress
 from drivers.errors import NotAllowed
 from drivers.link import Found
+from drivers.texts.message import text
 from profiles import drive_names, load_profile
 from profiles.importer import ImportFailed, export_eds
 from profiles.importer.esi import MAX_BYTES
@@ -36,7 +37,6 @@ from profiles.language.overlay import Language, load_overlay
 from profiles.language.texts import translations
 from profiles.loader import ProfileError, user_folder
 from profiles.schema import LinkKind
-from texts.message import text
 
 router = APIRouter()
 

@@ -34,7 +34,7 @@ from drivers.ethercat.link import EthercatLink, segment_of
 from drivers.ethercat.process import firmware
 from drivers.ethercat.process.survey import ExchangeFigures, Survey, SurveyedStation
 from drivers.ethercat.wire.al_status import AlState
-from texts.message import Text, language, text
+from drivers.texts.message import Text, language, text
 
 router = APIRouter()
 

@@ -30,7 +30,7 @@ from backend.station.bench import Bench
 from backend.work.jobs import JobResult, Progress
 from drivers.computer.lateness import EDGES_US, Measured
 from drivers.errors import Busy
-from texts.message import text
+from drivers.texts.message import text
 
 router = APIRouter()
 _MEDIAN, _NEARLY_ALL = 0.5, 0.999

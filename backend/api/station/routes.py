@@ -35,9 +35,9 @@ from backend.station.connected_drive import Member
 from backend.station.second_port import require_same_drive
 from backend.work.jobs import Job, JobResult, Progress
 from drivers.link import Found
+from drivers.texts.message import text
 from profiles import load_all
 from profiles.loader import broken_profiles, is_own
-from texts.message import text
 
 router = APIRouter()
 

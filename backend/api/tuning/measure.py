@@ -43,7 +43,7 @@ from backend.tools.sweep.preview import preview
 from backend.tools.tool import AnyTool, Keep, Run, ToolSettings
 from backend.work.jobs import JobResult, Progress
 from drivers.errors import DriveError
-from texts.message import text
+from drivers.texts.message import text
 
 router = APIRouter()
 for part in (routes_design, routes_measurements, routes_report, routes_response_import):

@@ -29,7 +29,7 @@ from backend.tools.autotune.present import Trials, judged
 from backend.tools.autotune.verdict import fixed_of
 from backend.tools.autotune.verify import LOOKS, MOST_PAIRS, Verified, sharp_margins
 from backend.tools.measuring.temporary import write_settings
-from texts.message import text
+from drivers.texts.message import text
 
 #: A prediction stands within these: share of the -3 dB point, dB and degrees. The aims are 10 %,
 #: 3 dB and 6° (tuning.md, section 5).

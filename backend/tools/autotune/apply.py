@@ -18,7 +18,7 @@ from backend.tools.measuring.interrupted import ends_all
 from backend.tools.measuring.temporary import put_back_in_time, write_settings
 from backend.work.jobs import Progress
 from drivers.errors import DriveError
-from texts.message import Text, joined, text
+from drivers.texts.message import Text, joined, text
 
 #: A candidate with this share of its gain; None where that keeps no margins.
 Softer = Callable[[Candidate, float], Awaitable[Candidate | None]]

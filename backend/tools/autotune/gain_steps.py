@@ -22,7 +22,7 @@ from backend.tools.measuring.temporary import temporary
 from backend.tools.step.run import LEAD_S, StepResult, StepSettings, step_response
 from backend.work.jobs import Progress
 from drivers.errors import DriveError
-from texts.message import text
+from drivers.texts.message import text
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 #: Gains are raised in steps of this many dB, and the last one to what is asked for.

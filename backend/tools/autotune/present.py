@@ -33,7 +33,7 @@ from backend.tools.notch.effect import unknown
 from backend.tools.notch.meaning import meaning_of
 from backend.work.jobs import Progress
 from drivers.errors import DriveError, NotAllowed
-from texts.message import text
+from drivers.texts.message import text
 
 _TURN = 2.0 * np.pi
 #: Said where nothing was changed.

@@ -46,7 +46,7 @@ from backend.tools.sweep import run as sweep_tool
 from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import EnvelopeExceeded, NotAllowed
-from texts.message import text
+from drivers.texts.message import text
 
 #: A response with more of its samples at a torque limit is none.
 _SATURATED = 0.25

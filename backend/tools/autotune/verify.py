@@ -41,7 +41,7 @@ from backend.tools.step import run as step_tool
 from backend.tools.sweep import evaluation as sweep_evaluation
 from backend.tools.sweep import run as sweep_tool
 from backend.work.jobs import Progress
-from texts.message import prose
+from drivers.texts.message import prose
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 

@@ -23,7 +23,7 @@ from backend.tools.moves.go_back import go_back
 from backend.tools.tool import Run, Tool
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
-from texts.message import Text, text
+from drivers.texts.message import Text, text
 
 FloatArray = npt.NDArray[np.float64]
 _TURN = 2 * np.pi

@@ -40,7 +40,7 @@ from backend.tools.tool import Keep, Run, Tool
 from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
-from texts.message import text
+from drivers.texts.message import text
 
 _END_MARGIN_REV = 0.15
 #: Gentle moves last about so many times as long; seconds beside them, such as going back.

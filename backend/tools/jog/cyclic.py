@@ -31,7 +31,7 @@ from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange, motion_halted
 from drivers.motion.setpoint_plan import Phase
-from texts.message import text
+from drivers.texts.message import text
 
 _RENEW_S, _LOOK_S = 0.05, 0.02
 _STATE_TIMEOUT_S = 5.0

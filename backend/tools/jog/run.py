@@ -21,7 +21,7 @@ from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
-from texts.message import text
+from drivers.texts.message import text
 
 #: Period of target renewals to the drive (20 Hz or faster).
 PERIOD_S = 0.04

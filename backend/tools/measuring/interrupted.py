@@ -8,7 +8,7 @@ from backend.scales.words import halt_remedy, halt_words
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, NotAllowed, motion_halted
 from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted
-from texts.message import text
+from drivers.texts.message import text
 
 #: Ends that the loop makes by itself for what a tool has asked of the axis. A smaller motion or
 #: other gains may mend them; nothing mends any other end but a person.

@@ -33,7 +33,7 @@ from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed
 from drivers.motion.feedback import FeedbackScale
-from texts.message import Text
+from drivers.texts.message import Text
 
 _RENEW_S = 0.03
 _STATE_TIMEOUT_S = 5.0

@@ -18,7 +18,7 @@ from backend.tools.measuring.recording import cycle_s
 from backend.tools.measuring.temporary import temporary
 from backend.work.jobs import Progress
 from drivers.errors import NotAllowed, OutOfRange
-from texts.message import text
+from drivers.texts.message import text
 
 _TURN = 2 * np.pi
 #: So long at rest is an end; the axis' own start is not judged.

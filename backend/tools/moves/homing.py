@@ -14,7 +14,7 @@ from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
-from texts.message import text
+from drivers.texts.message import text
 
 _POLL_S = 0.02
 _START_HOMING = 0x10

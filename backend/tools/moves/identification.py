@@ -11,8 +11,8 @@ from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, Rejected
+from drivers.texts.message import prose
 from profiles.functions import DriveIdentification
-from texts.message import prose
 
 _POLL_S = 0.02
 #: The drive must show within this time that it has begun.

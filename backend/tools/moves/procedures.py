@@ -13,6 +13,7 @@ from backend.motion.classes import motion_of
 from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, Rejected
+from drivers.texts.message import prose, text
 from profiles.schema import (
     ConfirmStep,
     PollStep,
@@ -23,7 +24,6 @@ from profiles.schema import (
     WaitStep,
     WriteStep,
 )
-from texts.message import prose, text
 
 _POLL_S = 0.1
 

@@ -23,7 +23,7 @@ from backend.work.jobs import JobResult, Progress
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
-from texts.message import text
+from drivers.texts.message import text
 
 #: Increments of the first move at most, and by how much the next may be longer.
 FIRST_INCREMENTS, LONGER = 1_000, 10

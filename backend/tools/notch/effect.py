@@ -47,7 +47,7 @@ from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, exceeded
 from drivers.halt import HaltCause
-from texts.message import text
+from drivers.texts.message import text
 
 _TURN = 2 * np.pi
 #: Where the notch is tried: share of the sample rate, and limits in Hz.

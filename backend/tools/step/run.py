@@ -30,7 +30,7 @@ from backend.tools.moves.go_back import go_back
 from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import OutOfRange
-from texts.message import text
+from drivers.texts.message import text
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 _TURN = 2 * np.pi

@@ -32,7 +32,7 @@ from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange, exceeded
 from drivers.halt import HaltCause
-from texts.message import text
+from drivers.texts.message import text
 
 _TURN = 2 * np.pi
 MODE_OF = {"none": Mode.CST, "speed": Mode.CSV, "position": Mode.CSP}

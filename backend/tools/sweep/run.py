@@ -39,7 +39,7 @@ from backend.work.jobs import Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed, exceeded
 from drivers.halt import HaltCause
-from texts.message import text
+from drivers.texts.message import text
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 

@@ -28,7 +28,7 @@ from drivers.ethercat.wire.steps import Pause, Steps
 from drivers.halt import HaltCause, Halted
 from drivers.motion.playback import AxisLoop
 from drivers.motion.setpoint_plan import Motion, limits_of
-from texts.message import text
+from drivers.texts.message import text
 
 _NOT_YET, _OP_TRIES, _OP_PAUSE_S = (0x001B, 0x002D), 5, 0.2
 """Process data or SYNC0 stayed away (AL status codes of ETG.1020 table 2)."""

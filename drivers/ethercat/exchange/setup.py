@@ -26,7 +26,7 @@ from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.registers import TRIES, read_again
 from drivers.ethercat.wire.steps import Read, Steps, Write
 from drivers.motion.interpolation import interpolation_period
-from texts.message import text
+from drivers.texts.message import text
 
 FMMU, SYNC_MANAGERS = 0x600, 0x800
 _FMMU_COUNT = 0x004

@@ -17,7 +17,7 @@ from drivers.ethercat.wire import foe, sii
 from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.mailbox import Mailbox
 from drivers.ethercat.wire.steps import Pause, Steps, Write
-from texts.message import Text, joined, text
+from drivers.texts.message import Text, joined, text
 
 Where = Literal["auto", "BOOT", "PREOP"]
 Tell = Callable[[float, Text], None]

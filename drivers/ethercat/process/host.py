@@ -27,7 +27,7 @@ from drivers.ethercat.process import protocol
 from drivers.ethercat.process.operations import Operations
 from drivers.ethercat.process.protocol import Message
 from drivers.halt import HaltCause, Halted
-from texts.message import text
+from drivers.texts.message import text
 
 _LAST_WORDS_S = 5
 _STATUS_S = 0.2

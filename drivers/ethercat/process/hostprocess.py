@@ -18,7 +18,7 @@ from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.process import protocol
 from drivers.ethercat.process.protocol import Message
 from drivers.link import Progress
-from texts.message import Text
+from drivers.texts.message import Text
 
 _WATCH_S = 0.1
 _RESTART_PAUSE_S = (0.2, 1.0, 3.0, 10.0)

@@ -27,7 +27,7 @@ from drivers.ethercat.wire.al_status import AlState, state_name
 from drivers.ethercat.wire.frames import ROOM_BYTES
 from drivers.ethercat.wire.lanes import Done, Lanes, Urgency
 from drivers.halt import HaltCause, Halted
-from texts.message import Text, text
+from drivers.texts.message import Text, text
 
 _CONTROL_WORD = 0x6040
 _MAX_STEPS_PER_CYCLE = 16

@@ -14,7 +14,7 @@ import msgpack  # type: ignore[import-untyped]
 
 from drivers import errors
 from drivers.errors import DriveError, Rejected
-from texts.message import Text, Wire
+from drivers.texts.message import Text, Wire
 
 #: A message is a closed set of keys, but its values differ by operation: the boundary is here.
 Message = dict[str, Any]

@@ -13,7 +13,7 @@ from drivers.ethercat.wire.al_status import ERROR_BIT, AlState, al_status_text, 
 from drivers.ethercat.wire.mailbox import Mailbox
 from drivers.ethercat.wire.registers import GONE_S, TRIES, read_again
 from drivers.ethercat.wire.steps import Pause, Read, Steps, Write
-from texts.message import text
+from drivers.texts.message import text
 
 AL_CONTROL, AL_STATUS = 0x120, 0x130
 _SYNC_MANAGERS, _NO_MAILBOXES = 0x800, 0x0016

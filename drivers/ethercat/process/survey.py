@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from drivers.ethercat.process.protocol import Message
 from drivers.ethercat.wire.al_status import ERROR_BIT, al_status_text, state_name
 from drivers.ethercat.wire.esc import Finding, Port, PortCounters
-from texts.message import Text
+from drivers.texts.message import Text
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from texts.message import Text, text
+from drivers.texts.message import Text, text
 
 
 class AlState(IntEnum):

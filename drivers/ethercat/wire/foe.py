@@ -9,7 +9,7 @@ from drivers.errors import DriveError, ProtocolError, Rejected
 from drivers.ethercat.wire.mailbox import FOE, Mail, Mailbox
 from drivers.ethercat.wire.registers import GONE_S
 from drivers.ethercat.wire.steps import Pause, Steps
-from texts.message import joined, prose, text
+from drivers.texts.message import joined, prose, text
 
 ERASE_S, PACKET_S = 30.0, 10.0
 """Drives that erase their memory first, or check the whole file at the end, take their time."""

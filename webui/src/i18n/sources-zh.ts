@@ -1,5 +1,5 @@
 /** The texts of each room as they stand in the catalogue, by the name of the room. */
-const files: Record<string, string> = import.meta.glob('../../../texts/catalogue/*/*.zh.ftl', {
+const files: Record<string, string> = import.meta.glob('../../../drivers/texts/catalogue/*/*.zh.ftl', {
   query: '?raw',
   import: 'default',
   eager: true,

@@ -74,13 +74,13 @@ class Text:
 
     def words(self, language: Language = "en") -> str:
         """The sentence in one language."""
-        from texts.render import render  # the catalogue's library is needed for words alone
+        from drivers.texts.render import render  # the catalogue's library is needed for words alone
 
         return render(self, language)
 
     def remedy(self) -> Text | None:
         """What the catalogue says to do about it; None where it says nothing."""
-        from texts.render import has_text
+        from drivers.texts.render import has_text
 
         part = f"{self.code}{REMEDY}"
         return Text(part, self.params) if self.code and has_text(part) else None

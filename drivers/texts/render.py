@@ -17,7 +17,7 @@ from fluent.runtime import FluentBundle, FluentResource
 from fluent.runtime.resolver import Pattern
 from fluent.runtime.types import FluentInt, FluentType
 
-from texts.message import JOINED, PROSE, Language, Param, Text
+from drivers.texts.message import JOINED, PROSE, Language, Param, Text
 
 CATALOGUE = Path(__file__).with_name("catalogue")
 _LOCALES: dict[Language, str] = {"en": "en", "zh": "zh-Hans"}

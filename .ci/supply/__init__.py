@@ -1,1 +1,0 @@
-"""Locked packages, bill of materials and notice: see `supply.__main__`."""
