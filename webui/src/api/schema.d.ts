@@ -4275,6 +4275,25 @@ export interface components {
             source: string;
         };
         /**
+         * Finding
+         * @description What the map says, or cannot say, as a code with the figure that it rests on.
+         */
+        Finding: {
+            /**
+             * Code
+             * @enum {string}
+             */
+            code: "mapped" | "standstill_not_measured" | "stribeck_not_seen" | "stribeck_not_reached" | "few_speeds" | "ripple_not_asked" | "ripple_needs_revolution" | "ripple_not_seen" | "uneven_speeds" | "fastest_by_travel" | "slowest_by_time" | "model_misfit";
+            /**
+             * Unit
+             * @default
+             * @enum {string}
+             */
+            unit: "" | "rpm" | "rev" | "s" | "%";
+            /** Value */
+            value?: number | null;
+        };
+        /**
          * Fix
          * @description Settings that servodeck can change and restore.
          * @enum {string}
@@ -5175,6 +5194,26 @@ export interface components {
             notes: string[];
             /** Writes */
             writes: number;
+        };
+        /**
+         * Harmonic
+         * @description Torque that repeats ``order_per_rev`` times per motor revolution.
+         *
+         *     Torque = ``amplitude_percent`` · sin(order · angle + ``phase_deg``), by the angle that the
+         *     drive reports (6064h).
+         */
+        Harmonic: {
+            /** Amplitude Ci95 Percent */
+            amplitude_ci95_percent: [
+                number,
+                number
+            ];
+            /** Amplitude Percent */
+            amplitude_percent: number;
+            /** Order Per Rev */
+            order_per_rev: number;
+            /** Phase Deg */
+            phase_deg: number;
         };
         /**
          * Health
@@ -9509,6 +9548,7 @@ export type EthercatSegment = components['schemas']['EthercatSegment'];
 export type ExcitationInfo = components['schemas']['ExcitationInfo'];
 export type FaultHistory = components['schemas']['FaultHistory'];
 export type FaultHistoryInfo = components['schemas']['FaultHistoryInfo'];
+export type Finding = components['schemas']['Finding'];
 export type Fix = components['schemas']['Fix'];
 export type FixRequest = components['schemas']['FixRequest'];
 export type Forcing = components['schemas']['Forcing'];
@@ -9541,6 +9581,7 @@ export type HandoverDefect = components['schemas']['HandoverDefect'];
 export type HandoverFile = components['schemas']['HandoverFile'];
 export type HandoverRequest = components['schemas']['HandoverRequest'];
 export type HandoverResult = components['schemas']['HandoverResult'];
+export type Harmonic = components['schemas']['Harmonic'];
 export type Health = components['schemas']['Health'];
 export type Hello = components['schemas']['Hello'];
 export type HistorySlot = components['schemas']['HistorySlot'];

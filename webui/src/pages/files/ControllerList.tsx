@@ -28,7 +28,7 @@ export function ControllerList({ drive, file }: { drive: DriveSummary; file: str
               query: {
                 file: chosen.name.slice(0, 200),
                 set_file: file,
-                slave: typeof slave === 'number' ? slave : undefined,
+                slave: typeof slave === 'number' ? slave : null,
               },
             },
             body: chosen as never,
