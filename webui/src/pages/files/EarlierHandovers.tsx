@@ -52,7 +52,7 @@ function Earlier({ drive, made }: { drive: DriveSummary; made: HandedOverInfo })
           <p className="dim">
             {dateTime(made.time)} · {made.person} · {made.set_file}
           </p>
-          <p className="mono dim handover-hash">SHA-256 {made.sha256}</p>
+          <p className="mono dim handover-hash">{t('handover.hash', { sum: made.sha256 })}</p>
         </div>
         <div className="library-tools">
           <Button

@@ -153,7 +153,9 @@ function Made({ result }: { result: HandoverResult }) {
           </Button>
         ))}
       </div>
-      {result.files[0] && <p className="mono handover-hash">SHA-256 {result.files[0].sha256}</p>}
+      {result.files[0] && (
+        <p className="mono handover-hash">{t('handover.hash', { sum: result.files[0].sha256 })}</p>
+      )}
       {result.notes.length > 0 && (
         <>
           <p className="warn-text">{t('handover.notes')}</p>
