@@ -46,7 +46,7 @@ export const handover = {
   ],
   'handover.download': ['Download {name}', '下载 {name}'],
   'handover.leftOut': ['Left out, and why', '略去的参数及原因'],
-  'handover.hash': ['SHA-256 {sum}', 'SHA-256 {sum}'],
+  'handover.hash': ['Checksum (SHA-256): {sum}', '校验和（SHA-256）：{sum}'],
   'handover.notes': ['To heed', '注意事项'],
   'handover.compareTitle': ['What will the controller overwrite?', '控制器会覆盖哪些值？'],
   'handover.compareHelp': [
