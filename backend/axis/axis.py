@@ -142,17 +142,21 @@ class Axis(ScaledAxis):
             )
 
     async def standstill(self, timeout_s: float) -> bool:
-        """Whether the axis came to rest (position unchanged over 30 ms) within the time."""
+        """Whether the axis came to rest (position unchanged over 30 ms) within the time.
+
+        Two readings are compared at least: a busy computer or a slow bus may take longer for one.
+        """
         tolerance = (await self.units()).rest_tolerance()
         deadline = time.monotonic() + timeout_s
         last = await self.position_raw()
-        while time.monotonic() < deadline:
+        while True:
             await asyncio.sleep(0.03)
             now = await self.position_raw()
             if abs(now - last) <= tolerance:
                 return True
+            if time.monotonic() >= deadline:
+                return False
             last = now
-        return False
 
     # --- what must be undone ----------------------------------------------------------
 

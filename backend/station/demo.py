@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -44,6 +45,7 @@ class DemoBench:
         self._folder = folder
         self._nvm = nvm
         self._host: subprocess.Popen[str] | None = None
+        self._asking = threading.Lock()  # an answer belongs to the command sent before it
         self.spec: BenchSpec = load_bench(self._file)
         #: The bench's bus URLs, and how to open the wire behind each.
         self.wires: dict[str, Callable[[], Link]] = {}
@@ -128,12 +130,13 @@ class DemoBench:
         """
         if self._host is None or self._host.stdin is None:
             raise LinkLost("station.virtual-drives-not-run")
-        try:
-            self._host.stdin.write(json.dumps(command) + "\n")
-            self._host.stdin.flush()
-        except OSError as error:
-            raise LinkLost("station.virtual-drives-ended") from error
-        answer = self._read()
+        with self._asking:
+            try:
+                self._host.stdin.write(json.dumps(command) + "\n")
+                self._host.stdin.flush()
+            except OSError as error:
+                raise LinkLost("station.virtual-drives-ended") from error
+            answer = self._read()
         if not answer.get("ok"):
             raise ValueError(str(answer.get("error", "the process ended")))
         return answer.get("result")

@@ -212,7 +212,11 @@ class Bundle:
 def opened(data: bytes) -> Bundle:
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         assert archive.testzip() is None
-        texts = {n: archive.read(n).decode() for n in archive.namelist() if n != "samples.sdrec"}
+        texts = {
+            n: archive.read(n).decode()
+            for n in archive.namelist()
+            if not n.endswith((".sdrec", ".pcapng"))
+        }
         return Bundle(
             set(archive.namelist()),
             texts["index.html"],

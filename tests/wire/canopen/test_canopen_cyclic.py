@@ -44,7 +44,7 @@ def _cyclic(link: CanopenLink) -> CanopenCyclic:
 
 def _lost(link: CanopenLink, note: str) -> bool:
     halt = _cyclic(link).axis_state(5).halted
-    return halt is not None and halt.cause is HaltCause.LOST and note in halt.note
+    return halt is not None and halt.cause is HaltCause.LOST and note in str(halt.note)
 
 
 async def _run(

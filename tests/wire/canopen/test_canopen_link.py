@@ -51,7 +51,7 @@ async def test_long_objects_travel_with_and_without_block_transfer(
 async def test_an_abort_comes_back_in_words(link: CanopenLink) -> None:
     with pytest.raises(Rejected) as refused:
         await link.write(5, LIMITED, b"\x65\x00")
-    assert refused.value.code == 0x06090030
+    assert refused.value.abort_code == 0x06090030
     assert "does not accept this value" in str(refused.value)
     assert refused.value.parameter == "2001:00"
     assert refused.value.drive is not None
@@ -158,7 +158,7 @@ async def test_a_timed_out_write_is_sent_once(bench: Bench, link: CanopenLink) -
 
 async def test_scan_tells_who_is_there(bench: Bench, link: CanopenLink) -> None:
     said: list[str] = []
-    found = await link.scan(lambda _fraction, text: said.append(text), range(1, 17))
+    found = await link.scan(lambda _fraction, text: said.append(str(text)), range(1, 17))
     assert [f.station for f in found] == [5]
     drive = found[0]
     assert (drive.vendor_id, drive.product_code, drive.revision, drive.serial) == (

@@ -85,7 +85,7 @@ def test_aborts_are_understood_whatever_service_and_low_bits(service: int, comma
     slave = ScriptedSlave(lambda _: [coe(service, body)])
     with pytest.raises(Rejected, match="does not accept this value") as caught:
         slave.run(sdo.download(slave.box(), 0x6060, 0, b"\x63"))
-    assert caught.value.code == 0x06090030
+    assert caught.value.abort_code == 0x06090030
     assert caught.value.parameter == "6060:00"
 
 

@@ -90,7 +90,7 @@ async def test_one_failure_does_not_spoil_the_others(port: Path, opened: OpenLin
         text = Address(0x1008, 0, "STRING")
         first, second, third, fourth = await link.read_many(1, [missing, STATUS, text, MODE])
     assert isinstance(first, Rejected)
-    assert first.code == 2
+    assert first.abort_code == 2
     assert second == b"\x50\x02"
     assert isinstance(third, NotAllowed)
     assert fourth == b"\0"
@@ -103,7 +103,7 @@ async def test_refusals_in_words(port: Path, opened: OpenLink) -> None:
             await link.write(1, STATUS, b"\0\0")
         with pytest.raises(Rejected, match="illegal data") as too_high:
             await link.write(1, Address(0x2105, 0, "UINT8"), b"\xf8")
-    assert (read_only.value.code, too_high.value.code) == (4, 3)
+    assert (read_only.value.abort_code, too_high.value.abort_code) == (4, 3)
 
 
 async def test_neighbouring_subindices_are_read_together_if_the_profile_allows(
@@ -184,7 +184,7 @@ async def test_scan_tells_of_damaged_answers(port: Path, opened: OpenLink) -> No
     with serving(port, {1: ShelfDevice(), 2: ShelfDevice()}) as slave:
         link = await opened(f"mlink://{port}")
         slave.trouble(Trouble("corrupt"), Trouble("corrupt"))
-        found = await link.scan(lambda _fraction, text: said.append(text), (1, 2))
+        found = await link.scan(lambda _fraction, text: said.append(str(text)), (1, 2))
     assert [f.station for f in found] == [2]
     assert said[-1].startswith("1 found; damaged answers at 1: two drives with the same address")
 

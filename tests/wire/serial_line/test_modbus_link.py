@@ -103,7 +103,7 @@ async def test_read_only_register_is_refused_in_words(port: Path, opened: OpenLi
             await link.write(1, register(0x38), b"\x01\0")
         with pytest.raises(Rejected, match="no such register"):
             await link.read(1, register(0x999))
-    assert caught.value.code == 4
+    assert caught.value.abort_code == 4
 
 
 async def test_scan_takes_a_refusal_for_a_drive(port: Path, opened: OpenLink) -> None:

@@ -72,7 +72,7 @@ async def test_our_link_on_a_pymodbus_server(port: Path, opened: OpenLink) -> No
             assert await link.read(1, long) == b"\x01\x02\x03\x04"
             with pytest.raises(Rejected) as caught:
                 await link.read(1, Address(None, 0, "UINT16", 0x100))
-            assert caught.value.code == 2
+            assert caught.value.abort_code == 2
         finally:
             await server.shutdown()
 

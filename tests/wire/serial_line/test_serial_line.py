@@ -291,7 +291,7 @@ def test_exception_becomes_words() -> None:
     port = ScriptedPort([(0.001, exception_response(1, 3, 2))])
     with pytest.raises(Rejected, match="no such register") as caught:
         line_on(port).read(1, 0, 1)
-    assert caught.value.code == 2
+    assert caught.value.abort_code == 2
     assert "manual" in (caught.value.remedy or "")
 
 

@@ -9,6 +9,7 @@ import selectors
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Sequence
 from types import TracebackType
@@ -30,6 +31,7 @@ class VirtualSegment:
         self._words = words
         self._buffer = b""
         self._next_id = 0
+        self._asking = threading.Lock()  # an answer belongs to the command sent before it
         self.description: dict[str, Any] = {}
 
     @classmethod
@@ -74,19 +76,20 @@ class VirtualSegment:
             LinkLost: the segment has ended.
             LinkTimeout: no answer within `ANSWER_TIMEOUT_S`.
         """
-        self._next_id += 1
-        message = {"id": self._next_id, "do": do, **arguments}
-        assert self._process.stdin is not None
-        try:
-            self._process.stdin.write(json.dumps(message).encode() + b"\n")
-            self._process.stdin.flush()
-        except OSError as error:
-            raise self._ended() from error
-        deadline = time.monotonic() + ANSWER_TIMEOUT_S
-        while True:
-            answer = self._receive(deadline - time.monotonic())
-            if answer.get("id") == self._next_id:
-                break
+        with self._asking:
+            self._next_id += 1
+            message = {"id": self._next_id, "do": do, **arguments}
+            assert self._process.stdin is not None
+            try:
+                self._process.stdin.write(json.dumps(message).encode() + b"\n")
+                self._process.stdin.flush()
+            except OSError as error:
+                raise self._ended() from error
+            deadline = time.monotonic() + ANSWER_TIMEOUT_S
+            while True:
+                answer = self._receive(deadline - time.monotonic())
+                if answer.get("id") == self._next_id:
+                    break
         if not answer["ok"]:
             raise ValueError(f"virtual segment refuses {do!r}: {answer['error']}")
         return answer.get("result")
