@@ -44,6 +44,7 @@ def parse_url(text: str) -> BusUrl:
         raise OutOfRange(
             "link.no-bus-url-must",
             value=text,
+            schemes=", ".join(f"{known}://" for known in SCHEMES),
             remedy="write it like " + " or ".join(bus_kind(known).example for known in SCHEMES),
         )
     place = match[2]

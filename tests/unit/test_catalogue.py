@@ -105,6 +105,32 @@ def test_every_code_has_words() -> None:
     assert not SHOWN - set(ENGLISH), "in no file of texts/catalogue"
 
 
+def _calls() -> Iterator[tuple[str, ast.Call, str]]:
+    """Every call that begins with a code: where it stands, the call, the code."""
+    for folder in ("backend", "drivers", "profiles"):
+        for file in (ROOT / folder).rglob("*.py"):
+            for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+                if isinstance(node, ast.Call):
+                    for each in node.args:
+                        if isinstance(each, ast.Constant) and each.value in ENGLISH:
+                            place = f"{file.relative_to(ROOT)}:{node.lineno}"
+                            yield place, node, str(each.value)
+
+
+def test_every_message_is_given_the_facts_of_its_text() -> None:
+    checked, missing = 0, []
+    for place, call, code in _calls():
+        given = {each.arg for each in call.keywords}
+        if None in given:
+            continue  # facts of a map, known when it runs
+        checked += 1
+        lacking = (ENGLISH[code] | ENGLISH.get(f"{code}{REMEDY}", set())) - given
+        if lacking:
+            missing.append(f"{place} {code}: {sorted(lacking)}")
+    assert checked > 500
+    assert not missing, "\n".join(missing)
+
+
 def test_every_text_is_shown_by_somebody() -> None:
     made = {code for code in ENGLISH if _MADE.fullmatch(code) or code.startswith(tuple(TABLES))}
     unused = {code for code in ENGLISH if REMEDY not in code} - RAISED - made

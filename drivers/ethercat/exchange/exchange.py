@@ -37,6 +37,24 @@ _STOPPING = Halted(HaltCause.COMMANDED, note=text("ethercat.cyclic-exchange-bein
 _NO_ANSWER = Halted(HaltCause.LOST, note=text("ethercat.drive-no-longer-answers"))
 
 
+def enter_op(station: Station, limit_s: float) -> Steps[None]:
+    """To OP; once more where data or SYNC0 just stayed away: a computer may stall for 50 ms.
+
+    Raises:
+        NotAllowed: the station refuses OP, with the reason that it names.
+    """
+    for _ in range(_OP_TRIES - 1):
+        try:
+            yield from change_state(station, AlState.OP, time.monotonic, limit_s)
+        except NotAllowed:
+            if station.al_code not in _NOT_YET:
+                raise
+            yield Pause(_OP_PAUSE_S)
+        else:
+            return
+    yield from change_state(station, AlState.OP, time.monotonic, limit_s)
+
+
 class Exchange:
     """Cyclic exchange of one segment: at most one configuration and one loop at a time."""
 
@@ -136,21 +154,10 @@ class Exchange:
         yield from self._enter_op(self._stations[number - 1])
 
     def _enter_op(self, station: Station) -> Steps[None]:
-        """To OP; once more where data or SYNC0 just stayed away: a computer may stall for 50 ms."""
-        setup = self.setups[station.number]
-        if setup.rules is not None and self._has_commands(station.number):
-            yield from send_commands(station, setup.rules, BEFORE_OP)
-        limit_s = timeout_s(setup.rules, STATE_TIMEOUT_S[AlState.OP])
-        for _ in range(_OP_TRIES - 1):
-            try:
-                yield from change_state(station, AlState.OP, time.monotonic, limit_s)
-            except NotAllowed:
-                if station.al_code not in _NOT_YET:
-                    raise
-                yield Pause(_OP_PAUSE_S)
-            else:
-                return
-        yield from change_state(station, AlState.OP, time.monotonic, limit_s)
+        rules = self.setups[station.number].rules
+        if rules is not None and self._has_commands(station.number):
+            yield from send_commands(station, rules, BEFORE_OP)
+        yield from enter_op(station, timeout_s(rules, STATE_TIMEOUT_S[AlState.OP]))
 
     def stop(self, done: Done) -> None:
         """Brake what moves, disable, leave OP, then end the exchange."""

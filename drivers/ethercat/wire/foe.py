@@ -103,7 +103,7 @@ def _refused(answer: bytes) -> Rejected:
     reason = text(f"ethercat.foe-{code:04x}" if code in _ERRORS else "ethercat.foe-other")
     told = answer[6:].split(b"\0", 1)[0].decode("utf-8", "replace").strip()
     words = joined((reason, prose(told)), ": ") if told else reason
-    return Rejected("ethercat.drive-refused-file-foe", abort_code=code, words=words)
+    return Rejected("ethercat.drive-refused-file-foe", abort_code=code, number=code, words=words)
 
 
 def _is_foe(mail: Mail) -> bool:

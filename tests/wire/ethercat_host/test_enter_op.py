@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import cast
-
 import pytest
 
 from drivers.errors import NotAllowed
-from drivers.ethercat.exchange.exchange import Exchange
-from drivers.ethercat.process.station import AL_CONTROL, AL_STATUS, Station
+from drivers.ethercat.exchange.exchange import enter_op
+from drivers.ethercat.process.station import AL_CONTROL, AL_STATUS, STATE_TIMEOUT_S, Station
 from drivers.ethercat.wire.al_status import ERROR_BIT, AlState
 from drivers.ethercat.wire.steps import Read, Write
 from tests.wire.ethercat_host.by_hand import ByHand
@@ -44,7 +42,7 @@ class Slave(ByHand):
 
 
 def enter(slave: Slave) -> None:
-    slave.run(Exchange._enter_op(cast("Exchange", None), Station(2)))
+    slave.run(enter_op(Station(2), STATE_TIMEOUT_S[AlState.OP]))
 
 
 @pytest.mark.parametrize("code", [WATCHDOG, NO_SYNC0])

@@ -76,7 +76,7 @@ class Loading:
 
     async def load(self, **options: str) -> str:
         return await self.bus.link.load_firmware(
-            1, "app.efw", FILE, lambda share, text: self.told.append((share, text)),
+            1, "app.efw", FILE, lambda share, text: self.told.append((share, str(text))),
             **options,  # type: ignore[arg-type]
         )  # fmt: skip
 
