@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
@@ -55,6 +56,7 @@ def pulled(station: Station, x: str) -> Iterator[Bench]:
     y = station.add(2, name="Y")
     pull(station, PULL_NM)
     until(lambda: abs(bench.state()["velocity"]) > 0.7 * ABOUT_RPM, what="the load turns it")
+    until(lambda: still_gains(bench) < 0.01, what="it turns at a constant speed")
     yield bench
     pull(station, 0.0)
     bench.wait_standing()
@@ -63,6 +65,13 @@ def pulled(station: Station, x: str) -> Iterator[Bench]:
 
 def pull(station: Station, torque_nm: float) -> None:
     station.drives.command(do="inject", axis="X", what="load_nm", value=torque_nm)
+
+
+def still_gains(bench: Bench) -> float:
+    """By what share of its speed the axis gets faster within half a second."""
+    before = abs(bench.state()["velocity"])
+    time.sleep(0.5)
+    return abs(abs(bench.state()["velocity"]) / before - 1.0)
 
 
 def turned_rpm(bench: Bench) -> float:
