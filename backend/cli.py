@@ -100,7 +100,7 @@ COMMANDS = {
     "station": ("station:app", "A station as a service."),
     "preflight": (
         "preflight:preflight_command",
-        "Is this computer punctual enough, and what would help most? Writes to no drive.",
+        "Look at this computer, measure how punctual it is, and name the change that helps most.",
     ),
 }
 """Name of a command to where it is, below `backend.commands`, and what the list says of it."""

@@ -13,7 +13,6 @@ import argparse
 import contextlib
 import json
 import select
-import signal
 import socket
 import struct
 import sys
@@ -21,6 +20,7 @@ import threading
 import time
 
 from drivers.computer.processes import yield_processor
+from drivers.computer.signals import ignore_interrupt
 from drivers.computer.sockets import AF_PACKET, receive_with_notes
 from drivers.flight.kinds import ethercat_ring
 from drivers.flight.ring import FrameRing
@@ -126,7 +126,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("interface")
     parser.add_argument("--control", type=int, required=True, help="descriptor of the socket")
     options = parser.parse_args(argv)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ignore_interrupt()
     yield_processor(_NICE)
     Recorder(options.interface, socket.socket(fileno=options.control)).run()
     return 0

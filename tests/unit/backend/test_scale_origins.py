@@ -200,7 +200,7 @@ def test_an_odd_factor_is_no_unit(measured: float, counts: float) -> None:
 def halted(cause: HaltCause, value: float, limit: float) -> str:
     units = AxisUnits(load_profile("mms7").units, 65_536.0)
     quantity = {HaltCause.POSITION: "position", HaltCause.TORQUE: "torque"}.get(cause, "speed")
-    return halt_words(Halted(cause, quantity, value, limit), units)  # type: ignore[arg-type]
+    return str(halt_words(Halted(cause, quantity, value, limit), units))  # type: ignore[arg-type]
 
 
 def test_limits_are_said_in_the_units_of_the_axis() -> None:
