@@ -22,10 +22,11 @@ from drivers.errors import DriveError, NotAllowed
 from profiles.schema import Parameter, Raw
 
 #: The order in which an axis is commissioned, and a report is read.
-_ORDER = (
+#: Kinds of measurements in the order of the report; those of tools that are not named come last.
+_ORDER = tuple(dict.fromkeys((
     "inertia", "sweep-mechanics", "sweep-speed_loop", "sweep-position_loop", "step-speed",
     "step-move", *(tool.kind for tool in TOOLS),
-)  # fmt: skip
+)))  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ def _said() -> set[str]:
                 found |= {words, *words.split(": "), *re.split(": |; ", words)}
     # What the catalogue says reaches the page as a sentence still where a message is part of a
     # state or of a result.
-    for file in (ROOT / "texts" / "catalogue").rglob("*.en.ftl"):
+    for file in (ROOT / "drivers" / "texts" / "catalogue").rglob("*.en.ftl"):
         for line in file.read_text("utf-8").splitlines():
             words = re.sub(r"\{[^{}]*\$[^{}]*\}", "{}", line.partition(" = ")[2] or line)
             words = re.sub(r"^ \}", "{}", words)  # the end of a selection

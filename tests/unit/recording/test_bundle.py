@@ -119,7 +119,11 @@ def test_bundle_holds_the_samples_as_a_recording(tmp_path: Path) -> None:
 
 def test_what_came_long_ago_is_no_evidence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bench: Any = SimpleNamespace(
-        journal=Journal(), members={}, on_snapshot=[], on_readings=[], on_drives=[],
+        journal=Journal(),
+        members={},
+        on_snapshot=[],
+        on_readings=[],
+        on_drives=[],
         buses=SimpleNamespace(opened={}),
     )
     reading: Any = SimpleNamespace(time=1000.0, key="6079:00", value=310.0)
@@ -143,7 +147,11 @@ def test_what_a_full_disk_does_not_take_is_held_until_it_does(
 ) -> None:
     journal = Journal()
     bench: Any = SimpleNamespace(
-        journal=journal, members={}, on_snapshot=[], on_readings=[], on_drives=[],
+        journal=journal,
+        members={},
+        on_snapshot=[],
+        on_readings=[],
+        on_drives=[],
         buses=SimpleNamespace(opened={}),
     )
     free, written = [0], "what was held in memory is kept in"
