@@ -294,16 +294,19 @@ def _saturated(
     """Share of samples whose torque is at the envelope's limit, or not what was commanded.
 
     ``told``: the reported torque is the one that acts, so that a missing one is none of a filter.
+    Of another torque only a level counts at which it stays while more is commanded: a filter or a
+    copy of the demand has no such level.
     """
     shares = []
     for r in records:
         if r.torque is None:
             continue
-        at_limit = np.abs(r.torque) >= 0.98 * limit_nm
-        if quantity == "torque_mode" and told:
-            asked = sampled_command(r.excitation.samples, path)
-            size = float(np.max(np.abs(asked)))
-            at_limit |= np.abs(asked) - np.abs(r.torque) > 0.1 * size
+        torque = np.abs(r.torque)
+        at_limit = torque >= 0.98 * limit_nm
+        if quantity == "torque_mode":
+            asked = np.abs(sampled_command(r.excitation.samples, path))
+            missing = asked - torque > 0.1 * float(np.max(asked))
+            at_limit |= missing if told else missing & (torque >= 0.97 * float(np.max(torque)))
         shares.append(float(np.mean(at_limit)))
     return max(shares, default=0.0)
 
