@@ -21,7 +21,6 @@ from backend.store.lock import FolderLock
 from drivers.errors import NotAllowed
 
 FILE = "state.json"
-FORMAT = "servodeck state"
 VERSION = 2
 #: What 0.1.0 wrote has no file that says so.
 FIRST = 1
@@ -53,8 +52,6 @@ def read(folder: Path) -> StateVersion | None:
     file = folder / FILE
     try:
         content = json.loads(file.read_bytes())
-        if content["format"] != FORMAT:
-            raise ValueError(content["format"])
         return StateVersion(
             int(content["version"]),
             str(content["program"]),
@@ -126,7 +123,7 @@ def bring_up_to_date(folder: Path) -> bool:
 
 def _note(folder: Path, state: StateVersion) -> None:
     content = {
-        "format": FORMAT,
+        "format": "servodeck state",
         "version": state.version,
         "program": state.program,
         "revisions": sorted(state.revisions),

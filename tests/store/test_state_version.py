@@ -140,7 +140,7 @@ def test_a_step_that_was_interrupted_is_done_again(
 def newer(folder: Path, **changed: object) -> None:
     """Let the folder be that of a servodeck 9.0."""
     content = {
-        "format": state_version.FORMAT, "version": VERSION, "program": "9.0",
+        "format": "servodeck state", "version": VERSION, "program": "9.0",
         "revisions": sorted(migrate.known_revisions()),
     }  # fmt: skip
     (folder / FILE).write_text(json.dumps(content | changed))
