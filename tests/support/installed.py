@@ -14,7 +14,7 @@ from pathlib import Path
 from urllib.request import urlopen
 
 _ADDRESS = re.compile(r"servodeck is at (http://\S+)")
-_ASSET = re.compile(r'(?:src|href)="/?(assets/[^"]+)"')
+_ASSET = re.compile(r'(?:src|href)="(?:[.]?/)?(assets/[^"]+)"')
 #: What takes longer hangs.
 HANG_S = 120.0
 
