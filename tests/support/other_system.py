@@ -26,7 +26,7 @@ import types
 from pathlib import Path
 from typing import Any
 
-OURS = ("backend", "drivers", "profiles", "texts")
+OURS = ("backend", "drivers", "profiles")
 ABSENT = {"fcntl", "grp", "pty", "pwd", "resource", "termios", "tty"}
 LACKING = {
     "os": {
