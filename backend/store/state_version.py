@@ -87,7 +87,7 @@ def check(folder: Path) -> StateVersion | None:
         raise StateRefused(
             "store.state-newer",
             value=found.version,
-            limit=VERSION,
+            limit=str(VERSION),
             folder=str(folder),
             program=found.program,
             have=backend.__version__,
