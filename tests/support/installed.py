@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.request import urlopen
 
+import psutil
+
 _ADDRESS = re.compile(r"servodeck is at (http://\S+)")
 _ASSET = re.compile(r'(?:src|href)="(?:[.]?/)?(assets/[^"]+)"')
 #: What takes longer hangs.
@@ -21,12 +23,15 @@ HANG_S = 120.0
 
 @dataclass(frozen=True)
 class Served:
-    """A running server: its address, and how long its process took until the page was there."""
+    """A running server: its address, and how long it took until the page was there, with the
+    processor time of its process (seconds).
+    """
 
     address: str
     page: str
     assets: tuple[str, ...]
     seconds: float
+    processor_s: float
 
 
 @contextmanager
@@ -50,7 +55,8 @@ def served(
         assets = tuple(_ASSET.findall(page))
         for asset in assets:
             _get(f"{address}{asset}")
-        yield Served(address, page, assets, time.monotonic() - began)
+        used = psutil.Process(process.pid).cpu_times()
+        yield Served(address, page, assets, time.monotonic() - began, used.user + used.system)
     finally:
         process.terminate()
         # It ends by itself, or the guard ends it.
