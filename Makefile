@@ -41,11 +41,13 @@ supply-chain: $(VENV)/.dev webui/node_modules/.package-lock.json ## locks, bill 
 wheels: $(VENV)/.dev ## whether every package comes as a wheel for every system; asks the package index
 	$(BIN)/python .ci/supply/wheels.py
 
-packages: $(VENV)/.dev $(PAGE) ## wheel with the page, all wheels that it needs, and the Debian package, in dist/
-	rm -rf dist/wheels
+packages: $(VENV)/.dev $(PAGE) wheels ## all that is carried to a computer, with checksums, in dist/
+	rm -rf dist
 	$(BIN)/python -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir dist/wheels .
 	$(BIN)/python -m pip download --quiet --require-hashes --only-binary :all: --dest dist/wheels -r .ci/supply/run.txt
 	$(BIN)/python .ci/supply/debian.py dist/wheels dist
+	$(BIN)/python .ci/supply/portable.py dist/wheels dist
+	$(BIN)/python .ci/supply/checksums.py dist
 
 audit: $(VENV)/.dev ## known weaknesses of the locked packages; asks their registries
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check pip-audit

@@ -47,6 +47,8 @@ PATIENT = [
 AT_IDLE = ["chrt", "--idle", "0"]
 
 
+#: Of every suite what ran, as JUnit XML.
+REPORTS = ".pytest_cache/reports"
 TWO = ["-n", "2", "--dist", "loadfile"]
 
 
@@ -58,9 +60,14 @@ class Check(NamedTuple):
     folder: Path = ROOT
 
 
-def pytest(name: str, *arguments: str) -> Check:
-    """A suite; each keeps its own note of what failed, as two may run at a time."""
-    return Check(name, [*PYTEST, "-o", f"cache_dir=.pytest_cache/{name}", *arguments])
+def pytest(name: str, *arguments: str, again: bool = False) -> Check:
+    """A suite; each keeps its own note of what failed, as two may run at a time.
+
+    Its report says what ran (see `tests/matrix.py`), that of a run ``again`` beside the first.
+    """
+    report = f"{REPORTS}/{name}{' again' if again else ''}.xml"
+    noted = ["-o", f"cache_dir=.pytest_cache/{name}", f"--junitxml={report}"]
+    return Check(name, [*PYTEST, *noted, *arguments])
 
 
 def ignoring(paths: Sequence[str]) -> list[str]:
@@ -100,6 +107,8 @@ BESIDE = [
     # test may stand still for minutes, which is no hanging.
     pytest("patient tests", *TWO, "--timeout=900", *PATIENT),
 ]
+#: Whether the documentation says no more than what has just run.
+MATRIX = [Check("matrix", [sys.executable, "tests/matrix.py", REPORTS])]
 
 
 class Runner:
@@ -127,7 +136,7 @@ class Runner:
             suite = list(check.command[: len(PYTEST)]) == PYTEST
             files = last_failed(check.name) if code == 1 and suite and not last else []
             if files:
-                self.again.append(pytest(check.name, *files))
+                self.again.append(pytest(check.name, *files, again=True))
             elif code != 0:
                 self.failed.append(check.name)
 
@@ -162,7 +171,7 @@ def main() -> int:
     runner.run(QUICK)
     checks, failed = QUICK, runner.failed
     if "--fast" not in sys.argv:
-        checks, failed = [*QUICK, *TIMED, *BUSES, *PAGES, *BESIDE], run_suites(runner)
+        checks, failed = [*QUICK, *TIMED, *BUSES, *PAGES, *BESIDE, *MATRIX], run_suites(runner)
     print(f"failed: {', '.join(failed)}" if failed else "all checks passed")
     print(f"{len(checks) - len(failed)} passed, {len(failed)} failed")
     return len(failed)
@@ -191,6 +200,7 @@ def run_suites(runner: Runner) -> list[str]:
         print("== once more, alone", flush=True)
         alone.run(again, last=True)
         runner.failed += alone.failed
+    runner.run(MATRIX)
     return runner.failed + pages.failed + beside.failed
 
 

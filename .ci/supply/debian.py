@@ -8,12 +8,11 @@ index. The wheels are unpacked at build time into ``/opt/servodeck/site``, so th
 needs no network, no compiler and no pip. The package fits the CPython that builds it.
 
 Installing keeps a running station's state; removing keeps ``/var/lib/servodeck`` and the user,
-purging deletes both. ``sha256sum`` of the file is printed.
+purging deletes both.
 """
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 import subprocess
 import sys
@@ -169,7 +168,7 @@ def main(arguments: list[str]) -> int:
         if not (site / "backend/web/index.html").is_file():
             raise SystemExit(f"{ours.name} has no page in it; build it without SERVODECK_NO_PAGE")
         file = build(site, output, ours.name.split("-")[1])
-    print(f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file}")
+    print(f"{file}: {file.stat().st_size >> 20} MiB")
     return 0
 
 

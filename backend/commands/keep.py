@@ -17,7 +17,7 @@ from backend.audit.export_check import check_lines
 from backend.audit.trail import Filter
 from backend.commands.options import Json
 from backend.commands.session import told
-from backend.commands.state import state_folder
+from backend.commands.state import chosen_folder, state_folder
 from backend.library.entries import KINDS, Kind, Query
 from backend.parameters import set_file as parameter_set
 from backend.people.identity import LOCAL, Actor, acting
@@ -102,7 +102,7 @@ def restore(
     ] = False,
 ) -> None:
     """Put a backup in place, after checking it as a whole. End the server first."""
-    folder = state_folder(config)
+    folder = chosen_folder(config)
     done = restore_archive(archive, folder, database=database, replace=replace_)
     print(f"{folder}: {done.parts} files, audit of {done.audit_entries} entries is whole")
     if done.copied_rows:

@@ -90,7 +90,7 @@ def demo(
 
     async def work() -> None:
         with tempfile.TemporaryDirectory(prefix="servodeck-") as folder:
-            state = config or Path(folder) / "state"
+            state = state_folder(config) if config else Path(folder) / "state"
             print("starting the virtual drives …", flush=True)
             with DemoBench(bench, Path(folder) / "wires", state / "nvm", steady=True) as drives:
                 for url, real in drives.addresses.items():

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import platformdirs
 
+from backend.store import state_version
+
 STATE_FOLDER_VARIABLE = "SERVODECK_CONFIG"
 
 
@@ -15,6 +17,16 @@ def state_folder(chosen: Path | None) -> Path:
 
     The environment's SERVODECK_CONFIG is taken where no folder is given, so that server and
     commands of one station share it.
+
+    Raises:
+        StateRefused: a newer servodeck has written it.
     """
+    folder = chosen_folder(chosen)
+    state_version.check(folder)
+    return folder
+
+
+def chosen_folder(chosen: Path | None) -> Path:
+    """The same folder, whoever has written it: for a restore that replaces it."""
     named = os.environ.get(STATE_FOLDER_VARIABLE)
     return chosen or Path(named or platformdirs.user_data_dir("servodeck"))

@@ -12,6 +12,7 @@ from backend.audit.trail import Trail
 from backend.library import Library, LibrarySets
 from backend.library.described import folders
 from backend.library.index import Index
+from backend.store import state_version
 from backend.store.blobs import Blobs
 from backend.store.database import DatabaseFailed, Store
 from backend.store.files import StorageFailed
@@ -47,9 +48,13 @@ class Records:
     def claim(self) -> None:
         """Be the only one who uses the state folder, which is made where it is not there. Blocks.
 
+        What an older servodeck kept is migrated.
+
         Raises:
             Busy: another servodeck uses it.
+            StateRefused: a newer servodeck has written it; nothing was changed.
         """
+        state_version.check(self.store.folder)
         with contextlib.suppress(OSError):
             # One that cannot be made or written has nothing that two could disturb.
             self.store.folder.mkdir(parents=True, exist_ok=True)
@@ -59,6 +64,14 @@ class Records:
                 value=str(self.store.folder),
                 folder=str(self.store.folder),
             )
+        try:
+            if state_version.bring_up_to_date(self.store.folder):
+                self._journal.add("the state folder of an older servodeck was migrated")
+        except StorageFailed as error:
+            self._journal.add(f"{error.message}; {error.remedy}", level="error")
+        except BaseException:
+            self._lock.give()
+            raise
 
     def release(self) -> None:
         """Let another have the folder; does nothing where it is not claimed."""

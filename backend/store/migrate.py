@@ -23,6 +23,11 @@ def _config() -> Config:
     return config
 
 
+def known_revisions() -> frozenset[str]:
+    """Names of all revisions that this program knows: those of the files, which are not run."""
+    return frozenset(file.stem for file in (_FOLDER / "versions").glob("*_[0-9]*.py"))
+
+
 def script() -> ScriptDirectory:
     """The revisions that this program knows."""
     return ScriptDirectory.from_config(_config())

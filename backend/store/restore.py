@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from backend.audit.trail import Trail
-from backend.store import backup
+from backend.store import backup, state_version
 from backend.store.backup import SHARED, BackupFailed
 from backend.store.copy import copy_rows
 from backend.store.database import FILE, Store
@@ -37,6 +37,7 @@ def restore(
 
     Raises:
         BackupFailed: the archive is not whole, or the folder is in use; nothing was changed.
+        StateRefused: a newer servodeck made the backup; nothing was changed.
         StorageFailed: disk or database; the state folder is as it was.
     """
     used = folder.exists() and any(path.name != FolderLock.NAME for path in folder.iterdir())
@@ -89,6 +90,7 @@ def _unpack(archive: Path, folder: Path) -> int:
 
 def _check(folder: Path, shown: str) -> int:
     """The databases open, and the audit's chain is whole; entries of the audit."""
+    state_version.check(folder)
     entries = 0
     for name in (FILE, SHARED):
         if not (folder / name).exists():

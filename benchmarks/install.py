@@ -1,0 +1,226 @@
+"""From the files of `make packages` to the page on a fresh account: steps and seconds of each way.
+
+    python -m benchmarks.install [DIST]
+
+Everything is installed into scratch folders, without the network where this process may take it
+away (``unshare --net``). A way that cannot be gone on this computer says why; no figure is made up.
+Aims (issue 23): pipx 2 min, Debian package 1 min, unpacked folder 10 s, its cold start 5 s.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from benchmarks._aims import Aim, print_verdict
+from tests.support.installed import plain_environment, served
+
+ROOT = Path(__file__).resolve().parents[1]
+DIST = ROOT / "dist"
+_CACHES = Path("/proc/sys/vm/drop_caches")
+
+
+class NotHere(Exception):
+    """This way cannot be gone on this computer, and why."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """What a person types, how long it took, and how long a processor worked for it (seconds)."""
+
+    typed: str
+    seconds: float
+    processor_s: float
+
+
+@dataclass
+class Walk:
+    """One way in, step by step."""
+
+    scratch: Path
+    offline: bool
+    steps: list[Step] = field(default_factory=list)
+
+    def do(self, typed: str, command: Sequence[str | Path], **environment: str) -> None:
+        """One step that installs, without a network where that can be had."""
+        away = ["unshare", "--net"] if self.offline else []
+        began, worked = time.monotonic(), _processor_s()
+        done = subprocess.run(
+            [*away, *(str(part) for part in command)], cwd=self.scratch,
+            env=plain_environment(self.scratch / "home") | environment,
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        if done.returncode:
+            raise NotHere(f"{typed}: {done.stderr.strip().splitlines()[-1]}")
+        self.steps.append(Step(typed, time.monotonic() - began, _processor_s() - worked))
+
+    def page(self, typed: str, *command: str | Path, path: Path | None = None) -> None:
+        """Start the server and get its page with everything that it names."""
+        environment = plain_environment(self.scratch / "home", *([path] if path else []))
+        with served(command, self.scratch, environment) as answer:
+            self.steps.append(Step(typed, answer.seconds, answer.processor_s))
+
+    @property
+    def seconds(self) -> float:
+        """All steps together."""
+        return sum(step.seconds for step in self.steps)
+
+
+def _processor_s() -> float:
+    """Processor time of all processes that this one has started and that have ended."""
+    used = os.times()
+    return used.children_user + used.children_system
+
+
+def pip(walk: Walk, dist: Path) -> None:
+    """What pipx does: an environment of its own, and pip."""
+    environment = walk.scratch / "environment"
+    walk.do("python3 -m venv servodeck", [sys.executable, "-m", "venv", environment])
+    walk.do(
+        "servodeck/bin/pip install --no-index --find-links wheels servodeck",
+        [environment / "bin/pip", "install", "--quiet", "--disable-pip-version-check",
+         "--no-index", "--find-links", dist / "wheels", "servodeck"],
+    )  # fmt: skip
+    walk.page("servodeck serve", environment / "bin/servodeck", "serve", "--port", "0")
+
+
+def uv(walk: Walk, dist: Path) -> None:
+    """uv itself, with its tool folder in the scratch folder."""
+    if importlib.util.find_spec("uv") is None:
+        raise NotHere("uv is not installed here")
+    tools, binaries = walk.scratch / "tools", walk.scratch / "bin"
+    walk.do(
+        "uv tool install --no-index --find-links wheels servodeck",
+        [sys.executable, "-m", "uv", "tool", "install", "--quiet", "--offline", "--no-index",
+         "--find-links", dist / "wheels", "--python", sys.executable, "servodeck"],
+        UV_TOOL_DIR=str(tools), UV_TOOL_BIN_DIR=str(binaries),
+        UV_CACHE_DIR=str(walk.scratch / "cache"),
+    )  # fmt: skip
+    walk.page("servodeck serve", binaries / "servodeck", "serve", "--port", "0")
+
+
+def debian(walk: Walk, dist: Path) -> None:
+    """dpkg in a root of its own; service, user and udev are not started there."""
+    if shutil.which("dpkg") is None:
+        raise NotHere("no dpkg on this computer")
+    file, root = _one(dist, "servodeck_*.deb"), walk.scratch / "root"
+    (root / "var/lib/dpkg").mkdir(parents=True)
+    (root / "var/lib/dpkg/status").touch()
+    walk.do(
+        f"sudo dpkg --install {file.name}",
+        ["dpkg", f"--root={root}", f"--log={root}/log", "--force-script-chrootless",
+         "--force-depends", "--force-not-root", "--force-bad-path", "--install", file],
+    )  # fmt: skip
+    walk.page(
+        "systemctl start servodeck (here: its program)",
+        root / "opt/servodeck/bin/servodeck", "serve", "--port", "0",
+        path=Path(sys.base_prefix) / "bin",
+    )  # fmt: skip
+
+
+def folder(walk: Walk, dist: Path) -> None:
+    """The self-contained folder."""
+    file = _one(dist, "servodeck-*-linux-*.tar.gz")
+    walk.do(f"tar -xzf {file.name}", ["tar", "-xzf", file])
+    (unpacked,) = walk.scratch.glob("servodeck-*-linux-*")
+    _forget_cached_files()
+    walk.page("./servodeck serve, cold", unpacked / "servodeck", "serve", "--port", "0")
+
+
+def container(_walk: Walk, dist: Path) -> None:
+    """An image, where a builder and its base image are to be had."""
+    for builder in ("podman", "docker", "buildah"):
+        if shutil.which(builder) is None:
+            continue
+        arguments = ["bud"] if builder == "buildah" else ["build"]
+        done = subprocess.run(
+            [builder, *arguments, "-f", str(ROOT / ".ci/supply/Containerfile"), str(dist.parent)],
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        if done.returncode:
+            raise NotHere(f"{builder}: {done.stderr.strip().splitlines()[-1]}")
+        raise NotHere(f"{builder} has built it; it is not started by this script")
+    raise NotHere("no container builder (podman, docker, buildah) on this computer")
+
+
+def edge_box(_walk: Walk, _dist: Path) -> None:
+    """The first-boot page."""
+    raise NotHere("the set-up page of an edge box is not made yet")
+
+
+def _one(folder_of: Path, pattern: str) -> Path:
+    found = sorted(folder_of.glob(pattern))
+    if not found:
+        raise NotHere(f"no {pattern} in {folder_of.name}/: make packages")
+    return found[-1]
+
+
+def _forget_cached_files() -> None:
+    """Read everything from the disk again, where this process may ask for it."""
+    os.sync()
+    if os.access(_CACHES, os.W_OK):
+        _CACHES.write_text("3")
+
+
+def may_take_network_away() -> bool:
+    """Whether a step can be run in an empty network namespace."""
+    if shutil.which("unshare") is None:
+        return False
+    return (
+        subprocess.run(["unshare", "--net", "true"], check=False, capture_output=True).returncode
+        == 0
+    )
+
+
+WAYS: dict[str, tuple[Callable[[Walk, Path], None], float | None]] = {
+    "pipx (venv and pip)": (pip, 120.0),
+    "uv tool": (uv, 120.0),
+    "Debian package": (debian, 60.0),
+    "self-contained folder": (folder, None),
+    "container": (container, None),
+    "edge box": (edge_box, None),
+}
+"""How each is gone, and in how many seconds from file to page."""
+
+
+def main() -> None:
+    """Go each way and print its steps."""
+    dist = Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else DIST
+    offline = may_take_network_away()
+    print(f"installing {'without' if offline else 'with (it cannot be taken away here)'} network; "
+          f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")  # fmt: skip
+    aims = []
+    for name, (go, aim_s) in WAYS.items():
+        with tempfile.TemporaryDirectory(prefix="servodeck-install-") as scratch:
+            walk = Walk(Path(scratch), offline)
+            try:
+                if not (dist / "wheels").is_dir():
+                    raise NotHere("no dist/wheels: make packages")  # noqa: TRY301
+                go(walk, dist)
+            except NotHere as why:
+                print(f"{name}: not possible here: {why}", flush=True)
+                continue
+        print(f"{name}: {len(walk.steps)} steps, {walk.seconds:.1f} s from file to page")
+        for number, step in enumerate(walk.steps, start=1):
+            worked = f"{step.processor_s:.1f} s of a processor"
+            print(f"  {number}. {step.typed}: {step.seconds:.1f} s ({worked})", flush=True)
+        if aim_s is not None:
+            words = f"{name}: {walk.seconds:.1f} s, aim {aim_s:g} s"
+            aims.append(Aim(words, walk.seconds <= aim_s))
+        if go is folder:
+            cold = walk.steps[-1].seconds
+            aims.append(Aim(f"unpacked folder to page: {cold:.1f} s, aim 10 s", cold <= 10.0))
+            aims.append(Aim(f"its cold start: {cold:.1f} s, aim 5 s", cold <= 5.0))
+    print_verdict(aims)
+
+
+if __name__ == "__main__":
+    main()
