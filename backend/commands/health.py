@@ -22,7 +22,7 @@ from backend.commands.options import DEFAULT_SERVER, Json, Server
 from backend.commands.remote import Remote, remote
 from backend.commands.session import run
 from backend.commands.tools import command_of, lines_of
-from backend.health.compare import LEAST_REPEATS
+from backend.health.compare import CHECKS, LEAST_REPEATS
 from backend.health.records import HealthRecords
 from backend.tools.health.result import UNITS, HealthResult
 from backend.tools.registry import BY_KIND
@@ -62,7 +62,14 @@ def baseline(
 
 
 @app.command("repeat")
-def repeat(axis: Axis, server: Server = None, as_json: Json = False) -> None:
+def repeat(
+    axis: Axis,
+    consent: Annotated[
+        bool, typer.Option("--consent", help="for a drive without watchdog, as when measuring")
+    ] = False,
+    server: Server = None,
+    as_json: Json = False,
+) -> None:
     """Repeat the measurements of the baseline with its settings, and compare. The axis moves."""
 
     async def work() -> None:
@@ -71,7 +78,8 @@ def repeat(axis: Axis, server: Server = None, as_json: Json = False) -> None:
             known = await at.ask("GET", f"/drives/{drive.id}/health", AxisHealth)
             if known.baseline is None:
                 raise NotAllowed("health.no-baseline", axis=axis)
-            body = {**known.baseline.settings, "rounds": 2}
+            # Consent is given for one motion: that of the baseline is not taken over.
+            body = {**known.baseline.settings, "rounds": CHECKS, "consent": consent}
             found = await at.result(f"/drives/{drive.id}/jobs/health", body)
             now = await at.ask("GET", f"/drives/{drive.id}/health", AxisHealth)
             if not as_json:
@@ -133,7 +141,13 @@ def _read(
         records.store.close()
 
     run(work)
+    if axis and not found:
+        run(lambda: _none(axis))
     return found
+
+
+async def _none(axis: str) -> None:
+    raise NotAllowed("health.no-rounds", axis=axis)
 
 
 async def _drive(at: Remote, name: str) -> DriveSummary:
@@ -186,9 +200,9 @@ def _baseline_lines(found: AxisHealth) -> list[str]:
     signed = found.baseline
     if signed is None:
         return [_no_baseline(found)]
+    when = f"{signed.signed:%Y-%m-%d %H:%M} UTC"
     return [
-        f"{found.axis}: baseline of {len(signed.runs)} rounds, signed {signed.signed:%Y-%m-%d "
-        f"%H:%M} UTC by {signed.person}",
+        f"{found.axis}: baseline of {len(signed.runs)} rounds, signed {when} by {signed.person}",
         f"sha256: {signed.sha256}",
     ]
 

@@ -230,11 +230,11 @@ def _condition(
     return Condition(axis, shown, baseline, tuple(findings), len(same), len(later) - len(same))
 
 
-def _query() -> Select[tuple[HealthRun]]:
+def _query() -> Select[HealthRun]:
     return select(HealthRun).order_by(HealthRun.taken, HealthRun.id)
 
 
-def _rows(session: Session, query: Select[tuple[HealthRun]]) -> list[HealthRow]:
+def _rows(session: Session, query: Select[HealthRun]) -> list[HealthRow]:
     """Rows of a query. Columns, not objects of the mapping: thousands are read for one page."""
     found = session.execute(query.with_only_columns(*HealthRun.__table__.columns))
     return [

@@ -1,4 +1,4 @@
-"""Routes of the axes' condition. Measuring is the job of the tool ``health``; nothing moves here."""
+"""Routes of the axes' condition. Nothing moves; measuring is the job of the tool ``health``."""
 
 from __future__ import annotations
 
