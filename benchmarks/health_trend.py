@@ -68,15 +68,15 @@ def _round(chance: random.Random, wear: float) -> HealthRound:
     return HealthRound(values=tuple(values))
 
 
-def opened_s(url: str, folder: Path) -> tuple[float, int, int]:
-    """Seconds until the answer is there, its bytes, and how many rounds are in it."""
-    begun = time.perf_counter()
+def opened_s(url: str, folder: Path) -> tuple[float, float, int, int]:
+    """Seconds until the answer is there and of the processor, bytes of it, and its rounds."""
+    begun, busy = time.perf_counter(), time.process_time()
     store = Store(folder, url)
     found: Sequence[AxisHealth] = [info_of(each) for each in HealthRecords(store, "").trend()]
     data = TypeAdapter(list[AxisHealth]).dump_json(list(found))
-    taken = time.perf_counter() - begun
+    taken, used = time.perf_counter() - begun, time.process_time() - busy
     store.close()
-    return taken, len(data), sum(len(each.runs) for each in found)
+    return taken, used, len(data), sum(len(each.runs) for each in found)
 
 
 def measured(name: str, url: str, folder: Path) -> bool:
@@ -86,10 +86,10 @@ def measured(name: str, url: str, folder: Path) -> bool:
     store.close()
     times, size, rounds = [], 0, 0
     for _ in range(3):
-        taken, size, rounds = opened_s(url, folder)
+        taken, used, size, rounds = opened_s(url, folder)
         times.append(taken)
-    shown = ", ".join(f"{each:.2f}" for each in times)
-    print(f"{name}: {rounds} rounds of {AXES} axes in {shown} s, {size / 1e6:.1f} MB of JSON")
+        print(f"{name}: {taken:.2f} s, of which the processor worked {used:.2f} s")
+    print(f"{name}: {rounds} rounds of {AXES} axes, {size / 1e6:.1f} MB of JSON")
     return max(times) < AIM_S
 
 

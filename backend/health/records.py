@@ -52,7 +52,6 @@ class HealthRow:
     station: str
     taken: datetime
     person: str
-    settings: Mapping[str, object]
     settings_sha256: str
     measurements: Mapping[str, str]
     round: HealthRound
@@ -146,7 +145,7 @@ class HealthRecords:
                     taken=taken or datetime.now(UTC), person=person,
                     settings=settings.model_dump(mode="json"),
                     settings_sha256=settings_sha256(settings), measurements=dict(measurements),
-                    round=one.model_dump(mode="json"),
+                    round=one.model_dump_json(),
                 )
                 for one in rounds
             ]  # fmt: skip
@@ -180,7 +179,8 @@ class HealthRecords:
             if len({row.settings_sha256 for row in rows}) > 1:
                 raise NotAllowed("health.baseline-different-settings")
             signed = datetime.now(UTC)
-            content = _content(rows, signed, person.strip(), notes)
+            settings = session.get_one(HealthRun, rows[0].id).settings
+            content = _content(rows, settings, signed, person.strip(), notes)
             made = HealthBaseline(
                 axis_key=key, signed=signed, person=person.strip(), notes=notes, content=content,
                 sha256=_digest(content),
@@ -236,7 +236,8 @@ def _query() -> Select[HealthRun]:
 
 def _rows(session: Session, query: Select[HealthRun]) -> list[HealthRow]:
     """Rows of a query. Columns, not objects of the mapping: thousands are read for one page."""
-    found = session.execute(query.with_only_columns(*HealthRun.__table__.columns))
+    columns = [each for each in HealthRun.__table__.columns if each.name != "settings"]
+    found = session.execute(query.with_only_columns(*columns))
     return [
         HealthRow(
             id=row.id,
@@ -244,9 +245,9 @@ def _rows(session: Session, query: Select[HealthRun]) -> list[HealthRow]:
                 row.axis_key, row.axis, row.profile, row.vendor_id, row.product_code, row.revision,
                 row.serial, row.firmware,
             ),
-            station=row.station, taken=row.taken, person=row.person, settings=row.settings,
+            station=row.station, taken=row.taken, person=row.person,
             settings_sha256=row.settings_sha256, measurements=row.measurements,
-            round=HealthRound.model_validate(row.round),
+            round=HealthRound.model_validate_json(row.round),
         )
         for row in found
     ]  # fmt: skip
@@ -262,12 +263,16 @@ def _baselines(session: Session, key: str | None = None) -> dict[str, Baseline]:
 
 
 def _content(
-    rows: Sequence[HealthRow], signed: datetime, person: str, notes: str
+    rows: Sequence[HealthRow],
+    settings: Mapping[str, object],
+    signed: datetime,
+    person: str,
+    notes: str,
 ) -> dict[str, object]:
     """What is signed: who, when, which axis, which stored measurements, and their values."""
     return {
         "signed": signed.isoformat(), "person": person, "notes": notes,
-        "axis": asdict(rows[-1].axis), "settings": dict(rows[0].settings),
+        "axis": asdict(rows[-1].axis), "settings": dict(settings),
         "settings_sha256": rows[0].settings_sha256,
         "runs": [
             {

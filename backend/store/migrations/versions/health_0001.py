@@ -30,7 +30,7 @@ def upgrade() -> None:
         sa.Column("settings", sa.JSON, nullable=False),
         sa.Column("settings_sha256", sa.String(64), nullable=False),
         sa.Column("measurements", sa.JSON, nullable=False),
-        sa.Column("round", sa.JSON, nullable=False),
+        sa.Column("round", sa.Text, nullable=False),
     )
     op.create_index("ix_health_run_axis_key_taken", "health_run", ["axis_key", "taken"])
     op.create_table(
