@@ -29,7 +29,11 @@ from backend.tools.registry import BY_KIND
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, language, text
 
-app = typer.Typer(help="The condition of axes: baseline, comparison, trend.", no_args_is_help=True)
+app = typer.Typer(
+    help="The condition of an axis: measure, sign a baseline, repeat, compare, trend. "
+    "Measuring moves it.",
+    no_args_is_help=True,
+)
 
 Axis = Annotated[str, typer.Option("--axis", help="name of the axis")]
 _TOOL = BY_KIND["health"]
