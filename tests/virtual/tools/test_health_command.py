@@ -23,6 +23,7 @@ from backend.tools.health import run as health_run
 from backend.tools.health.result import HealthRound, HealthValue
 from backend.tools.health.settings import HealthSettings
 from backend.tools.tool import Run
+from drivers.texts.message import speaking
 from drivers.virtual.firmware.factory import make_device
 from profiles.loader import load_profile
 from tests.virtual.tools.direct import DirectLink
@@ -118,10 +119,9 @@ def test_from_a_measurement_to_a_change(axis: Axis, tmp_path: Path) -> None:
         assert "50.2 Hz" in run("trend", *place)
         (late,) = json.loads(run("trend", *place, "--json", "--since", "2100-01-01"))
         assert not late["runs"]
-    told = CliRunner().invoke(
-        cli.app, ["--language", "zh", "health", "compare", "--config", str(tmp_path)]
-    )
-    assert "联轴器" in told.output
+    with speaking("zh"):
+        told = run("compare", "--config", str(tmp_path), code=3)
+    assert "联轴器" in told
 
 
 def test_what_is_not_there_says_so(axis: Axis, tmp_path: Path) -> None:
