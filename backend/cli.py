@@ -69,6 +69,11 @@ COMMANDS = {
         "tools:friction",
         "Map friction over speed and torque over position, both directions. The axis moves.",
     ),
+    "health": (
+        "health:app",
+        "The condition of an axis: measure, sign a baseline, repeat, compare, trend. "
+        "Measuring moves it.",
+    ),
     "autotune": (
         "tune:autotune",
         "Measure, design and, with --apply or --keep, verify an axis's loop gains. The axis moves.",

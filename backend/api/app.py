@@ -25,6 +25,7 @@ from backend.api.drive import scales as routes_scales
 from backend.api.drive import terminals as routes_io
 from backend.api.errors import NotFound
 from backend.api.handover import routes as routes_handover
+from backend.api.health import routes as routes_health
 from backend.api.library import routes as routes_library
 from backend.api.live.live import LiveHub
 from backend.api.models import Problem
@@ -88,6 +89,7 @@ _PARTS = (
     routes_lists,
     routes_sets,
     routes_handover,
+    routes_health,
     routes_description,
     routes_motion_class,
     routes_recordings,

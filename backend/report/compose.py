@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from backend.report.chapters import chapter
+from backend.report.condition import condition
 from backend.report.document import (
     Block,
     Document,
@@ -44,6 +45,9 @@ def compose(facts: Facts, language: Language) -> Document:
         blocks += chapter(measured, words)
     if facts.handed_over:
         blocks += [Heading(words("handover")), *handed_over(facts.handed_over, words)]
+    if facts.condition is not None and facts.condition.baseline is not None:
+        found = facts.condition
+        blocks += [Heading(words("health")), *condition(found, facts.condition.baseline, words)]
     if facts.notes:
         blocks += [Heading(words("notes")), *(Note(line) for line in facts.notes.splitlines())]
     blocks += [

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 
+from backend.health.records import Condition
 from backend.report.views import AnyView
 
 
@@ -96,5 +97,6 @@ class Facts:
     pending: tuple[str, ...] = ()
     trouble: tuple[str, ...] = ()
     handed_over: tuple[HandedOverFile, ...] = ()
+    condition: Condition | None = None
     #: Whether the drive was asked; a report of files alone knows nothing of its settings.
     live: bool = True

@@ -11,11 +11,14 @@ from backend.audit.chain import ZERO
 from backend.store.audit_tables import AuditEntry, AuditHead
 from backend.store.base import Base
 from backend.store.database import Store
+from backend.store.health_tables import HealthBaseline, HealthRun
 from backend.store.library_tables import Content, Item, Tag, Version
 from drivers.errors import NotAllowed
 
 #: In the order in which they can be filled.
-_TABLES: tuple[type[Base], ...] = (Item, Content, Version, Tag, AuditEntry)
+_TABLES: tuple[type[Base], ...] = (
+    Item, Content, Version, Tag, HealthRun, HealthBaseline, AuditEntry,
+)  # fmt: skip
 _CHUNK = 500
 
 
@@ -55,7 +58,7 @@ def _require_empty(session: Session, shown: str) -> None:
 
 def _set_sequences(session: Session) -> None:
     """Numbers given by hand do not move PostgreSQL's counters."""
-    for table in _tables((Item, Version)):
+    for table in _tables((Item, Version, HealthRun, HealthBaseline)):
         highest = session.scalar(select(func.max(table.c.id))) or 1
         sequence = func.pg_get_serial_sequence(table.name, "id")
         session.execute(select(func.setval(sequence, highest)))

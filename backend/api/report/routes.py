@@ -12,8 +12,10 @@ from backend.api.context import TheBench, TheMember
 from backend.api.disposition import disposition
 from backend.api.errors import NotFound
 from backend.api.handover.routes import handover_log
+from backend.api.health.kept import records_of
 from backend.api.report.models import ReportInfo, ReportRequest
 from backend.api.tuning.measurements import change_log, measurement_head
+from backend.health.records import axis_of
 from backend.library.measurements import BadMeasurement, Head
 from backend.report.gather import (
     About,
@@ -27,6 +29,7 @@ from backend.report.gather import (
 from backend.report.store import Format, ReportStore, render
 from backend.station.bench import Bench
 from backend.station.connected_drive import Member
+from backend.store.database import DatabaseFailed
 from drivers.errors import NotAllowed
 
 router = APIRouter()
@@ -50,6 +53,13 @@ async def make_report(bench: TheBench, member: TheMember, request: ReportRequest
     made = await asyncio.to_thread(handover_log(bench).read, member.drive.id)
     handed = await handed_over_facts(member.drive, made)
     whole = replace(facts, measured=measured, unusable=unusable, handed_over=handed)
+    try:
+        axis = axis_of(member.drive, bench.records.station)
+        condition = await bench.records.store.call(records_of(bench).condition, axis)
+        whole = replace(whole, condition=condition)
+    except DatabaseFailed as error:
+        # All else of the report is in files: it is made without the database, and names that.
+        whole = replace(whole, trouble=(*whole.trouble, error.message))
     data = await asyncio.to_thread(render, whole, request.language, request.format)
     file = await asyncio.to_thread(_store(bench).save, member.drive.name, request.format, data)
     bench.journal.add(f"{member.drive.name}: report {file}", drive=member.drive.id)

@@ -198,6 +198,10 @@ _API: dict[str, Need] = {
     "POST /drives/{drive_id}/handover/compare": Need(Right.LOOK, body_bytes=9 << 20),
     "GET /drives/{drive_id}/handovers": _LOOK,
     "GET /drives/{drive_id}/handovers/{number}/changes": _LOOK,
+    # The condition of axes: measuring is a job of the tool; signing takes over what was measured.
+    "GET /health/trend": _LOOK,
+    "GET /drives/{drive_id}/health": _LOOK,
+    "POST /drives/{drive_id}/health/baseline": _FILES,
     "GET /library": _LOOK,
     "GET /library/tags": _LOOK,
     "GET /library/{entry_id}": _LOOK,

@@ -12,6 +12,7 @@ from fastapi import APIRouter
 
 from backend.api import convert
 from backend.api.context import Controlled, TheBench, TheMember
+from backend.api.health.kept import keep_health
 from backend.api.models import JobInfo
 from backend.api.report import routes as routes_report
 from backend.api.tuning import design as routes_design
@@ -34,6 +35,7 @@ from backend.station.connected_drive import Member
 from backend.station.measuring import EXCHANGE_ENDS_S, exchange_for
 from backend.tools.autotune import run as autotune
 from backend.tools.autotune.apply import take_back
+from backend.tools.health.settings import HealthSettings
 from backend.tools.registry import TOOLS
 from backend.tools.step import run as step_response
 from backend.tools.sweep import evaluation as sweep_evaluation
@@ -73,6 +75,8 @@ async def _start(
             async with profile_speed.prepared(member.axis, session, limits, request.consent):
                 result = await tool(session, progress, keep)
             await asyncio.to_thread(_conclude, bench.measurements, files, result)
+            if isinstance(request, HealthSettings):
+                await keep_health(bench, member.drive, request, result, files)
         finally:
             await shielded(exchange.end, EXCHANGE_ENDS_S, member.drive.name)
         return result | {"measurements": files}
@@ -110,6 +114,9 @@ def _conclude(store: MeasurementStore, files: Sequence[str], result: JobResult) 
     Of several files of a kind (designs that were taken back) the last one made the result.
     """
     kinds = {store.head(file).kind: file for file in files}
+    if result.get("tool") == "health":
+        # What was concluded from its parts is not the conclusion of the whole.
+        kinds = {kind: file for kind, file in kinds.items() if kind == "health"}
     for kind, file in kinds.items():
         part: object = result
         for name in _PARTS.get(kind, ()) if "candidates" in result else ():

@@ -1,7 +1,7 @@
-import type { FrictionResult, InertiaAnswer, JobInfo } from './schema'
+import type { FrictionResult, HealthResult, InertiaAnswer, JobInfo } from './schema'
 
 /** What a tool concluded: told apart by its field `tool`. */
-type ToolOutcome = FrictionResult | InertiaAnswer
+type ToolOutcome = FrictionResult | HealthResult | InertiaAnswer
 
 const outcome = (result: unknown): ToolOutcome | null =>
   typeof result === 'object' && result !== null && 'tool' in result ? (result as ToolOutcome) : null

@@ -710,6 +710,48 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/health": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Read Health
+         * @description Baseline, comparison and rounds of one axis.
+         */
+        get: operations["read_health"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/health/baseline": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Sign Baseline
+         * @description Sign rounds as the baseline of the axis. The one before is kept, and counts no longer.
+         *
+         *     Who is logged in signs by that name; ``person`` counts where the page is used without accounts.
+         */
+        post: operations["sign_baseline"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/homing-methods": {
         parameters: {
             query?: never;
@@ -874,6 +916,26 @@ export interface paths {
          * @description Play a test signal in a cyclic mode, one value per cycle.
          */
         post: operations["start_generator"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/jobs/health": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Health
+         * @description Measure what the condition of an axis is followed by: resonances, friction, inertia. The axis moves.
+         */
+        post: operations["start_health"];
         delete?: never;
         options?: never;
         head?: never;
@@ -1767,6 +1829,26 @@ export interface paths {
          * @description Whether the server is alive.
          */
         get: operations["health"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/health/trend": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Health Trend
+         * @description Every axis of the database with its rounds and its comparison, of all stations of it.
+         */
+        get: operations["health_trend"];
         put?: never;
         post?: never;
         delete?: never;
@@ -3254,6 +3336,36 @@ export interface components {
             travel_limit: number;
         };
         /**
+         * AxisHealth
+         * @description One axis. ``changed`` counts findings that are changes, ``suspected`` those to be repeated.
+         *
+         *     ``other_settings`` counts rounds after the baseline that were measured otherwise.
+         */
+        AxisHealth: {
+            /** Axis */
+            axis: string;
+            baseline: components["schemas"]["HealthBaselineInfo"] | null;
+            /** Changed */
+            changed: number;
+            /** Findings */
+            findings: components["schemas"]["HealthFinding"][];
+            /** Key */
+            key: string;
+            /** Other Settings */
+            other_settings: number;
+            /** Profile */
+            profile: string;
+            /**
+             * Runs
+             * @description oldest first
+             */
+            runs: components["schemas"]["HealthRunInfo"][];
+            /** Serial */
+            serial: number | null;
+            /** Suspected */
+            suspected: number;
+        };
+        /**
          * AxisInfo
          * @description The drive that something was made with.
          */
@@ -3416,6 +3528,24 @@ export interface components {
              * @enum {string}
              */
             verdict: "stopped" | "coasting" | "still_moving" | "unreachable";
+        };
+        /**
+         * BaselineRequest
+         * @description Which rounds are the baseline, and who signs where nobody is logged in by name.
+         */
+        BaselineRequest: {
+            /**
+             * Notes
+             * @default
+             */
+            notes: string;
+            /**
+             * Person
+             * @default
+             */
+            person: string;
+            /** Runs */
+            runs: number[];
         };
         /**
          * BrakeTiming
@@ -5231,6 +5361,261 @@ export interface components {
             version: string;
         };
         /**
+         * HealthBaselineInfo
+         * @description A signed baseline. ``intact``: its contents still have the checksum of the signing.
+         */
+        HealthBaselineInfo: {
+            /** Id */
+            id: number;
+            /** Intact */
+            intact: boolean;
+            /** Measurements */
+            measurements: string[];
+            /** Notes */
+            notes: string;
+            /** Person */
+            person: string;
+            /** Runs */
+            runs: number[];
+            /** Settings */
+            settings: {
+                [key: string]: unknown;
+            };
+            /** Sha256 */
+            sha256: string;
+            /**
+             * Signed
+             * Format: date-time
+             */
+            signed: string;
+        };
+        /**
+         * HealthFinding
+         * @description One quantity against the baseline; changes are shares (0.1 is 10 % more).
+         *
+         *     ``low`` to ``high`` hold the true change but for the level of the whole comparison (99 %).
+         */
+        HealthFinding: {
+            /** Before */
+            before: number | null;
+            /** Change */
+            change: number | null;
+            /**
+             * Code
+             * @enum {string}
+             */
+            code: "changed" | "suspected" | "same" | "undecided" | "not_seen" | "few_runs" | "no_check";
+            /**
+             * Direction
+             * @enum {string}
+             */
+            direction: "" | "higher" | "lower";
+            /** High */
+            high: number | null;
+            /**
+             * Looked For
+             * @description share that must be found; null: not judged
+             */
+            looked_for: number | null;
+            /** Low */
+            low: number | null;
+            message: components["schemas"]["MessageInfo"];
+            next_step: components["schemas"]["MessageInfo"] | null;
+            /** Now */
+            now: number | null;
+            /** Number */
+            number: number;
+            /**
+             * Quantity
+             * @enum {string}
+             */
+            quantity: "resonance" | "antiresonance" | "friction" | "inertia" | "step_rise" | "step_overshoot";
+            /** Unit */
+            unit: string;
+        };
+        /**
+         * HealthResult
+         * @description Rounds in the order in which they were measured.
+         */
+        HealthResult: {
+            /**
+             * Measurements
+             * @description names of the stored raw data
+             * @default []
+             */
+            measurements: string[];
+            /**
+             * Rounds
+             * @default []
+             */
+            rounds: components["schemas"]["HealthRound"][];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            tool: "health";
+        };
+        /**
+         * HealthRound
+         * @description All quantities of one round. ``missing``: measured, but without an answer.
+         */
+        HealthRound: {
+            /**
+             * Missing
+             * @default []
+             */
+            missing: ("resonance" | "antiresonance" | "friction" | "inertia" | "step_rise" | "step_overshoot")[];
+            /** Values */
+            values: components["schemas"]["HealthValue"][];
+        };
+        /**
+         * HealthRunInfo
+         * @description One round of a health check.
+         */
+        HealthRunInfo: {
+            /**
+             * Comparable
+             * @description measured with the settings of the baseline
+             */
+            comparable: boolean;
+            /** Id */
+            id: number;
+            /** Measurements */
+            measurements: string[];
+            /** Missing */
+            missing: ("resonance" | "antiresonance" | "friction" | "inertia" | "step_rise" | "step_overshoot")[];
+            /** Person */
+            person: string;
+            /** Station */
+            station: string;
+            /**
+             * Taken
+             * Format: date-time
+             */
+            taken: string;
+            /** Values */
+            values: components["schemas"]["HealthValue"][];
+        };
+        /**
+         * HealthSettings
+         * @description One envelope for all measurements; two results compare only with equal settings.
+         *
+         *     The time limit is that of each measurement.
+         */
+        HealthSettings: {
+            /**
+             * Consent
+             * @description the user agreed that nothing in the drive ends a speed when this computer falls silent; needed where the drive has no watchdog (DS_C)
+             * @default false
+             */
+            consent: boolean;
+            /**
+             * Cycle Ms
+             * @description cycle of the exchange that is started where none runs, and ended afterwards
+             * @default 1
+             */
+            cycle_ms: number;
+            /**
+             * Friction
+             * @description measure friction over speed
+             * @default true
+             */
+            friction: boolean;
+            /**
+             * Inertia
+             * @description measure the inertia
+             * @default true
+             */
+            inertia: boolean;
+            /**
+             * Lowest Hz
+             * @description lowest frequency, in Hz
+             * @default 5
+             */
+            lowest_hz: number;
+            /**
+             * Rated Torque Nm
+             * @description overrides what the drive says
+             */
+            rated_torque_nm?: number | null;
+            /**
+             * Response
+             * @description measure the frequency response
+             * @default true
+             */
+            response: boolean;
+            /**
+             * Rounds
+             * @description how often everything is measured
+             * @default 2
+             */
+            rounds: number;
+            /**
+             * Slowest Rpm
+             * @description lowest speed of it, in rpm
+             * @default 30
+             */
+            slowest_rpm: number;
+            /**
+             * Speed Limit
+             * @description highest speed, in rpm
+             */
+            speed_limit: number;
+            /**
+             * Speeds
+             * @description speeds of the friction map
+             * @default 4
+             */
+            speeds: number;
+            /**
+             * Step Rpm
+             * @description step of speed in rpm; 0: none
+             * @default 0
+             */
+            step_rpm: number;
+            /**
+             * Time Limit S
+             * @description longest time of a motion, in s
+             * @default 60
+             */
+            time_limit_s: number;
+            /**
+             * Torque Limit
+             * @description highest torque, in % of rated
+             */
+            torque_limit: number;
+            /**
+             * Travel Limit
+             * @description longest way from the start, in revolutions
+             */
+            travel_limit: number;
+        };
+        /**
+         * HealthValue
+         * @description One quantity of one round; ``low`` and ``high`` are its 95 % interval where one is known.
+         *
+         *     ``number`` counts quantities of a name from 1, by rising frequency. Friction is in % of rated
+         *     torque, half the difference of both directions, as the mean over the speeds.
+         */
+        HealthValue: {
+            /** High */
+            high?: number | null;
+            /** Low */
+            low?: number | null;
+            /**
+             * Number
+             * @default 1
+             */
+            number: number;
+            /**
+             * Quantity
+             * @enum {string}
+             */
+            quantity: "resonance" | "antiresonance" | "friction" | "inertia" | "step_rise" | "step_overshoot";
+            /** Value */
+            value: number;
+        };
+        /**
          * Hello
          * @description First message on every connection.
          */
@@ -5693,7 +6078,7 @@ export interface components {
              * Result
              * @description of a tool: its result, which its field tool names
              */
-            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"]) | {
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["HealthResult"]) | {
                 [key: string]: unknown;
             } | null;
             /**
@@ -9506,10 +9891,12 @@ export type AuditPage = components['schemas']['AuditPage'];
 export type AuditStatus = components['schemas']['AuditStatus'];
 export type AuditVerdict = components['schemas']['AuditVerdict'];
 export type AutotuneRequest = components['schemas']['AutotuneRequest'];
+export type AxisHealth = components['schemas']['AxisHealth'];
 export type AxisInfo = components['schemas']['AxisInfo'];
 export type AxisRecordInfo = components['schemas']['AxisRecordInfo'];
 export type AxisState = components['schemas']['AxisState'];
 export type AxisStopInfo = components['schemas']['AxisStopInfo'];
+export type BaselineRequest = components['schemas']['BaselineRequest'];
 export type BrakeTiming = components['schemas']['BrakeTiming'];
 export type BrakingInfo = components['schemas']['BrakingInfo'];
 export type BrakingRequest = components['schemas']['BrakingRequest'];
@@ -9583,6 +9970,13 @@ export type HandoverRequest = components['schemas']['HandoverRequest'];
 export type HandoverResult = components['schemas']['HandoverResult'];
 export type Harmonic = components['schemas']['Harmonic'];
 export type Health = components['schemas']['Health'];
+export type HealthBaselineInfo = components['schemas']['HealthBaselineInfo'];
+export type HealthFinding = components['schemas']['HealthFinding'];
+export type HealthResult = components['schemas']['HealthResult'];
+export type HealthRound = components['schemas']['HealthRound'];
+export type HealthRunInfo = components['schemas']['HealthRunInfo'];
+export type HealthSettings = components['schemas']['HealthSettings'];
+export type HealthValue = components['schemas']['HealthValue'];
 export type Hello = components['schemas']['Hello'];
 export type HistorySlot = components['schemas']['HistorySlot'];
 export type HomeRequest = components['schemas']['HomeRequest'];
@@ -15818,6 +16212,288 @@ export interface operations {
             };
         };
     };
+    read_health: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AxisHealth"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    sign_baseline: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["BaselineRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AxisHealth"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     homing_methods: {
         parameters: {
             query?: never;
@@ -17120,6 +17796,149 @@ export interface operations {
         requestBody: {
             content: {
                 "application/json": components["schemas"]["GenerateRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_health: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["HealthSettings"];
             };
         };
         responses: {
@@ -23932,6 +24751,148 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Health"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    health_trend: {
+        parameters: {
+            query?: {
+                /** @description earliest round that is shown */
+                since?: string | null;
+                /** @description name; all without it */
+                axis?: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AxisHealth"][];
                 };
             };
             /** @description Not a request of this interface */

@@ -4,6 +4,7 @@ import { drive } from './texts/drive'
 import { frame } from './texts/frame'
 import { functions } from './texts/functions'
 import { handover } from './texts/handover'
+import { health } from './texts/health'
 import { library } from './texts/library'
 import { notListed } from './texts/notlisted'
 import { motionClass } from './texts/motion-class'
@@ -30,6 +31,7 @@ export const catalogue = {
   ...drive,
   ...functions,
   ...handover,
+  ...health,
   ...motionClass,
   ...parameters,
   ...people,

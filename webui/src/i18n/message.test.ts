@@ -82,6 +82,8 @@ describe('a number', () => {
     [12.3456, '.3g', '12.3'],
     [5, '02d', '05'],
     [2.5, '', '2.5'],
+    [16.27, '+.1f', '+16.3'],
+    [-16.27, '+.1f', '-16.3'],
   ] as const)('%d in the format %s is %s', (value, format, text) => {
     expect(formatted(value, format)).toBe(text)
   })

@@ -40,6 +40,10 @@ class Plain extends FluentType<number> {
 
 /** A number in a format of Python's `format`, as far as the catalogue uses it. */
 export function formatted(value: number, format: string): string {
+  if (format.startsWith('+')) {
+    const text = formatted(value, format.slice(1))
+    return text.startsWith('-') ? text : `+${text}`
+  }
   const parts = /^(#?)(0?)(\d*)(?:\.(\d+))?([dfgeXx%]?)$/.exec(format)
   if (!parts) return String(value)
   const [, prefix = '', zero = '', width = '', digits, kind = ''] = parts

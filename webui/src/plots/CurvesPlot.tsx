@@ -23,26 +23,29 @@ export function CurvesPlot({
   yLabel,
   label,
   dark,
+  dates = false,
 }: {
   curves: PlottedCurve[]
   xLabel: string
   yLabel: string
   label: string
   dark: boolean
+  /** The common quantity is a moment, in seconds since the epoch. */
+  dates?: boolean
 }) {
   const box = useRef<HTMLDivElement>(null)
   useEffect(() => {
     const element = box.current
     if (!element) return
     const size = () => ({ width: Math.max(200, element.clientWidth), height: 260 })
-    const plot = new uPlot(options(curves, xLabel, yLabel, size()), data(curves), element)
+    const plot = new uPlot(options(curves, xLabel, yLabel, size(), dates), data(curves), element)
     const observer = new ResizeObserver(() => plot.setSize(size()))
     observer.observe(element)
     return () => {
       observer.disconnect()
       plot.destroy()
     }
-  }, [curves, xLabel, yLabel, dark])
+  }, [curves, xLabel, yLabel, dark, dates])
   return <div ref={box} className="lines-plot" role="img" aria-label={label} />
 }
 
@@ -60,6 +63,7 @@ function options(
   xLabel: string,
   yLabel: string,
   size: { width: number; height: number },
+  dates: boolean,
 ): uPlot.Options {
   const axis = {
     ...axisLook(),
@@ -86,9 +90,9 @@ function options(
     ...size,
     legend: { show: true },
     cursor: { drag: { x: false, y: false, setScale: false } },
-    scales: { x: { time: false } },
+    scales: { x: { time: dates } },
     axes: [
-      { ...axis, label: xLabel, size: 34 },
+      { ...(dates ? axisLook() : axis), label: xLabel, size: 34 },
       { ...axis, label: yLabel, size: 62 },
     ],
     series,

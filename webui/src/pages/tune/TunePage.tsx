@@ -17,6 +17,7 @@ import { AutotunePanel } from './AutotunePanel'
 import { CandidatesPanel } from './CandidatesPanel'
 import { FrictionPanel } from './FrictionPanel'
 import { GainsPanel } from './GainsPanel'
+import { HealthPanel } from './HealthPanel'
 import { InertiaPanel } from './InertiaPanel'
 import { type Known, later, tunedAt } from './path'
 import { PathNav } from './PathNav'
@@ -152,6 +153,14 @@ export function TunePage({ drive }: { drive: string }) {
           )}
           {possible && (
             <FrictionPanel
+              drive={drive}
+              limits={limits.agreed ? limits.limits : null}
+              obstacle={obstacle}
+              cycleMs={cycleMs}
+            />
+          )}
+          {possible && (
+            <HealthPanel
               drive={drive}
               limits={limits.agreed ? limits.limits : null}
               obstacle={obstacle}

@@ -1,0 +1,1 @@
+"""Routes of the axes' condition: baselines, comparison, trend."""

@@ -1,0 +1,39 @@
+"""What a health check measured, from its job into the database."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+
+from backend.drive.drive import Drive
+from backend.health.records import HealthRecords, axis_of
+from backend.people.identity import acting_person
+from backend.station.bench import Bench
+from backend.tools.health.result import HealthResult
+from backend.tools.health.settings import HealthSettings
+from backend.work.jobs import JobResult
+
+
+def records_of(bench: Bench) -> HealthRecords:
+    """The condition of axes in the database of this station."""
+    return HealthRecords(bench.records.store, bench.records.station)
+
+
+async def keep_health(
+    bench: Bench, drive: Drive, settings: HealthSettings, result: JobResult, files: Sequence[str]
+) -> None:
+    """Store the rounds of a health check with the SHA-256 of its raw data.
+
+    Raises:
+        DatabaseFailed: they are not stored; the raw data are.
+    """
+    found = HealthResult.model_validate(result)
+    axis = axis_of(drive, bench.records.station)
+
+    def store() -> None:
+        digests = {
+            name: hashlib.sha256(bench.measurements.read(name)).hexdigest() for name in files
+        }
+        records_of(bench).add(axis, settings, found.rounds, digests, acting_person())
+
+    await bench.records.store.call(store)

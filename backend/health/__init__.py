@@ -1,0 +1,1 @@
+"""The condition of axes over years: signed baselines, health checks, their comparison and trend."""

@@ -1,0 +1,56 @@
+"""Tables of the axes' condition: what health checks measured, and the baselines that were signed.
+
+An axis is named by ``axis_key``: by vendor, product and serial number where the drive reports
+them, so that it stays the same axis on another station; else by station and place on the bench.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from sqlalchemy import JSON, BigInteger, Index, Integer, String, Text
+from sqlalchemy.orm import Mapped, mapped_column
+
+from backend.store.base import Base, UtcDateTime
+
+
+class HealthRun(Base):
+    """One round of a health check. Never changed once written."""
+
+    __tablename__ = "health_run"
+    __table_args__ = (Index("ix_health_run_axis_key_taken", "axis_key", "taken"),)
+
+    id: Mapped[int] = mapped_column(Integer, primary_key=True)
+    station: Mapped[str] = mapped_column(String(100))
+    axis_key: Mapped[str] = mapped_column(String(200))
+    axis: Mapped[str] = mapped_column(String(200))
+    profile: Mapped[str] = mapped_column(String(100))
+    vendor_id: Mapped[int | None] = mapped_column(BigInteger)
+    product_code: Mapped[int | None] = mapped_column(BigInteger)
+    revision: Mapped[int | None] = mapped_column(BigInteger)
+    serial: Mapped[int | None] = mapped_column(BigInteger)
+    firmware: Mapped[str] = mapped_column(String(100), default="")
+    taken: Mapped[datetime] = mapped_column(UtcDateTime)
+    person: Mapped[str] = mapped_column(String(200), default="")
+    settings: Mapped[dict[str, object]] = mapped_column(JSON)
+    settings_sha256: Mapped[str] = mapped_column(String(64))
+    """Of the settings on which values depend: only runs of the same ones are compared."""
+    measurements: Mapped[dict[str, str]] = mapped_column(JSON)
+    """Names of the stored raw data, with their SHA-256."""
+    round: Mapped[str] = mapped_column(Text)
+    """`backend.tools.health.result.HealthRound` as JSON. Text: thousands are read for one page, and
+    the model's own parser takes a tenth of the time."""
+
+
+class HealthBaseline(Base):
+    """A baseline as it was signed: a copy of its runs, with a checksum over all of it."""
+
+    __tablename__ = "health_baseline"
+
+    id: Mapped[int] = mapped_column(Integer, primary_key=True)
+    axis_key: Mapped[str] = mapped_column(String(200), index=True)
+    signed: Mapped[datetime] = mapped_column(UtcDateTime)
+    person: Mapped[str] = mapped_column(String(200))
+    notes: Mapped[str] = mapped_column(Text, default="")
+    content: Mapped[dict[str, object]] = mapped_column(JSON)
+    sha256: Mapped[str] = mapped_column(String(64))

@@ -1,0 +1,1 @@
+"""The measurements of an axis by which its condition is followed, one after another in rounds."""

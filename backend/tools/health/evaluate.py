@@ -1,0 +1,114 @@
+"""From results of the measurements to quantities, and to arrays that are stored. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.analysis.mechanics.resonance import Resonance
+from backend.tools.friction.result import FrictionPoint
+from backend.tools.health.result import (
+    QUANTITIES,
+    HealthResult,
+    HealthRound,
+    HealthValue,
+    Quantity,
+)
+from backend.tools.tool import Arrays, Meta
+
+#: So many of a kind are followed, the lowest ones: they are the stiffness of the drive train.
+_FOLLOWED = 3
+#: Speeds of both directions belong together within this share.
+_SAME_SPEED = 0.03
+
+
+def resonances(found: Iterable[Resonance]) -> list[HealthValue]:
+    """The lowest resonances and antiresonances, each kind by rising frequency."""
+    values: list[HealthValue] = []
+    kinds: tuple[Quantity, ...] = ("resonance", "antiresonance")
+    rows = sorted(found, key=lambda row: row.frequency_hz)
+    for kind in kinds:
+        own = [row for row in rows if row.kind == kind][:_FOLLOWED]
+        for number, row in enumerate(own, 1):
+            low, high = row.frequency_ci95_hz or (None, None)
+            values.append(
+                HealthValue(
+                    quantity=kind, number=number, value=row.frequency_hz, low=low, high=high
+                )
+            )
+    return values
+
+
+def friction(points: Sequence[FrictionPoint]) -> HealthValue | None:
+    """Mean friction over the speeds measured in both directions, in % of rated torque.
+
+    Half the difference of both directions has no share of the load's pull. None without a pair.
+    """
+    halves, variances = [], []
+    for ahead in (each for each in points if each.speed_rpm > 0):
+        back = min(
+            (each for each in points if each.speed_rpm < 0),
+            key=lambda each: abs(each.speed_rpm + ahead.speed_rpm), default=None,
+        )  # fmt: skip
+        if back is None or abs(back.speed_rpm / ahead.speed_rpm + 1.0) > _SAME_SPEED:
+            continue
+        halves.append(0.5 * (ahead.torque_percent - back.torque_percent))
+        deviations = [
+            (each.torque_ci95_percent[1] - each.torque_ci95_percent[0]) / (2 * 1.96)
+            for each in (ahead, back)
+        ]
+        variances.append(0.25 * sum(d**2 for d in deviations))
+    if not halves:
+        return None
+    mean = sum(halves) / len(halves)
+    half_width = 1.96 * math.sqrt(sum(variances)) / len(halves)
+    return HealthValue(
+        quantity="friction", value=mean, low=mean - half_width, high=mean + half_width
+    )
+
+
+def arrays_of(rounds: Sequence[HealthRound]) -> dict[str, npt.NDArray[np.generic]]:
+    """For storage: one row for each value; a missing quantity is a row without a value."""
+    rows = [
+        (index, QUANTITIES.index(each.quantity), each.number, each.value, each.low, each.high)
+        for index, one in enumerate(rounds) for each in one.values
+    ] + [
+        (index, QUANTITIES.index(name), 0, math.nan, None, None)
+        for index, one in enumerate(rounds) for name in one.missing
+    ]  # fmt: skip
+    table = np.array(
+        [[math.nan if cell is None else cell for cell in row] for row in rows], np.float64
+    ).reshape(-1, 6)
+    return {"rows": table, "rounds": np.array([len(rounds)], np.int64)}
+
+
+def reevaluate(arrays: Arrays, meta: Meta) -> HealthResult:
+    """The result again from what was stored.
+
+    Raises:
+        ValueError: the arrays are not of a health check.
+    """
+    if meta.get("tool") != "health" or "rows" not in arrays:
+        raise ValueError("no health check")
+    values: list[list[HealthValue]] = [[] for _ in range(int(arrays["rounds"][0]))]
+    missing: list[list[Quantity]] = [[] for _ in values]
+    for row in np.asarray(arrays["rows"], np.float64):
+        index, quantity, number = int(row[0]), QUANTITIES[int(row[1])], int(row[2])
+        if number == 0:
+            missing[index].append(quantity)
+            continue
+        value, low, high = (None if math.isnan(cell) else float(cell) for cell in row[3:])
+        if value is None:
+            raise ValueError("a quantity without a value")
+        values[index].append(
+            HealthValue(quantity=quantity, number=number, value=value, low=low, high=high)
+        )
+    return HealthResult(
+        rounds=tuple(
+            HealthRound(values=tuple(own), missing=tuple(gone))
+            for own, gone in zip(values, missing, strict=True)
+        )
+    )

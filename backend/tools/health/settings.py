@@ -1,0 +1,29 @@
+"""Which measurements a health check makes, and how often."""
+
+from __future__ import annotations
+
+from pydantic import Field, model_validator
+
+from backend.tools.tool import ToolSettings
+
+
+class HealthSettings(ToolSettings):
+    """One envelope for all measurements; two results compare only with equal settings.
+
+    The time limit is that of each measurement.
+    """
+
+    rounds: int = Field(default=2, ge=1, le=10, description="how often everything is measured")
+    response: bool = Field(default=True, description="measure the frequency response")
+    friction: bool = Field(default=True, description="measure friction over speed")
+    inertia: bool = Field(default=True, description="measure the inertia")
+    step_rpm: float = Field(default=0.0, ge=0, description="step of speed in rpm; 0: none")
+    lowest_hz: float = Field(default=5.0, gt=0, description="lowest frequency, in Hz")
+    speeds: int = Field(default=4, ge=3, le=24, description="speeds of the friction map")
+    slowest_rpm: float = Field(default=30.0, gt=0, description="lowest speed of it, in rpm")
+
+    @model_validator(mode="after")
+    def _something(self) -> HealthSettings:
+        if not (self.response or self.friction or self.inertia or self.step_rpm):
+            raise ValueError("choose at least one measurement")
+        return self
