@@ -69,6 +69,10 @@ COMMANDS = {
         "tools:friction",
         "Map friction over speed and torque over position, both directions. The axis moves.",
     ),
+    "brake-test": (
+        "tools:brake_test",
+        "Torque against the closed holding brake, both directions. The axis is energised.",
+    ),
     "autotune": (
         "tune:autotune",
         "Measure, design and, with --apply or --keep, verify an axis's loop gains. The axis moves.",

@@ -9,7 +9,10 @@ from typing import Annotated, TypeAlias
 
 from pydantic import Field
 
+from backend.tools.brake.result import BrakeResult
 from backend.tools.friction.result import FrictionResult
 from backend.tools.inertia.result import InertiaAnswer
 
-ToolOutcome: TypeAlias = Annotated[FrictionResult | InertiaAnswer, Field(discriminator="tool")]
+ToolOutcome: TypeAlias = Annotated[
+    FrictionResult | InertiaAnswer | BrakeResult, Field(discriminator="tool")
+]
