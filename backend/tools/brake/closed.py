@@ -97,5 +97,3 @@ async def _forced(drive: Drive, name: str) -> bool:
                 if await drive.raw(place.key) >> place.bits[name] & 1:
                     return True
     return False
-
-

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession, channel
+from backend.axis.cyclic import channel
 from backend.scales.units import AxisUnits
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts, si
 from backend.tools.brake.closed import forcing_keys, kept_closed, obstacle_of
@@ -37,6 +37,7 @@ from backend.tools.measuring.recording import (
     share,
     takes_torque,
 )
+from backend.tools.measuring.temporary import stopping_hard
 from backend.tools.tool import Run, Tool
 from drivers import link as bus
 from drivers.cia402 import Mode
@@ -117,7 +118,7 @@ async def run(run: Run, settings: BrakeSettings) -> BrakeResult:
     await quiet(axis)
     means: Means = "supply" if settings.brake_supply_cut else "output"
     trials: list[Trial] = []
-    async with _closed(axis, settings):
+    async with _closed(axis, settings), stopping_hard(axis, settings.speed_limit):
         for number, direction in enumerate(_DIRECTIONS):
             trial = await _trial(run, settings, facts, units, direction, percent, number)
             trials.append(trial)
@@ -202,32 +203,62 @@ async def _trial(
     run: Run, settings: BrakeSettings, facts: AxisFacts, units: AxisUnits,
     direction: Literal[1, -1], percent: float, number: int,
 ) -> Trial:  # fmt: skip
+    """One direction: a preload, which shows whether the brake is closed at all, then the ramp.
+
+    Beyond a limit the preload ends by a quick stop, as an open brake holds nothing. Later the
+    torque only becomes zero.
+    """
     axis, session = run.axis, run.session
     rate = 1.0 / cycle_s(session)
     lead_s = _LEAD_S + await _opens_s(axis)
     values, phases = sequence(direction * percent, settings.ramp_s, lead_s, rate)
     raw = np.array([units.torque_raw(value) for value in values], np.int64)
+    begins = int(np.flatnonzero(phases == Phase.RAMP)[0])
     step = text("brake.forwards") if direction > 0 else text("brake.backwards")
-    progress = share(run.progress, 0.05 + 0.45 * number, 0.5 + 0.45 * number, step)
-    drive = axis.drive
+    parts: list[Trial] = []
+    async with enabled(axis, session, Mode.CST) as start:
+        limits = await bus_limits(axis, settings.envelope, start)
+        for part, closed in ((slice(0, begins), False), (slice(begins, None), True)):
+            low = 0.05 + 0.45 * number + (0.2 if closed else 0.0)
+            done = share(run.progress, low, low + 0.22, step)
+            bounds = replace(limits, brake_closed=closed)
+            catch, halted = await _played(run, facts, raw[part], bounds, done)
+            parts.append(_placed(catch, raw[part], phases[part], units, facts, direction, halted))
+            if halted:
+                break
+    return _joined(parts)
+
+
+async def _played(
+    run: Run, facts: AxisFacts, raw: npt.NDArray[np.int64], limits: bus.Envelope,
+    progress: Callable[[float], None],
+) -> tuple[_Catch, bool]:  # fmt: skip
+    """What the bus saw, and whether a limit of travel or speed ended it."""
+    axis, session, drive = run.axis, run.session, run.axis.drive
     keys = [drive.require(role) for role in ("position_actual", "torque_actual", "torque_target")]
     first, second, third = (channel(drive, key) for key in keys)
     catch, halted = _Catch((first, second, third)), False
-    async with enabled(axis, session, Mode.CST) as start:
-        limits = await bus_limits(axis, settings.envelope, start)
-        unsubscribe = session.cyclic.blocks(catch.blocks.append)
-        try:
-            await play(
-                axis, session, Play(Mode.CST, raw), limits, facts.rated_torque_nm, progress
-            )  # fmt: skip
-        except EnvelopeExceeded as error:
-            if error.halt.cause not in (HaltCause.POSITION, HaltCause.SPEED):
-                raise
-            halted = True
-            await asyncio.sleep(_AFTER_HALT_S)
-        finally:
-            unsubscribe()
-    return _placed(catch, raw, phases, units, facts, direction, halted=halted)
+    unsubscribe = session.cyclic.blocks(catch.blocks.append)
+    try:
+        await play(axis, session, Play(Mode.CST, raw), limits, facts.rated_torque_nm, progress)
+    except EnvelopeExceeded as error:
+        if error.halt.cause not in (HaltCause.POSITION, HaltCause.SPEED):
+            raise
+        halted = True
+        await asyncio.sleep(_AFTER_HALT_S)
+    finally:
+        unsubscribe()
+    return catch, halted
+
+
+def _joined(parts: Sequence[Trial]) -> Trial:
+    def of(name: str) -> Any:
+        return np.concatenate([getattr(each, name) for each in parts])
+
+    return Trial(
+        direction=parts[0].direction, position_rad=of("position_rad"), torque_nm=of("torque_nm"),
+        sent_nm=of("sent_nm"), phase=of("phase"), valid=of("valid"), halted=parts[-1].halted,
+    )  # fmt: skip
 
 
 async def _opens_s(axis: Axis) -> float:
@@ -243,15 +274,15 @@ async def _opens_s(axis: Axis) -> float:
 
 def _placed(
     catch: _Catch, raw: npt.NDArray[np.int64], phases: npt.NDArray[np.int64], units: AxisUnits,
-    facts: AxisFacts, direction: Literal[1, -1], *, halted: bool,
+    facts: AxisFacts, direction: Literal[1, -1], halted: bool,
 ) -> Trial:  # fmt: skip
     """Each sample with the part of the sequence that its cycle belongs to.
 
-    The first torque that came back tells where the sequence began.
+    The first set-point that came back and is not the one before the motion tells where it began.
     """
     cycles, values, valid = catch.rows()
-    went = np.flatnonzero(values[:, 2] != 0)
-    begun = int(cycles[went[0]] if went.size else cycles[0]) - int(np.flatnonzero(raw)[0])
+    went = np.flatnonzero(valid & (values[:, 2] != raw[0]))
+    begun = int(cycles[went[0]] if went.size else cycles[0]) - int(np.argmax(raw != raw[0]))
     row = cycles - begun
     inside = (row >= 0) & (row < len(raw) + (0 if not halted else len(raw)))
     row, values, valid = row[inside], values[inside], valid[inside]

@@ -51,6 +51,7 @@ TEXTS: dict[str, tuple[str, str]] = {
         "held, and never after one that slipped.",
         "3. 在下方声明轴上的悬挂情况，然后启动。制动器保持后方可撤去支撑；打滑后切勿撤去。",
     ),
+    "state_first": ("State first what hangs at the axis.", "请先声明轴上的悬挂情况。"),
     "start": ("Test the brake", "测试制动器"),
     "field.test_percent": ("Test torque (% of rated)", "测试转矩（额定的 %）"),
     "field.test_torque_nm": ("Test torque (N·m), instead", "测试转矩 (N·m)，替代百分比"),
@@ -81,7 +82,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     "verdict.not_closed": (
         "The brake is not closed, or holds less than {value} % of the motor's rated torque. "
         "Secure the load; then look at the brake's wiring and at its output.",
-        "制动器未闭合，或保持转矩低于电机额定转矩的 {value} %。请固定负载，然后检查制动器接线及其输出。",
+        "制动器未闭合，或保持转矩低于电机额定转矩的 {value} %。请固定负载，"
+        "然后检查制动器接线及其输出。",
     ),
     "verdict.cannot_be_tested": ("The brake cannot be tested.", "无法测试制动器。"),
     "obstacle.means_unknown": (
@@ -103,7 +105,8 @@ TEXTS: dict[str, tuple[str, str]] = {
         "Process data rule the brake (60FEh), or the drive by itself: the manual's excerpt does "
         "not say which output, nor how to change its function. Disconnect the brake's supply, "
         "state that, and start again.",
-        "制动器由过程数据 (60FEh) 或驱动器自身控制：手册节选未说明是哪个输出，也未说明如何更改其功能。"
+        "制动器由过程数据 (60FEh) 或驱动器自身控制：手册节选未说明是哪个输出，"
+        "也未说明如何更改其功能。"
         "请断开制动器电源并声明，然后重新开始。",
     ),
     "obstacle.no_output": (

@@ -46,7 +46,7 @@ def braked(
     return spec.model_copy(update={"motor": motor})
 
 
-async def tested(
+async def brake_of(
     axis: Axis, session: CyclicSession, asked: BrakeSettings = ASKED,
     kept: dict[str, object] | None = None,
 ) -> BrakeResult:  # fmt: skip
@@ -68,7 +68,7 @@ async def on(
     async with direct(spec, drive=drive, settings=settings) as bench:
         mode = bench.axis.drive.require("mode")
         before = await settings_of(bench.axis.drive, mode)
-        found = await tested(bench.axis, bench.session, asked)
+        found = await brake_of(bench.axis, bench.session, asked)
         assert await settings_of(bench.axis.drive, mode) == before
         assert await bench.axis.state() is not State.OPERATION_ENABLED
         return found, bench
@@ -131,7 +131,7 @@ async def test_the_shaft_itself_after_the_limit_was_passed() -> None:
             seen.append((now_ns / 1e6, turned, float(core.s[k.S_TORQUE])))
 
         bench.link.device.advance = watched  # type: ignore[method-assign]
-        await tested(bench.axis, bench.session)
+        await brake_of(bench.axis, bench.session)
     passed = next(at for at, turned, _ in seen if turned >= 0.02)
     gone = next(at for at, _, nm in seen if at > passed and abs(nm) < 0.05 * RATED_NM)
     assert gone - passed <= 20.0
@@ -184,11 +184,11 @@ async def test_nothing_moves_before_somebody_said_what_hangs_and_what_torque_is_
     async with direct(braked(2.0 * RATED_NM), drive="m6l", settings=M6L) as bench:
         unsaid = ASKED.model_copy(update={"nothing_hangs": False})
         with pytest.raises(NotAllowed) as refused:
-            await tested(bench.axis, bench.session, unsaid)
+            await brake_of(bench.axis, bench.session, unsaid)
         assert refused.value.code == "brake.say-what-hangs"
         little = ASKED.model_copy(update={"torque_limit": 100.0})
         with pytest.raises(OutOfRange) as limited:
-            await tested(bench.axis, bench.session, little)
+            await brake_of(bench.axis, bench.session, little)
         assert limited.value.code == "brake.torque-not-permitted"
         assert bench.link.highest["torque"] == 0
 
@@ -198,7 +198,7 @@ async def test_kept_raw_data_give_the_same_result() -> None:
     asked = ASKED.model_copy(update={"brake_rated_nm": 2.0, "test_torque_nm": 1.0})
     spec = braked(0.6 * RATED_NM, windup_rev=WINDUP_REV)
     async with direct(spec, drive="m6l", settings=M6L) as bench:
-        found = await tested(bench.axis, bench.session, asked, kept)
+        found = await brake_of(bench.axis, bench.session, asked, kept)
     again = TOOL.reevaluate(kept["arrays"], kept["meta"])  # type: ignore[arg-type]
     assert again.model_dump() == found.model_dump()
     assert kept["name"] == "brake-test"
