@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -277,7 +278,7 @@ def _compliance(way: FloatArray, torque: FloatArray) -> float:
     """Revolutions per % of the stiffer parts of the ramp; the others may slip."""
     edges = np.linspace(float(torque[0]), float(np.max(torque)), _PARTS + 1)
     slopes = []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in itertools.pairwise(edges):
         at = (torque >= low) & (torque <= high)
         if np.count_nonzero(at) >= 4 and float(np.ptp(torque[at])) > 0.0:
             slopes.append(float(np.polyfit(torque[at], way[at], 1)[0]))

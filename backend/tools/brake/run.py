@@ -19,9 +19,9 @@ import numpy.typing as npt
 
 from backend.axis.axis import Axis
 from backend.axis.cyclic import channel
+from backend.functions.closed_brake import forcing_keys, kept_closed, obstacle_of
 from backend.scales.units import AxisUnits
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts, si
-from backend.tools.brake.closed import forcing_keys, kept_closed, obstacle_of
 from backend.tools.brake.evaluate import PRELOAD, Phase, Trial, Trials, evaluate, reevaluate
 from backend.tools.brake.result import BrakeResult, Means, Obstacle
 from backend.tools.brake.settings import BrakeSettings

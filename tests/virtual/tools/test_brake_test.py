@@ -125,10 +125,10 @@ async def test_the_shaft_itself_after_the_limit_was_passed() -> None:
         core = bench.link.device.axis  # type: ignore[attr-defined]
         advance = bench.link.device.advance
 
-        def watched(now_ns: int) -> None:
-            advance(now_ns)
+        def watched(t_ns: int) -> None:
+            advance(t_ns)
             turned = core._x[0] / (2 * math.pi)
-            seen.append((now_ns / 1e6, turned, float(core.s[k.S_TORQUE])))
+            seen.append((t_ns / 1e6, turned, float(core.s[k.S_TORQUE])))
 
         bench.link.device.advance = watched  # type: ignore[method-assign]
         await brake_of(bench.axis, bench.session)

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from typing import Literal
 
 from backend.axis.axis import Axis
 from backend.drive.drive import Drive
-from backend.tools.brake.result import Obstacle
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
 from profiles.functions import Forcing
 from profiles.schema import IoTerminal
+
+#: Why the outputs of a drive cannot keep its brake closed.
+Obstacle = Literal[
+    "means_unknown", "built_in", "fixed_output", "bus_bit", "no_output", "output_inverted",
+    "output_forced",
+]  # fmt: skip
 
 
 async def obstacle_of(drive: Drive) -> Obstacle | None:
@@ -93,7 +99,8 @@ async def _forced(drive: Drive, name: str) -> bool:
     """The bus would switch it on as soon as its function lets it."""
     for forcing in _forcings(drive):
         for place in (forcing.enable, forcing.value):
-            if place is not None and name in place.bits:
-                if await drive.raw(place.key) >> place.bits[name] & 1:
-                    return True
+            if place is None or name not in place.bits:
+                continue
+            if await drive.raw(place.key) >> place.bits[name] & 1:
+                return True
     return False
