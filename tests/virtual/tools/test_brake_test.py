@@ -5,6 +5,8 @@ What the shaft carries is brake and bearing friction together: 0.9·T + Coulomb 
 
 from __future__ import annotations
 
+import asyncio
+import contextvars
 import math
 from collections.abc import Mapping
 
@@ -18,11 +20,12 @@ from backend.tools.brake.settings import BrakeSettings
 from backend.tools.sweep import profile_speed
 from backend.tools.tool import Run
 from drivers.cia402 import State
-from drivers.errors import NotAllowed, OutOfRange
+from drivers.errors import Busy, NotAllowed, OutOfRange
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.mechanics import MechanicsSpec
+from tests.virtual.tools.can_rig import can_bench, incremental
 from tests.virtual.tools.direct import DirectBench, direct
-from tests.virtual.tools.rig import mechanics, settings_of, silent
+from tests.virtual.tools.rig import At, mechanics, settings_of, silent
 
 RATED_NM, COULOMB_NM = 1.27, 0.03
 #: One revolution per the torque that a hub of this twist slips at.
@@ -191,6 +194,63 @@ async def test_nothing_moves_before_somebody_said_what_hangs_and_what_torque_is_
             await brake_of(bench.axis, bench.session, little)
         assert limited.value.code == "brake.torque-not-permitted"
         assert bench.link.highest["torque"] == 0
+
+
+async def test_a_test_that_is_cancelled_puts_the_output_back_and_takes_the_power_off() -> None:
+    async with direct(braked(2.0 * RATED_NM), drive="m6l", settings=M6L) as bench:
+        axis, drive = bench.axis, bench.axis.drive
+        before = await settings_of(drive, drive.require("mode"))
+        seen: list[int] = []
+
+        def cancel() -> None:
+            seen.append(bench.link.device.od.number("2003:10"))  # type: ignore[attr-defined]
+            task.cancel()
+
+        at = At("forwards", cancel, fraction=0.3)
+        run = Run(axis, bench.session, at.progress)
+
+        async def work() -> None:
+            async with profile_speed.prepared(axis, bench.session, ASKED.envelope, True):
+                await TOOL.run(run, ASKED)
+
+        task = asyncio.create_task(work())
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        assert seen == [28]
+        assert await settings_of(drive, drive.require("mode")) == before
+        assert await axis.state() is not State.OPERATION_ENABLED
+        assert bench.link.highest["torque"] > 0
+
+
+async def test_nobody_forces_outputs_meanwhile() -> None:
+    """Function 28 lets 60FEh switch the brake's output on."""
+    async with direct(braked(2.0 * RATED_NM), drive="m6l", settings=M6L) as bench:
+        axis, refused = bench.axis, []
+
+        def force() -> None:
+            drive, name = axis.drive, axis.drive.name
+            keys = frozenset({"60FE:01", "60FE:02"})
+            try:
+                # As `backend.functions.forcing` asks, from work that holds no grant.
+                context = contextvars.Context()
+                context.run(
+                    lambda: drive.authority.granted(
+                        drive.id, name, "forcing", keys=keys
+                    ).__enter__()
+                )
+            except Busy as error:
+                refused.append(error.code)
+
+        at = At("forwards", force, fraction=0.3)
+        async with profile_speed.prepared(axis, bench.session, ASKED.envelope, True):
+            await TOOL.run(Run(axis, bench.session, at.progress), ASKED)
+        assert refused == ["motion.moved-already"]
+
+
+async def test_a_drive_that_takes_no_torque_says_so() -> None:
+    async with can_bench(incremental(braked(2.0 * RATED_NM)), pace=40.0) as bench:
+        found = await TOOL.run(Run(bench.axis, bench.session, silent()), ASKED)
+    assert (found.verdict, found.obstacle) == ("cannot_be_tested", "no_torque_mode")
 
 
 async def test_kept_raw_data_give_the_same_result() -> None:
