@@ -74,6 +74,10 @@ COMMANDS = {
         "The condition of an axis: measure, sign a baseline, repeat, compare, trend. "
         "Measuring moves it.",
     ),
+    "brake-test": (
+        "tools:brake_test",
+        "Torque against the closed holding brake, both directions. The axis is energised.",
+    ),
     "autotune": (
         "tune:autotune",
         "Measure, design and, with --apply or --keep, verify an axis's loop gains. The axis moves.",

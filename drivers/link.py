@@ -234,6 +234,9 @@ class Envelope:
     following_error_max: float | None = None
     feedback: FeedbackScale | None = None
     """How 606Ch and 6064h hang together: they are compared then, the speed limit watches both."""
+    brake_closed: bool = False
+    """The axis is held by its closed brake: beyond a limit a torque only becomes zero, and the
+    power goes a moment later. A quick stop would push against the brake."""
 
 
 @dataclass(frozen=True, slots=True)

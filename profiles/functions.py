@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from profiles.record import Frozen
 
@@ -153,6 +153,28 @@ class BrakeTiming(Frozen):
     notes: str = ""
 
 
+class BrakeTest(Frozen):
+    """How the holding brake stays closed while the axis is enabled, so that it can be tested.
+
+    Either ``output_function`` (a function that never switches the brake's output on by itself,
+    given to it meanwhile) or ``obstacle``: why the drive has no such way.
+    """
+
+    output_function: int | None = None
+    obstacle: Literal["built_in", "fixed_output", "bus_bit"] | None = Field(
+        default=None,
+        description="built_in: the brake inside follows the power stage; fixed_output: the output "
+        "that drives it cannot be given another function; bus_bit: process data rule it",
+    )
+    source: str
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> BrakeTest:
+        if (self.output_function is None) == (self.obstacle is None):
+            raise ValueError("brake_test: give output_function or obstacle, and not both")
+        return self
+
+
 class ResistorModel(Frozen):
     """What a manual's table says of braking with one model; None where it prints nothing."""
 
@@ -247,6 +269,7 @@ class Functions(Frozen):
     terminals: TerminalFacts = TerminalFacts()
     probe: TouchProbe | None = None
     brake: BrakeTiming | None = None
+    brake_test: BrakeTest | None = None
     regeneration: Regeneration | None = None
     guides: tuple[Guide, ...] = ()
     identification: DriveIdentification | None = None

@@ -132,3 +132,4 @@ def _settings(tool: AnyTool, given: dict[str, Any]) -> Any:
 
 inertia = command_of(BY_KIND["inertia"])
 friction = command_of(BY_KIND["friction"])
+brake_test = command_of(BY_KIND["brake-test"])

@@ -7,6 +7,8 @@ Whatever ends a motion by force (expiry, envelope, halt, invalid data) brakes an
 Operation enabled. Position and velocity setpoints are ramped down in `STOP_S`; a torque setpoint
 becomes zero with a quick stop, because no torque does not stop an axis that moves. An axis that
 could not follow the ramp is handed to the drive's quick stop too: without power it would coast.
+Against a closed brake a torque beyond a limit becomes zero only, and the power goes `LET_GO_S`
+later: a quick stop by a speed loop would push on (R6L, EP3E and M6-L take 50 ms to 1 s for it).
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from collections.abc import Callable, Sequence
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
-from drivers.halt import HaltCause, Halted
+from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted
 from drivers.motion.guard import SpeedGuard
 from drivers.motion.setpoint_plan import (
     ACTUAL_POSITION,
@@ -39,6 +41,8 @@ from drivers.texts.message import text
 
 STOP_S = 0.1
 """From any speed to standstill; shorter than the 200 ms in which a lost setpoint must end."""
+LET_GO_S = 0.05
+"""Until the power goes from an axis that its closed brake holds and that no torque drives."""
 
 _RESTLESS = 2
 """Increments per cycle that encoder noise may make of an axis at rest."""
@@ -97,6 +101,7 @@ class AxisLoop:
         self._brake_target = POSITION
         self._after_brake = State.READY
         self._after_quick_stop = State.READY
+        self._let_go_at: int | None = None
         self._was_enabled = False
         self._stale = 0
         self._last_position: int | None = None
@@ -185,6 +190,9 @@ class AxisLoop:
             self._set(TORQUE, 0)
             self.phase, self._brake_left = Phase.IDLE, 0
             self._brake_target = TORQUE
+            if motion.limits.brake_closed and why.cause in ENVELOPE_CAUSES:
+                self._let_go_at = self._cycles + max(1, round(LET_GO_S / self._cycle_s))
+                return
             self.goal = State.QUICK_STOP_ACTIVE
             self._after_quick_stop = goal
             return
@@ -390,6 +398,10 @@ class AxisLoop:
 
     def _control(self) -> None:
         place = self._out[CONTROL]
+        if self._let_go_at is not None and self._cycles >= self._let_go_at:
+            self._let_go_at = None
+            if self.goal is State.OPERATION_ENABLED and self.phase is Phase.IDLE:
+                self.goal = State.SWITCH_ON_DISABLED
         if self.goal is None:
             return
         if self.state in (State.FAULT, State.FAULT_REACTION) and not self._reset:

@@ -21,6 +21,9 @@ from drivers.virtual.firmware.settings import (
 from drivers.virtual.mechanics import MechanicsSpec
 from drivers.virtual.mechanics.chain import FIRST_LOAD, discretise
 
+#: Damping ratio of a motor that swings on the hub of its closed brake.
+_HUB_DAMPING = 0.3
+
 
 class VirtualAxis:
     """Mechanics, power stage and loops of one drive.
@@ -179,7 +182,12 @@ class VirtualAxis:
         """Whether the holding brake is kept open, with or without power."""
         self._brake_released = released
         grips = self._braked and not released
-        self.p[k.P_BRAKE_TORQUE] = 2 * self.motor.rated_torque_nm if grips else 0.0
+        motor = self.spec.motor
+        holds_nm = motor.brake_nm or 2 * motor.rated_torque_nm
+        self.p[k.P_BRAKE_TORQUE] = holds_nm if grips else 0.0
+        stiffness = holds_nm / motor.brake_windup_rad if motor.brake_windup_rad else 0.0
+        self.p[k.P_BRAKE_STIFFNESS] = stiffness
+        self.p[k.P_BRAKE_DAMPING] = 2 * _HUB_DAMPING * math.sqrt(stiffness * motor.inertia_kgm2)
 
     def close_brake(self, closed: bool) -> None:
         """The holding brake, apart from the power stage (it grips without power in any case)."""

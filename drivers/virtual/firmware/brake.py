@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.families.base import BrakeTimes
+from drivers.virtual.firmware.families.terminals import TABLES
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.schedule import Timer
 
@@ -29,6 +30,16 @@ class HoldingBrake:
     def times(self) -> BrakeTimes | None:
         """None without a brake on the motor, whatever the parameters say."""
         return self._core.family.brake(self._core.od) if self._axis.spec.motor.brake else None
+
+    def _without_current(self) -> bool:
+        """Its coil gets none, whatever the drive does: no supply, or no output for it."""
+        motor, core = self._axis.spec.motor, self._core
+        if not motor.brake or not motor.brake_supplied:
+            return motor.brake
+        table = TABLES.get(core.family.name)
+        if not motor.brake_output or table is None:
+            return False
+        return all(table.output_use(each, core.od) != "brake" for each in table.outputs)
 
     @property
     def moving(self) -> bool:
@@ -49,8 +60,9 @@ class HoldingBrake:
             return
         self.cancel()
         self._bus = applied
-        self._axis.release_brake(applied is False)
-        self._axis.close_brake(applied is True)
+        dead = self._without_current()
+        self._axis.release_brake(applied is False and not dead)
+        self._axis.close_brake(applied is True or dead)
 
     def grip(self) -> None:
         """A fault applies the brake, whatever the bus says (001:940)."""
@@ -66,6 +78,10 @@ class HoldingBrake:
     def open(self, ready: Callable[[], None]) -> bool:
         """Hold the axis while it opens; False where there is none to wait for."""
         if self._bus is not None:
+            return False
+        if self._without_current():
+            # The drive knows nothing of it, and takes commands against a closed brake.
+            self._axis.close_brake(True)
             return False
         late_s = self._axis.spec.rough_feedback.brake_opens_s
         if late_s is not None and self._axis.spec.motor.brake:

@@ -34,7 +34,21 @@ class MotorSpec(_Finite):
     rated_torque_nm: float = Field(gt=0)
     rated_speed_rpm: float = Field(gt=0)
     brake: bool = False
-    """A holding brake of twice the rated torque is mounted."""
+    """A holding brake is mounted."""
+    brake_nm: float | None = Field(
+        default=None, gt=0, description="slips at this torque; twice the rated one without it"
+    )
+    brake_windup_rad: float = Field(
+        default=0.0, ge=0, le=0.2, description="twist of its hub at the torque that it slips at"
+    )
+    brake_output: bool = Field(
+        default=False,
+        description="its coil is on the drive's output for it, and has no current while no output "
+        "has that function; else it follows the power stage",
+    )
+    brake_supplied: bool = Field(
+        default=True, description="the supply of its coil is there; it never opens without"
+    )
 
 
 class FrictionSpec(_Finite):

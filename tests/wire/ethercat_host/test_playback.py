@@ -11,7 +11,7 @@ from drivers.cia402 import State
 from drivers.errors import NotAllowed
 from drivers.halt import HaltCause, Halted
 from drivers.motion.feedback import FeedbackScale
-from drivers.motion.playback import STOP_S, AxisLoop
+from drivers.motion.playback import LET_GO_S, STOP_S, AxisLoop
 from drivers.motion.setpoint_plan import Limits, Motion, Phase
 
 IN = {0x6041: 0, 0x6064: 1, 0x606C: 2, 0x6077: 3, 0x6061: 4}
@@ -251,6 +251,37 @@ def test_an_axis_that_takes_too_much_torque_is_braked_from_its_own_speed(
 def test_torque_ends_with_a_quick_stop_because_no_torque_does_not_stop_an_axis() -> None:
     bench = Bench().enabled(mode=10)
     bench.play([100] * 1000, target=0x6071)
+    bench.step(5)
+    bench.axis.stop(RELEASED)
+    bench.step()
+    assert bench.axis.outputs[3] == 0
+    assert bench.axis.outputs[0] == 0x02
+
+
+def test_against_a_closed_brake_a_torque_beyond_a_limit_only_becomes_zero() -> None:
+    """A quick stop would push on; the power goes when no torque is left."""
+    bench = Bench().enabled(mode=10)
+    limits = Limits(position_max=600, brake_closed=True)
+    bench.play([100] * 1000, target=0x6071, limits=limits)
+    bench.step(5)
+    assert bench.axis.outputs[3] == 100
+    bench.position = 601
+    bench.step()
+    assert bench.axis.outputs[3] == 0
+    assert bench.axis.halted == Halted(HaltCause.POSITION, "position", 601, 600)
+    words = []
+    for _ in range(2 * round(LET_GO_S / CYCLE_S)):
+        bench.obey(1)
+        words.append(bench.axis.outputs[0])
+    assert words.index(0x00) == pytest.approx(LET_GO_S / CYCLE_S, abs=2)
+    assert 0x02 not in words
+    assert bench.axis.state is State.SWITCH_ON_DISABLED
+    assert bench.axis.outputs[3] == 0
+
+
+def test_against_a_closed_brake_every_other_end_is_a_quick_stop() -> None:
+    bench = Bench().enabled(mode=10)
+    bench.play([100] * 1000, target=0x6071, limits=Limits(position_max=600, brake_closed=True))
     bench.step(5)
     bench.axis.stop(RELEASED)
     bench.step()

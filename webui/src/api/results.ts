@@ -1,7 +1,7 @@
-import type { FrictionResult, HealthResult, InertiaAnswer, JobInfo } from './schema'
+import type { BrakeResult, FrictionResult, HealthResult, InertiaAnswer, JobInfo } from './schema'
 
 /** What a tool concluded: told apart by its field `tool`. */
-type ToolOutcome = FrictionResult | HealthResult | InertiaAnswer
+type ToolOutcome = BrakeResult | FrictionResult | HealthResult | InertiaAnswer
 
 const outcome = (result: unknown): ToolOutcome | null =>
   typeof result === 'object' && result !== null && 'tool' in result ? (result as ToolOutcome) : null
@@ -15,4 +15,10 @@ export function plainResult(result: JobInfo['result'] | undefined): Record<strin
 export function asFriction(result: unknown): FrictionResult | null {
   const found = outcome(result)
   return found?.tool === 'friction' ? found : null
+}
+
+/** The result of a brake test, or null where it is something else. */
+export function asBrakeTest(result: unknown): BrakeResult | null {
+  const found = outcome(result)
+  return found?.tool === 'brake-test' ? found : null
 }

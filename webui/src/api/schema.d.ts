@@ -860,6 +860,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/jobs/brake-test": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Brake-Test
+         * @description Torque against the closed holding brake, both directions, until the test torque or slip. The axis is energised.
+         */
+        post: operations["start_brake-test"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/jobs/firmware": {
         parameters: {
             query?: never;
@@ -3548,6 +3568,175 @@ export interface components {
             runs: number[];
         };
         /**
+         * BrakeResult
+         * @description The worse direction decides. ``measured_at`` is ISO 8601, UTC.
+         */
+        BrakeResult: {
+            /** Brake Rated Nm */
+            brake_rated_nm: number | null;
+            /** Means */
+            means?: ("output" | "supply") | null;
+            /** Measured At */
+            measured_at: string;
+            /**
+             * Measurements
+             * @description names of the stored raw data
+             * @default []
+             */
+            measurements: string[];
+            /** Obstacle */
+            obstacle?: ("means_unknown" | "built_in" | "fixed_output" | "bus_bit" | "no_output" | "output_inverted" | "output_forced" | "no_torque_mode" | "windup_beyond_limit") | null;
+            /**
+             * Of Brake Percent
+             * @description the same, in % of the brake's rated torque
+             */
+            of_brake_percent: number | null;
+            /**
+             * Rated Torque Nm
+             * @description what 100 % is; null where it is not known
+             */
+            rated_torque_nm: number | null;
+            /** Slip Limit Rev */
+            slip_limit_rev: number;
+            /** Test Percent */
+            test_percent: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            tool: "brake-test";
+            /**
+             * Torque Percent
+             * @description of the direction that carried less
+             */
+            torque_percent: number | null;
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            verdict: "held" | "slipped" | "not_closed" | "cannot_be_tested";
+            /**
+             * Ways
+             * @default []
+             */
+            ways: components["schemas"]["BrakeWay"][];
+        };
+        /**
+         * BrakeSettings
+         * @description Test torque, slip limit, and what a person states about brake and load.
+         *
+         *     The travel from the start is limited by ``slip_limit_rev`` and ``travel_limit``, whichever is
+         *     less. The test torque is ``test_torque_nm``, else ``test_percent`` of ``brake_rated_nm``, else
+         *     ``test_percent`` of the motor's rated torque.
+         */
+        BrakeSettings: {
+            /**
+             * Brake Rated Nm
+             * @description rated holding torque of the brake, in N·m
+             */
+            brake_rated_nm?: number | null;
+            /**
+             * Brake Supply Cut
+             * @description you have disconnected the brake's supply, so that nothing can open the brake
+             * @default false
+             */
+            brake_supply_cut: boolean;
+            /**
+             * Consent
+             * @description the user agreed that nothing in the drive ends a speed when this computer falls silent; needed where the drive has no watchdog (DS_C)
+             * @default false
+             */
+            consent: boolean;
+            /**
+             * Cycle Ms
+             * @description cycle of the exchange that is started where none runs, and ended afterwards
+             * @default 1
+             */
+            cycle_ms: number;
+            /**
+             * Load Supported
+             * @description you state that the hanging load is supported, cannot fall and cannot be lifted off its support, and that nobody is below it
+             * @default false
+             */
+            load_supported: boolean;
+            /**
+             * Nothing Hangs
+             * @description you state that no load pulls at the axis, whether its brake holds or not
+             * @default false
+             */
+            nothing_hangs: boolean;
+            /**
+             * Ramp S
+             * @description time in which the torque rises, in s
+             * @default 1
+             */
+            ramp_s: number;
+            /**
+             * Rated Torque Nm
+             * @description overrides what the drive says
+             */
+            rated_torque_nm?: number | null;
+            /**
+             * Slip Limit Rev
+             * @description travel that aborts the test, in revolutions
+             * @default 0.02
+             */
+            slip_limit_rev: number;
+            /**
+             * Speed Limit
+             * @description highest speed, in rpm
+             * @default 120
+             */
+            speed_limit: number;
+            /**
+             * Test Percent
+             * @description test torque in % of the brake's rated torque, or of the motor's without it
+             * @default 100
+             */
+            test_percent: number;
+            /**
+             * Test Torque Nm
+             * @description test torque, in N·m
+             */
+            test_torque_nm?: number | null;
+            /**
+             * Time Limit S
+             * @description longest time of a motion, in s
+             * @default 60
+             */
+            time_limit_s: number;
+            /**
+             * Torque Limit
+             * @description highest torque, in % of rated
+             * @default 130
+             */
+            torque_limit: number;
+            /**
+             * Travel Limit
+             * @description longest way from the start, in revolutions
+             * @default 0.02
+             */
+            travel_limit: number;
+        };
+        /**
+         * BrakeTest
+         * @description How the holding brake stays closed while the axis is enabled, so that it can be tested.
+         *
+         *     Either ``output_function`` (a function that never switches the brake's output on by itself,
+         *     given to it meanwhile) or ``obstacle``: why the drive has no such way.
+         */
+        BrakeTest: {
+            /**
+             * Obstacle
+             * @description built_in: the brake inside follows the power stage; fixed_output: the output that drives it cannot be given another function; bus_bit: process data rule it
+             */
+            obstacle?: ("built_in" | "fixed_output" | "bus_bit") | null;
+            /** Output Function */
+            output_function?: number | null;
+            /** Source */
+            source: string;
+        };
+        /**
          * BrakeTiming
          * @description Holding brake: which parameters hold the times of its course.
          *
@@ -3605,6 +3794,54 @@ export interface components {
             present_key?: string | null;
             /** Source */
             source: string;
+        };
+        /**
+         * BrakeWay
+         * @description One direction. Travel counts from a preload of a tenth of the test torque, which takes up
+         *     play; ``windup_rev`` comes back when the torque goes, ``slip_rev`` does not.
+         *
+         *     ``torque_percent`` is what the shaft carried: at the test torque, or where the brake began to
+         *     slip. The friction of the motor's bearings is part of it, and the pull of a load.
+         */
+        BrakeWay: {
+            /**
+             * Abort Ms
+             * @description from the limit of travel until the torque was gone
+             */
+            abort_ms?: number | null;
+            /**
+             * Curve Torque Percent
+             * @description [n]
+             */
+            curve_torque_percent: number[];
+            /**
+             * Curve Travel Rev
+             * @description [n] from the preload
+             */
+            curve_travel_rev: number[];
+            /**
+             * Direction
+             * @enum {integer}
+             */
+            direction: 1 | -1;
+            /** Slip Rev */
+            slip_rev: number;
+            /** Torque Ci95 Percent */
+            torque_ci95_percent: [
+                number,
+                number
+            ];
+            /** Torque Percent */
+            torque_percent: number;
+            /** Travel Rev */
+            travel_rev: number;
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            verdict: "held" | "slipped" | "not_closed" | "cannot_be_tested";
+            /** Windup Rev */
+            windup_rev: number;
         };
         /**
          * BrakingInfo
@@ -4736,6 +4973,7 @@ export interface components {
          */
         Functions: {
             brake?: components["schemas"]["BrakeTiming"] | null;
+            brake_test?: components["schemas"]["BrakeTest"] | null;
             /**
              * Gain Blocks
              * @default []
@@ -6078,7 +6316,7 @@ export interface components {
              * Result
              * @description of a tool: its result, which its field tool names
              */
-            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["HealthResult"]) | {
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"]) | {
                 [key: string]: unknown;
             } | null;
             /**
@@ -9897,7 +10135,11 @@ export type AxisRecordInfo = components['schemas']['AxisRecordInfo'];
 export type AxisState = components['schemas']['AxisState'];
 export type AxisStopInfo = components['schemas']['AxisStopInfo'];
 export type BaselineRequest = components['schemas']['BaselineRequest'];
+export type BrakeResult = components['schemas']['BrakeResult'];
+export type BrakeSettings = components['schemas']['BrakeSettings'];
+export type BrakeTest = components['schemas']['BrakeTest'];
 export type BrakeTiming = components['schemas']['BrakeTiming'];
+export type BrakeWay = components['schemas']['BrakeWay'];
 export type BrakingInfo = components['schemas']['BrakingInfo'];
 export type BrakingRequest = components['schemas']['BrakingRequest'];
 export type BundleInfo = components['schemas']['BundleInfo'];
@@ -17358,6 +17600,149 @@ export interface operations {
         requestBody: {
             content: {
                 "application/json": components["schemas"]["AutotuneRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "start_brake-test": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["BrakeSettings"];
             };
         };
         responses: {

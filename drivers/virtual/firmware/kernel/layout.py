@@ -81,7 +81,8 @@ P_NOTCHES = 139
     P_STRIBECK_TANH, P_RIPPLE_REVOLUTION, P_RIPPLE_POLE_PAIR, P_RIPPLE_POLE_PAIRS,
     P_RIPPLE_COGGING, P_RIPPLE_COGGING_SECOND, P_RIPPLE_COGGING_PER_REV, P_RIPPLE_PHASE,
 ) = range(P_NOTCHES + 41, P_NOTCHES + 49)  # fmt: skip
-P_SIZE = P_NOTCHES + 49
+P_BRAKE_STIFFNESS, P_BRAKE_DAMPING = range(P_NOTCHES + 49, P_NOTCHES + 51)
+P_SIZE = P_NOTCHES + 51
 
 # --- state ----------------------------------------------------------------------------------
 (
@@ -111,4 +112,6 @@ ROUGH_STEPS = 8
 ) = range(S_TRACE + TRACE_STEPS, S_TRACE + TRACE_STEPS + 9)  # fmt: skip
 S_ROUGH_RING = S_TRACE + TRACE_STEPS + 9
 """Start of the last ROUGH_STEPS torque commands of a rough drive."""
-S_SIZE = S_ROUGH_RING + ROUGH_STEPS
+S_BRAKE_ANCHOR = S_ROUGH_RING + ROUGH_STEPS
+"""Angle at which an elastic holding brake carries nothing."""
+S_SIZE = S_BRAKE_ANCHOR + 1

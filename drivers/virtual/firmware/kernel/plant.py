@@ -68,6 +68,18 @@ def _ripple(p, angle):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True)
+def _grip(p, s, angle, speed):  # type: ignore[no-untyped-def]
+    """Torque of a closed brake whose hub twists, and which slips at its holding torque."""
+    most, stiffness = p[k.P_BRAKE_TORQUE], p[k.P_BRAKE_STIFFNESS]
+    give = most / stiffness
+    twist = angle - s[k.S_BRAKE_ANCHOR]
+    if abs(twist) > give:
+        s[k.S_BRAKE_ANCHOR] = angle - math.copysign(give, twist)
+        return math.copysign(most, twist)
+    return clamp(stiffness * twist + p[k.P_BRAKE_DAMPING] * speed, -most, most)
+
+
+@njit(nogil=True)
 def step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-untyped-def]
     """One exact step of the linear chain, then friction and end stops on the velocity level."""
     size = x.shape[0]
@@ -78,6 +90,12 @@ def step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-
     am, bm = a[contact], b[contact]
     pull = _pull(p, x, size)
     ripple = _ripple(p, x[0])
+    gripped = int(p[k.P_LOOP]) == k.LOOP_OFF or p[k.P_BRAKE_CLOSED] > 0.0
+    elastic = p[k.P_BRAKE_STIFFNESS] > 0.0 and p[k.P_BRAKE_TORQUE] > 0.0
+    if gripped and elastic:
+        ripple += _grip(p, s, x[0], x[1])
+    else:
+        s[k.S_BRAKE_ANCHOR] = x[0]
     for i in range(size):
         total = bm[i, 0] * s[k.S_TORQUE_COMMAND] - bm[i, 1] * ripple - bm[i, 2] * pull
         for j in range(size):
@@ -89,7 +107,7 @@ def step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-
     coulomb = p[k.P_COULOMB]
     if p[k.P_STICTION] > 0.0:
         coulomb += _stribeck(p, x[1])
-    if int(p[k.P_LOOP]) == k.LOOP_OFF or p[k.P_BRAKE_CLOSED] > 0.0:
+    if gripped and not elastic:
         coulomb += p[k.P_BRAKE_TORQUE]
     friction = 0.0
     if coulomb > 0.0:

@@ -15,6 +15,7 @@ import { useMeasurements } from '../response/useMeasurements'
 import { useToolJob } from '../response/useToolJob'
 import { AutotunePanel } from './AutotunePanel'
 import { CandidatesPanel } from './CandidatesPanel'
+import { BrakePanel } from './BrakePanel'
 import { FrictionPanel } from './FrictionPanel'
 import { GainsPanel } from './GainsPanel'
 import { HealthPanel } from './HealthPanel'
@@ -43,8 +44,10 @@ export function TunePage({ drive }: { drive: string }) {
   const tuneJob = useToolJob(drive, 'autotune').job
   const stepJob = useToolJob(drive, 'step').job
   const frictionJob = useToolJob(drive, 'friction').job
+  const brakeJob = useToolJob(drive, 'brake-test').job
   useJobEnd(inertiaJob?.id ?? null, () => void measured.refresh())
   useJobEnd(frictionJob?.id ?? null, () => void measured.refresh())
+  useJobEnd(brakeJob?.id ?? null, () => void measured.refresh())
   useJobEnd(stepJob?.id ?? null, () => void measured.refresh())
   useJobEnd(tuneJob?.id ?? null, () => {
     void measured.refresh()
@@ -153,6 +156,14 @@ export function TunePage({ drive }: { drive: string }) {
           )}
           {possible && (
             <FrictionPanel
+              drive={drive}
+              limits={limits.agreed ? limits.limits : null}
+              obstacle={obstacle}
+              cycleMs={cycleMs}
+            />
+          )}
+          {possible && (
+            <BrakePanel
               drive={drive}
               limits={limits.agreed ? limits.limits : null}
               obstacle={obstacle}

@@ -1,0 +1,106 @@
+"""How a brake is kept closed while its axis is enabled, by what the family's manual prints."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Literal
+
+from backend.axis.axis import Axis
+from backend.drive.drive import Drive
+from drivers.cia402 import State
+from drivers.errors import NotAllowed
+from profiles.functions import Forcing
+from profiles.schema import IoTerminal
+
+#: Why the outputs of a drive cannot keep its brake closed.
+Obstacle = Literal[
+    "means_unknown", "built_in", "fixed_output", "bus_bit", "no_output", "output_inverted",
+    "output_forced",
+]  # fmt: skip
+
+
+async def obstacle_of(drive: Drive) -> Obstacle | None:
+    """Why this drive would open its brake, or might; None where its outputs can be used."""
+    means = drive.profile.functions.brake_test
+    if means is None:
+        return "means_unknown"
+    if means.output_function is None:
+        return means.obstacle
+    outputs = await _brake_outputs(drive)
+    if not outputs:
+        return "no_output"
+    for terminal in outputs:
+        if await _inverted(drive, terminal.name):
+            return "output_inverted"
+        if await _forced(drive, terminal.name):
+            return "output_forced"
+    return None
+
+
+@asynccontextmanager
+async def kept_closed(axis: Axis) -> AsyncIterator[None]:
+    """Inside the block no output has the brake's function, so that its coil has no current.
+
+    The calling work holds the grant of the axis. Afterwards the functions are as before.
+
+    Raises:
+        NotAllowed: the axis is enabled.
+        RestoreFailed: on leaving, naming what could not be put back.
+    """
+    drive = axis.drive
+    means = drive.profile.functions.brake_test
+    assert means is not None, "asked before"
+    assert means.output_function is not None, "asked before"
+    if await axis.state() is State.OPERATION_ENABLED:
+        raise NotAllowed("brake.enabled-already", drive=drive.name)
+    keys = [each.function_key for each in await _brake_outputs(drive) if each.function_key]
+    async with axis.restoring(*keys):
+        for key in keys:
+            await drive.energise(key, means.output_function, axis.grant(key))
+        yield
+
+
+def forcing_keys(drive: Drive) -> frozenset[str]:
+    """Objects by which somebody could switch an output on meanwhile."""
+    return frozenset(
+        place.key
+        for forcing in _forcings(drive)
+        for place in (forcing.enable, forcing.value)
+        if place is not None
+    )
+
+
+def _forcings(drive: Drive) -> list[Forcing]:
+    facts = drive.profile.functions.terminals
+    return [each for each in facts.forcing if each.name == "outputs"]
+
+
+async def _brake_outputs(drive: Drive) -> list[IoTerminal]:
+    codes = drive.profile.functions.terminals.brake_functions
+    found = []
+    for terminal in drive.profile.terminals:
+        if terminal.direction != "out" or terminal.function_key is None:
+            continue
+        if await drive.raw(terminal.function_key) in codes:
+            found.append(terminal)
+    return found
+
+
+async def _inverted(drive: Drive, name: str) -> bool:
+    """Switched on while its function is off: then another function would open the brake."""
+    for place in drive.profile.functions.terminals.polarities:
+        if name in place.bits and await drive.raw(place.key) >> place.bits[name] & 1:
+            return True
+    return False
+
+
+async def _forced(drive: Drive, name: str) -> bool:
+    """The bus would switch it on as soon as its function lets it."""
+    for forcing in _forcings(drive):
+        for place in (forcing.enable, forcing.value):
+            if place is None or name not in place.bits:
+                continue
+            if await drive.raw(place.key) >> place.bits[name] & 1:
+                return True
+    return False

@@ -1,0 +1,1 @@
+"""Brake test: a torque ramp against the closed holding brake, both directions."""

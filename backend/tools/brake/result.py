@@ -1,0 +1,68 @@
+"""What a brake test concludes; torques in % of the motor's rated torque, travel in revolutions."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from backend.tools.tool import ToolResult
+
+Verdict = Literal["held", "slipped", "not_closed", "cannot_be_tested"]
+Obstacle = Literal[
+    "means_unknown",
+    "built_in",
+    "fixed_output",
+    "bus_bit",
+    "no_output",
+    "output_inverted",
+    "output_forced",
+    "no_torque_mode",
+    "windup_beyond_limit",
+]
+"""Why a brake cannot be tested."""
+Means = Literal["output", "supply"]
+"""What keeps the brake closed: its output has another function, or its supply is cut."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class BrakeWay(_Part):
+    """One direction. Travel counts from a preload of a tenth of the test torque, which takes up
+    play; ``windup_rev`` comes back when the torque goes, ``slip_rev`` does not.
+
+    ``torque_percent`` is what the shaft carried: at the test torque, or where the brake began to
+    slip. The friction of the motor's bearings is part of it, and the pull of a load.
+    """
+
+    direction: Literal[1, -1]
+    verdict: Verdict
+    torque_percent: float
+    torque_ci95_percent: tuple[float, float]
+    travel_rev: float
+    windup_rev: float
+    slip_rev: float
+    abort_ms: float | None = Field(
+        default=None, description="from the limit of travel until the torque was gone"
+    )
+    curve_travel_rev: tuple[float, ...] = Field(description="[n] from the preload")
+    curve_torque_percent: tuple[float, ...] = Field(description="[n]")
+
+
+class BrakeResult(ToolResult):
+    """The worse direction decides. ``measured_at`` is ISO 8601, UTC."""
+
+    tool: Literal["brake-test"] = "brake-test"
+    verdict: Verdict
+    obstacle: Obstacle | None = None
+    means: Means | None = None
+    measured_at: str
+    rated_torque_nm: float | None = Field(description="what 100 % is; null where it is not known")
+    brake_rated_nm: float | None
+    test_percent: float
+    slip_limit_rev: float
+    torque_percent: float | None = Field(description="of the direction that carried less")
+    of_brake_percent: float | None = Field(description="the same, in % of the brake's rated torque")
+    ways: tuple[BrakeWay, ...] = ()

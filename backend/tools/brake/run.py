@@ -1,0 +1,306 @@
+"""The brake test: torque against the closed brake in CST, both directions.
+
+What ends it at the slip limit is the exchange's own loop, in the cycle after the sample that shows
+it: the torque becomes zero and a quick stop follows (`drivers.motion.playback`).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import asdict, dataclass, field, replace
+from datetime import UTC, datetime
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.axis.axis import Axis
+from backend.axis.cyclic import channel
+from backend.functions.closed_brake import forcing_keys, kept_closed, obstacle_of
+from backend.scales.units import AxisUnits
+from backend.tools.autotune.axis_facts import AxisFacts, read_facts, si
+from backend.tools.brake.evaluate import PRELOAD, Phase, Trial, Trials, evaluate, reevaluate
+from backend.tools.brake.result import BrakeResult, Means, Obstacle
+from backend.tools.brake.settings import BrakeSettings
+from backend.tools.brake.texts import TEXTS, report
+from backend.tools.measuring.recording import (
+    Play,
+    bus_limits,
+    cycle_s,
+    enabled,
+    play,
+    quiet,
+    require_signals,
+    share,
+    takes_torque,
+)
+from backend.tools.measuring.temporary import stopping_hard
+from backend.tools.tool import Run, Tool
+from drivers import link as bus
+from drivers.cia402 import Mode
+from drivers.errors import EnvelopeExceeded, NotAllowed, OutOfRange
+from drivers.halt import HaltCause
+from drivers.texts.message import text
+
+FloatArray = npt.NDArray[np.float64]
+#: Seconds of each part of the sequence beside its ramp.
+_LEAD_S, _PRELOAD_S, _STILL_S, _TOP_S, _DOWN_S, _END_S = 0.2, 0.15, 0.15, 0.25, 0.25, 0.05
+#: The envelope watches the actual torque, which swings about what is sent.
+_ABOVE_SHARE, _ABOVE_PERCENT = 1.08, 3.0
+#: After a halt the loop goes on telling what happens; the torque is gone within that.
+_AFTER_HALT_S = 0.1
+_DIRECTIONS: tuple[Literal[1, -1], ...] = (1, -1)
+
+
+@dataclass
+class _Catch:
+    """Rows of position, torque and set-point by their cycle, from before to after the motion."""
+
+    names: tuple[str, str, str]
+    blocks: list[bus.ScopeBlock] = field(default_factory=list)
+
+    def rows(self) -> tuple[npt.NDArray[np.int64], FloatArray, npt.NDArray[np.bool_]]:
+        """Cycle [n], values [n, 3] and validity [n]; cycles that were lost are not there."""
+        cycles, values, valid = [], [], []
+        for block in self.blocks:
+            assert block.cycle is not None, "what a cyclic exchange delivers is numbered"
+            part = block.samples[:, [block.channels.index(name) for name in self.names]]
+            good = np.ones(len(part), np.bool_) if block.valid is None else block.valid
+            cycles.append(block.cycle + np.arange(len(part)))
+            values.append(part)
+            valid.append(good & ~np.isnan(part).any(axis=1))
+        if not cycles:
+            return np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0, np.bool_)
+        return np.concatenate(cycles), np.concatenate(values), np.concatenate(valid)
+
+
+def sequence(
+    peak: float, ramp_s: float, lead_s: float, rate: float
+) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    """Torque [n] of one direction, in the unit of ``peak``, and the phase of each sample."""
+    low = PRELOAD * peak
+    parts = [
+        (Phase.LEAD, 0.0, 0.0, lead_s), (Phase.PRELOADING, 0.0, low, _PRELOAD_S),
+        (Phase.PRELOADED, low, low, _STILL_S), (Phase.RAMP, low, peak, ramp_s),
+        (Phase.TOP, peak, peak, _TOP_S), (Phase.UNLOADING, peak, low, _DOWN_S),
+        (Phase.UNLOADED, low, low, _STILL_S), (Phase.END, low, 0.0, _PRELOAD_S),
+        (Phase.END, 0.0, 0.0, _END_S),
+    ]  # fmt: skip
+    values, phases = [], []
+    for phase, begin, end, seconds in parts:
+        n = max(1, round(seconds * rate))
+        values.append(np.linspace(begin, end, n))
+        phases.append(np.full(n, phase, np.int64))
+    return np.concatenate(values), np.concatenate(phases)
+
+
+async def run(run: Run, settings: BrakeSettings) -> BrakeResult:
+    """Test; the axis ends disabled, its brake closed, with its settings as they were.
+
+    Raises:
+        NotAllowed: nobody said what hangs at the axis, or something but slip ended the test.
+        OutOfRange: the permitted torque is less than the test torque needs.
+    """
+    axis, drive = run.axis, run.axis.drive
+    measured_at = datetime.now(UTC).isoformat(timespec="seconds")
+    if not settings.nothing_hangs and not settings.load_supported:
+        raise NotAllowed("brake.say-what-hangs", drive=drive.name)
+    facts = await read_facts(axis, settings.rated_torque_nm)
+    percent = _test_percent(settings, facts, drive.name)
+    obstacle = await _obstacle(run, settings)
+    if obstacle is not None:
+        return _cannot(obstacle, settings, facts, percent, measured_at)
+    require_signals(axis, run.session, Mode.CST, False)
+    units = await axis.require_certain_scales()
+    await quiet(axis)
+    means: Means = "supply" if settings.brake_supply_cut else "output"
+    trials: list[Trial] = []
+    async with _closed(axis, settings), stopping_hard(axis, settings.speed_limit):
+        for number, direction in enumerate(_DIRECTIONS):
+            trial = await _trial(run, settings, facts, units, direction, percent, number)
+            trials.append(trial)
+            if trial.halted and not np.any(trial.phase[_sent(trial)] >= Phase.RAMP):
+                break  # it is open: the other direction would only turn the axis as well
+    run.progress(0.95, text("brake.evaluating"))
+    test = Trials(
+        tuple(trials), 1.0 / cycle_s(run.session),
+        abs(units.torque(1.0)) / 100.0 * facts.rated_torque_nm, percent, means, measured_at,
+    )  # fmt: skip
+    if run.keep is not None:
+        meta = {"settings": settings.model_dump(mode="json"), "facts": asdict(facts)}
+        run.keep("brake-test", test.arrays(), {"tool": "brake-test", **meta, **test.facts()})
+    return await asyncio.to_thread(evaluate, test, settings, facts)
+
+
+def _sent(trial: Trial) -> npt.NDArray[np.bool_]:
+    return np.abs(trial.sent_nm) > 0
+
+
+async def _obstacle(run: Run, settings: BrakeSettings) -> Obstacle | None:
+    if not takes_torque(run.axis, run.session):
+        return "no_torque_mode"
+    means = run.axis.drive.profile.functions.brake_test
+    if settings.brake_supply_cut:
+        # Nobody can cut the supply of a brake that is inside the motor together with its drive.
+        return "built_in" if means is not None and means.obstacle == "built_in" else None
+    return await obstacle_of(run.axis.drive)
+
+
+def _test_percent(settings: BrakeSettings, facts: AxisFacts, name: str) -> float:
+    """The test torque in % of the motor's rated torque.
+
+    Raises:
+        NotAllowed: it is given in Nm, and what 100 % is, is not known.
+        OutOfRange: less torque is permitted.
+    """
+    wanted_nm = settings.test_torque_nm
+    if wanted_nm is None and settings.brake_rated_nm is not None:
+        wanted_nm = settings.test_percent / 100.0 * settings.brake_rated_nm
+    percent = settings.test_percent
+    if wanted_nm is not None:
+        if not facts.torque_known:
+            raise NotAllowed("brake.rated-torque-not-known", drive=name)
+        percent = 100.0 * wanted_nm / facts.rated_torque_nm
+    needed = _ABOVE_SHARE * percent + _ABOVE_PERCENT
+    if needed > settings.torque_limit:
+        raise OutOfRange(
+            "brake.torque-not-permitted", drive=name, value=round(percent, 2),
+            limit=f"{settings.torque_limit:g} %", percent=percent, needed=needed,
+        )  # fmt: skip
+    return percent
+
+
+def _cannot(
+    obstacle: Obstacle, settings: BrakeSettings, facts: AxisFacts, percent: float, measured_at: str
+) -> BrakeResult:
+    return BrakeResult(
+        verdict="cannot_be_tested", obstacle=obstacle, measured_at=measured_at,
+        rated_torque_nm=facts.rated_torque_nm if facts.torque_known else None,
+        brake_rated_nm=settings.brake_rated_nm, test_percent=percent,
+        slip_limit_rev=settings.envelope.travel_rev, torque_percent=None, of_brake_percent=None,
+    )  # fmt: skip
+
+
+@asynccontextmanager
+async def _closed(axis: Axis, settings: BrakeSettings) -> AsyncIterator[None]:
+    """The grant of the test, with nobody forcing outputs meanwhile, and the brake kept closed."""
+    purpose = "brake test"
+    with contextlib.ExitStack() as stack:
+        if keys := forcing_keys(axis.drive):
+            stack.enter_context(axis.granted(purpose, keys=keys))
+        stack.enter_context(axis.granted(purpose, settings.envelope))
+        if settings.brake_supply_cut:
+            yield
+            return
+        async with kept_closed(axis):
+            yield
+
+
+async def _trial(
+    run: Run, settings: BrakeSettings, facts: AxisFacts, units: AxisUnits,
+    direction: Literal[1, -1], percent: float, number: int,
+) -> Trial:  # fmt: skip
+    """One direction: a preload, which shows whether the brake is closed at all, then the ramp.
+
+    Beyond a limit the preload ends by a quick stop, as an open brake holds nothing. Later the
+    torque only becomes zero.
+    """
+    axis, session = run.axis, run.session
+    rate = 1.0 / cycle_s(session)
+    lead_s = _LEAD_S + await _opens_s(axis)
+    values, phases = sequence(direction * percent, settings.ramp_s, lead_s, rate)
+    raw = np.array([units.torque_raw(value) for value in values], np.int64)
+    begins = int(np.flatnonzero(phases == Phase.RAMP)[0])
+    step = text("brake.forwards") if direction > 0 else text("brake.backwards")
+    parts: list[Trial] = []
+    async with enabled(axis, session, Mode.CST) as start:
+        limits = await bus_limits(axis, settings.envelope, start)
+        for part, closed in ((slice(0, begins), False), (slice(begins, None), True)):
+            low = 0.05 + 0.45 * number + (0.2 if closed else 0.0)
+            done = share(run.progress, low, low + 0.22, step)
+            bounds = replace(limits, brake_closed=closed)
+            catch, halted = await _played(run, facts, raw[part], bounds, done)
+            parts.append(_placed(catch, raw[part], phases[part], units, facts, direction, halted))
+            if halted:
+                break
+    return _joined(parts)
+
+
+async def _played(
+    run: Run, facts: AxisFacts, raw: npt.NDArray[np.int64], limits: bus.Envelope,
+    progress: Callable[[float], None],
+) -> tuple[_Catch, bool]:  # fmt: skip
+    """What the bus saw, and whether a limit of travel or speed ended it."""
+    axis, session, drive = run.axis, run.session, run.axis.drive
+    keys = [drive.require(role) for role in ("position_actual", "torque_actual", "torque_target")]
+    first, second, third = (channel(drive, key) for key in keys)
+    catch, halted = _Catch((first, second, third)), False
+    unsubscribe = session.cyclic.blocks(catch.blocks.append)
+    try:
+        await play(axis, session, Play(Mode.CST, raw), limits, facts.rated_torque_nm, progress)
+    except EnvelopeExceeded as error:
+        if error.halt.cause not in (HaltCause.POSITION, HaltCause.SPEED):
+            raise
+        halted = True
+        await asyncio.sleep(_AFTER_HALT_S)
+    finally:
+        unsubscribe()
+    return catch, halted
+
+
+def _joined(parts: Sequence[Trial]) -> Trial:
+    def of(name: str) -> Any:
+        return np.concatenate([getattr(each, name) for each in parts])
+
+    return Trial(
+        direction=parts[0].direction, position_rad=of("position_rad"), torque_nm=of("torque_nm"),
+        sent_nm=of("sent_nm"), phase=of("phase"), valid=of("valid"), halted=parts[-1].halted,
+    )  # fmt: skip
+
+
+async def _opens_s(axis: Axis) -> float:
+    """How long the drive waits for its brake before it takes commands, by its parameters [s]."""
+    timing = axis.drive.profile.functions.brake
+    if timing is None:
+        return 0.0
+    found = [
+        await si(axis.drive, key) for key in (timing.open_delay_key, timing.command_delay_key)
+    ]  # fmt: skip
+    return sum(each for each in found if each) + (timing.open_fixed_ms or 0.0) / 1e3
+
+
+def _placed(
+    catch: _Catch, raw: npt.NDArray[np.int64], phases: npt.NDArray[np.int64], units: AxisUnits,
+    facts: AxisFacts, direction: Literal[1, -1], halted: bool,
+) -> Trial:  # fmt: skip
+    """Each sample with the part of the sequence that its cycle belongs to.
+
+    The first set-point that came back and is not the one before the motion tells where it began.
+    """
+    cycles, values, valid = catch.rows()
+    went = np.flatnonzero(valid & (values[:, 2] != raw[0]))
+    begun = int(cycles[went[0]] if went.size else cycles[0]) - int(np.argmax(raw != raw[0]))
+    row = cycles - begun
+    inside = (row >= 0) & (row < len(raw) + (0 if not halted else len(raw)))
+    row, values, valid = row[inside], values[inside], valid[inside]
+    nm = units.torque(1.0) / 100.0 * facts.rated_torque_nm
+    return Trial(
+        direction=direction,
+        position_rad=values[:, 0] * (units.position(1.0) * 2 * np.pi),
+        torque_nm=values[:, 1] * nm, sent_nm=values[:, 2] * nm,
+        phase=phases[np.clip(row, 0, len(raw) - 1)], valid=valid, halted=halted,
+    )  # fmt: skip
+
+
+TOOL = Tool(
+    kind="brake-test",
+    settings=BrakeSettings,
+    result=BrakeResult,
+    run=run,
+    reevaluate=reevaluate,
+    report=report,
+    texts=TEXTS,
+)

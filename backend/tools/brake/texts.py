@@ -1,0 +1,234 @@
+"""The words of a brake test, English and Chinese, and what a report shows of it.
+
+Signal words as in ISO 3864-2: danger is death or serious injury if it is not avoided, warning is
+where either could result.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from backend.tools.brake.result import BrakeResult, BrakeWay, Verdict
+from backend.tools.tool import Chart, Line, Note, Row, Section
+
+TEXTS: dict[str, tuple[str, str]] = {
+    "title": ("Brake test", "制动器测试"),
+    "help": (
+        "Torque against the closed holding brake, both directions, until the test torque or slip. "
+        "The axis is energised.",
+        "对闭合的保持制动器双向加转矩，直至测试转矩或打滑。轴会通电。",
+    ),
+    "lead": (
+        "The axis is energised while its holding brake stays closed, and the torque rises to the "
+        "test torque, forwards and then backwards. Where the shaft moves by the slip limit, the "
+        "torque is taken away in the next cycle.",
+        "保持制动器闭合时给轴通电，转矩先正向后反向升至测试转矩。轴移动达到打滑限值时，"
+        "在下一个周期撤去转矩。",
+    ),
+    "danger": (
+        "DANGER. A hanging load falls where its brake slips: support it so that it can neither "
+        "fall nor be lifted off its support, and let nobody be below it or within its reach.",
+        "危险。制动器打滑时悬挂负载会坠落：请将负载支撑牢固，使其既不能坠落也不会被抬离支撑，"
+        "其下方及可及范围内不得有人。",
+    ),
+    "warning": (
+        "WARNING. The shaft may turn suddenly. Keep away from everything that it drives. On a "
+        "drive that is told of no brake (its output has another function) nothing but this brake "
+        "holds the axis.",
+        "警告。轴可能突然转动，请远离其驱动的所有部件。驱动器在测试期间不控制制动器（其输出已改为"
+        "其他功能），轴仅由该制动器保持。",
+    ),
+    "step.support": (
+        "1. Move the load to its lowest place or support it there; lock the support.",
+        "1. 将负载移到最低位置，或在原处支撑并锁定支撑。",
+    ),
+    "step.clear": (
+        "2. Clear the danger zone, and keep STOP within reach.",
+        "2. 清空危险区域，并确保停止按钮触手可及。",
+    ),
+    "step.state": (
+        "3. State below what hangs at the axis, then start. Remove the support after a brake that "
+        "held, and never after one that slipped.",
+        "3. 在下方声明轴上的悬挂情况，然后启动。制动器保持后方可撤去支撑；打滑后切勿撤去。",
+    ),
+    "state_first": ("State first what hangs at the axis.", "请先声明轴上的悬挂情况。"),
+    "start": ("Test the brake", "测试制动器"),
+    "field.test_percent": ("Test torque (% of rated)", "测试转矩（额定的 %）"),
+    "field.test_torque_nm": ("Test torque (N·m), instead", "测试转矩 (N·m)，替代百分比"),
+    "field.brake_rated_nm": ("Rated torque of the brake (N·m)", "制动器额定转矩 (N·m)"),
+    "field.slip_limit_rev": ("Slip limit (revolutions)", "打滑限值（圈）"),
+    "field.ramp_s": ("Time of the ramp (s)", "斜坡时间 (s)"),
+    "field.brake_supply_cut": (
+        "I have disconnected the brake's supply",
+        "我已断开制动器电源",
+    ),
+    "field.nothing_hangs": (
+        "No load pulls at this axis, whether its brake holds or not",
+        "无论制动器是否保持，都没有负载拉动此轴",
+    ),
+    "field.load_supported": (
+        "The hanging load is supported and nobody is below it",
+        "悬挂负载已支撑，且其下方无人",
+    ),
+    "verdict.held": (
+        "The brake held {value} % of the motor's rated torque in both directions.",
+        "制动器双向保持了电机额定转矩的 {value} %。",
+    ),
+    "verdict.slipped": (
+        "The brake slipped at {value} % of the motor's rated torque. Do not rely on it: secure "
+        "the load, and have the brake repaired or replaced.",
+        "制动器在电机额定转矩的 {value} % 处打滑。请勿依赖该制动器：固定负载，并修理或更换制动器。",
+    ),
+    "verdict.not_closed": (
+        "The brake is not closed, or holds less than {value} % of the motor's rated torque. "
+        "Secure the load; then look at the brake's wiring and at its output.",
+        "制动器未闭合，或保持转矩低于电机额定转矩的 {value} %。请固定负载，"
+        "然后检查制动器接线及其输出。",
+    ),
+    "verdict.cannot_be_tested": ("The brake cannot be tested.", "无法测试制动器。"),
+    "obstacle.means_unknown": (
+        "Nothing is known of how this drive could keep its brake closed while it is enabled. "
+        "Disconnect the brake's supply, state that, and start again.",
+        "不知道该驱动器在使能时如何保持制动器闭合。请断开制动器电源并声明，然后重新开始。",
+    ),
+    "obstacle.built_in": (
+        "The brake inside the motor opens with the power stage; the manual prints no other way.",
+        "电机内置制动器随功率级打开；手册未给出其他方式。",
+    ),
+    "obstacle.fixed_output": (
+        "The drive's output for the brake opens it when the axis is enabled, and cannot be given "
+        "another function. Disconnect the brake's supply, state that, and start again.",
+        "轴使能时驱动器的制动器输出会打开制动器，且无法改为其他功能。请断开制动器电源并声明，"
+        "然后重新开始。",
+    ),
+    "obstacle.bus_bit": (
+        "Process data rule the brake (60FEh), or the drive by itself: the manual's excerpt does "
+        "not say which output, nor how to change its function. Disconnect the brake's supply, "
+        "state that, and start again.",
+        "制动器由过程数据 (60FEh) 或驱动器自身控制：手册节选未说明是哪个输出，"
+        "也未说明如何更改其功能。"
+        "请断开制动器电源并声明，然后重新开始。",
+    ),
+    "obstacle.no_output": (
+        "No output of the drive has the function of a brake. Where the drive does not control the "
+        "brake, disconnect the brake's supply, state that, and start again.",
+        "驱动器没有具有制动器功能的输出。若制动器不由驱动器控制，请断开制动器电源并声明，然后重新开始。",
+    ),
+    "obstacle.output_inverted": (
+        "The brake's output has inverted logic, so that another function might open the brake. "
+        "Disconnect the brake's supply, state that, and start again.",
+        "制动器输出为反逻辑，改为其他功能可能会打开制动器。请断开制动器电源并声明，然后重新开始。",
+    ),
+    "obstacle.output_forced": (
+        "60FEh would switch the brake's output on as soon as it has another function. Release the "
+        "forced outputs first.",
+        "一旦改为其他功能，60FEh 会接通制动器输出。请先释放强制输出。",
+    ),
+    "obstacle.no_torque_mode": (
+        "The drive takes no torque with every cycle over this bus (cyclic synchronous torque).",
+        "该驱动器在此总线上不能逐周期接收转矩（循环同步转矩模式）。",
+    ),
+    "obstacle.windup_beyond_limit": (
+        "The shaft twisted elastically by the slip limit, without any slip. Raise the slip limit, "
+        "or test with less torque.",
+        "轴的弹性扭转已达到打滑限值，但未打滑。请提高打滑限值，或以较小转矩测试。",
+    ),
+    "crept": (
+        "The shaft moved by {value} rev and did not come back: less than the slip limit.",
+        "轴移动了 {value} 圈且未返回：低于打滑限值。",
+    ),
+    "torque_short": (
+        "The drive reached only {value} % of the motor's rated torque: look at its torque limits.",
+        "驱动器仅达到电机额定转矩的 {value} %：请检查其转矩限制。",
+    ),
+    "by.output": (
+        "The brake was kept closed by its output, which had another function meanwhile.",
+        "制动器由其输出保持闭合，该输出在测试期间改为其他功能。",
+    ),
+    "by.supply": (
+        "Somebody stated that the brake's supply was disconnected.",
+        "操作人员声明已断开制动器电源。",
+    ),
+    "measured_at": ("Tested at {at} (UTC).", "测试时间 {at} (UTC)。"),
+    "test_torque": ("Test torque", "测试转矩"),
+    "torque.forward": ("Torque carried, forwards", "承受转矩，正向"),
+    "torque.backward": ("Torque carried, backwards", "承受转矩，反向"),
+    "of_brake": ("Torque carried, of the brake's rating", "承受转矩，占制动器额定值"),
+    "travel.forward": ("Travel, forwards", "行程，正向"),
+    "travel.backward": ("Travel, backwards", "行程，反向"),
+    "windup.forward": ("of it elastic windup, forwards", "其中弹性扭转，正向"),
+    "windup.backward": ("of it elastic windup, backwards", "其中弹性扭转，反向"),
+    "slip.forward": ("of it slip, forwards", "其中打滑，正向"),
+    "slip.backward": ("of it slip, backwards", "其中打滑，反向"),
+    "abort.forward": ("Slip limit to torque gone, forwards", "打滑限值至转矩消失，正向"),
+    "abort.backward": ("Slip limit to torque gone, backwards", "打滑限值至转矩消失，反向"),
+    "chart": ("Travel over torque", "行程-转矩"),
+    "chart_torque": ("Torque (% of rated)", "转矩（额定转矩的 %）"),
+    "chart_travel": ("Travel (revolutions)", "行程（圈）"),
+    "forward": ("forwards", "正向"),
+    "backward": ("backwards", "反向"),
+}
+_TONES: dict[Verdict, Literal["good", "warn"]] = {
+    "held": "good", "slipped": "warn", "not_closed": "warn", "cannot_be_tested": "warn",
+}  # fmt: skip
+#: Slip below this share of the limit is what an encoder and a settling hub show.
+_CREPT = 0.05
+_SHORT = 0.95
+
+
+def report(result: BrakeResult) -> Section:
+    """Verdict, what it rests on, and travel over torque."""
+    rated = result.rated_torque_nm
+    torque, unit = (0.01 * rated, "N·m") if rated else (1.0, "%")
+    rows = [Row("test_torque", torque * result.test_percent, unit)]
+    for way in result.ways:
+        rows += _rows(way, torque, unit)
+    if result.of_brake_percent is not None:
+        rows.append(Row("of_brake", result.of_brake_percent, "%"))
+    charts = []
+    if any(way.curve_torque_percent for way in result.ways):
+        lines = tuple(
+            Line(_name(way), way.curve_torque_percent, way.curve_travel_rev) for way in result.ways
+        )
+        charts.append(Chart("chart", "chart_torque", "chart_travel", lines))
+    return Section(tuple(notes(result)), tuple(rows), tuple(charts))
+
+
+def notes(result: BrakeResult) -> list[Note]:
+    """The verdict first."""
+    value = result.torque_percent
+    if result.verdict == "not_closed":
+        value = max(way.torque_ci95_percent[1] for way in result.ways)
+    shown = "" if value is None else f"{value:.3g}"
+    found = [Note(f"verdict.{result.verdict}", _TONES[result.verdict], {"value": shown})]
+    if result.obstacle is not None:
+        found.append(Note(f"obstacle.{result.obstacle}", "warn"))
+    found += [
+        Note("crept", "warn", {"value": f"{way.slip_rev:.2g}"})
+        for way in result.ways
+        if way.verdict == "held" and way.slip_rev > _CREPT * result.slip_limit_rev
+    ]
+    if result.verdict == "held" and value is not None and value < _SHORT * result.test_percent:
+        found.append(Note("torque_short", "warn", {"value": shown}))
+    if result.means is not None:
+        found.append(Note(f"by.{result.means}"))
+    found.append(Note("measured_at", "plain", {"at": result.measured_at[:19].replace("T", " ")}))
+    return found
+
+
+def _name(way: BrakeWay) -> str:
+    return "forward" if way.direction > 0 else "backward"
+
+
+def _rows(way: BrakeWay, torque: float, unit: str) -> list[Row]:
+    name = _name(way)
+    low, high = way.torque_ci95_percent
+    rows = [
+        Row(f"torque.{name}", torque * way.torque_percent, unit, (torque * low, torque * high)),
+        Row(f"travel.{name}", way.travel_rev, "rev"),
+        Row(f"windup.{name}", way.windup_rev, "rev"),
+        Row(f"slip.{name}", way.slip_rev, "rev"),
+    ]
+    if way.abort_ms is not None:
+        rows.append(Row(f"abort.{name}", way.abort_ms, "ms"))
+    return rows

@@ -1,0 +1,11 @@
+brake_backwards = backwards
+brake_enabled-already = { $drive } is enabled: what its brake's output does is changed with the motor without power only
+    .remedy = disable the axis first
+brake_evaluating = evaluating
+brake_forwards = forwards
+brake_rated-torque-not-known = { $drive } does not tell its rated torque, so that a test torque in N·m means nothing to it
+    .remedy = give the motor's rated torque, or the test torque in % of it
+brake_say-what-hangs = { $drive }: nobody has said whether a load hangs at this axis, and one would fall where its brake slips
+    .remedy = support a hanging load and state that (load_supported), or state that none pulls at the axis (nothing_hangs)
+brake_torque-not-permitted = { $drive }: a test torque of { NUM($percent, format: ".3g") } % of rated needs { NUM($needed, format: ".3g") } % to be permitted, as the actual torque swings about it
+    .remedy = permit more torque where motor and machine take it, or test with less

@@ -1,0 +1,141 @@
+"""Holding torque, windup and slip of traces that are written down by formula."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.brake.evaluate import Phase, Trial, Trials, evaluate, reevaluate
+from backend.tools.brake.result import BrakeResult
+from backend.tools.brake.run import sequence
+from backend.tools.brake.settings import BrakeSettings
+from backend.tools.brake.texts import TEXTS, report
+
+RATE, RATED_NM, TEST = 1000.0, 2.0, 100.0
+#: One revolution of windup at this many %: 0.005 rev at the test torque.
+STIFF = 20_000.0
+FACTS = AxisFacts(RATED_NM, True, None, None, None, None, None, True)
+ASKED = BrakeSettings(nothing_hangs=True)
+
+
+def trial(
+    direction: Literal[1, -1], slips_at: float | None = None, creep_rev: float = 0.0,
+    speed_rev_s: float = 1.0, noise_rev: float = 0.0,
+) -> Trial:  # fmt: skip
+    """An elastic hub; beyond ``slips_at`` % it turns until 0.02 rev, and the torque is gone 3 ms
+    after that. ``creep_rev`` is gained at the top of the ramp and stays."""
+    sent, phase = sequence(TEST, 1.0, 0.3, RATE)
+    torque = sent.copy()
+    turned = torque / STIFF
+    halted = False
+    if slips_at is not None:
+        first = int(np.argmax(torque > slips_at))
+        slid = np.clip((np.arange(torque.size) - first) / RATE * speed_rev_s, 0.0, None)
+        turned = turned + slid
+        out = int(np.argmax(turned >= 0.02))
+        halted = True
+        end = out + 60
+        sent, torque, turned, phase = sent[:end], torque[:end], turned[:end], phase[:end]
+        sent[out + 1 :], torque[out + 3 :] = 0.0, 0.0
+        turned[out + 3 :] = turned[out + 2]
+    turned = turned + creep_rev * (np.arange(torque.size) >= int(np.argmax(phase == Phase.TOP)))
+    turned = turned + noise_rev * np.random.default_rng(5).normal(size=turned.size)
+    nm = RATED_NM / 100.0 * direction
+    return Trial(
+        direction, 2 * np.pi * direction * turned + 7.0, nm * torque, nm * sent, phase,
+        np.ones(torque.size, np.bool_), halted,
+    )  # fmt: skip
+
+
+def trials(*parts: Trial) -> Trials:
+    return Trials(parts, RATE, 0.001 * RATED_NM, TEST, "output", "2026-11-23T03:00:00+00:00")
+
+
+def found_of(*parts: Trial, asked: BrakeSettings = ASKED) -> BrakeResult:
+    return evaluate(trials(*parts), asked, FACTS)
+
+
+@pytest.mark.parametrize("noise_rev", [0.0, 1e-5])
+def test_elastic_windup_is_no_slip(noise_rev: float) -> None:
+    found = found_of(trial(1, noise_rev=noise_rev), trial(-1, noise_rev=noise_rev))
+    assert found.verdict == "held"
+    for way in found.ways:
+        assert way.torque_percent == pytest.approx(TEST, rel=0.01)
+        assert way.windup_rev == pytest.approx(0.9 * TEST / STIFF, rel=0.02)
+        assert way.slip_rev == pytest.approx(0.0, abs=3e-5)
+        assert way.abort_ms is None
+
+
+@pytest.mark.parametrize("slips_at", [15.0, 40.0, 75.0, 98.0])
+def test_the_torque_where_it_slips(slips_at: float) -> None:
+    found = found_of(trial(1, slips_at), trial(-1))
+    assert found.verdict == "slipped"
+    assert [way.verdict for way in found.ways] == ["slipped", "held"]
+    assert found.torque_percent == pytest.approx(slips_at, rel=0.05)
+    first = found.ways[0]
+    low, high = first.torque_ci95_percent
+    assert low < slips_at < high
+    assert first.abort_ms == pytest.approx(3.0, abs=1.1)
+    assert first.slip_rev > 0.01
+
+
+def test_a_creep_below_the_limit_is_told_beside_the_verdict() -> None:
+    found = found_of(trial(1, creep_rev=0.005), trial(-1))
+    assert found.verdict == "held"
+    assert found.ways[0].slip_rev == pytest.approx(0.005, rel=0.02)
+    names = [note.name for note in report(found).notes]
+    assert names == ["verdict.held", "crept", "by.output", "measured_at"]
+
+
+def test_a_creep_beyond_a_smaller_limit_is_slip() -> None:
+    asked = ASKED.model_copy(update={"slip_limit_rev": 0.004})
+    assert found_of(trial(1, creep_rev=0.005), trial(-1), asked=asked).verdict == "slipped"
+
+
+def test_an_axis_that_turns_under_the_preload_has_no_closed_brake() -> None:
+    open_brake = trial(1, 5.0)
+    assert int(open_brake.phase[np.flatnonzero(open_brake.sent_nm)[-1]]) < Phase.RAMP
+    found = found_of(open_brake)
+    assert found.verdict == "not_closed"
+    # It turns from 5 % on and is 0.02 rev away after 20 ms of a rise by 10 % in 150 ms.
+    assert found.ways[0].torque_ci95_percent[1] == pytest.approx(5.0 + 20 * 10 / 150, abs=0.2)
+    words = report(found).notes[0]
+    assert (words.name, words.values["value"]) == ("verdict.not_closed", "6.43")
+
+
+def test_windup_alone_that_reaches_the_limit_is_no_slip() -> None:
+    """A limit of 0.003 rev is reached elastically, at 60 %: nothing is known of the brake then."""
+    soft = trial(1)
+    out = int(np.argmax(soft.position_rad - 7.0 >= 2 * np.pi * 0.003))
+    soft.sent_nm[out + 1 :], soft.torque_nm[out + 2 :] = 0.0, 0.0
+    soft.position_rad[out + 2 :] = 7.0
+    halted = Trial(
+        1, soft.position_rad, soft.torque_nm, soft.sent_nm, soft.phase, soft.valid, halted=True
+    )
+    asked = ASKED.model_copy(update={"slip_limit_rev": 0.003})
+    found = found_of(halted, asked=asked)
+    assert (found.verdict, found.obstacle) == ("cannot_be_tested", "windup_beyond_limit")
+
+
+def test_of_the_brakes_rating_and_again_from_a_file() -> None:
+    data = trials(trial(1, 75.0), trial(-1))
+    asked = ASKED.model_copy(update={"brake_rated_nm": 3.0})
+    found = evaluate(data, asked, FACTS)
+    assert found.of_brake_percent == pytest.approx(100 * 0.75 * RATED_NM / 3.0, rel=0.02)
+    facts = {name: getattr(FACTS, name) for name in FACTS.__dataclass_fields__}
+    meta: dict[str, Any] = {"settings": asked.model_dump(mode="json"), "facts": facts}
+    assert reevaluate(data.arrays(), meta | data.facts()) == found
+    with pytest.raises(ValueError, match="brake test"):
+        reevaluate({}, meta)
+
+
+def test_every_note_row_and_chart_has_words() -> None:
+    for found in (found_of(trial(1, 40.0), trial(-1)), found_of(trial(1), trial(-1))):
+        section = report(found)
+        names = {note.name for note in section.notes} | {row.name for row in section.rows}
+        for chart in section.charts:
+            names |= {chart.name, chart.x_name, chart.y_name, *(line.name for line in chart.lines)}
+        assert names <= TEXTS.keys()
