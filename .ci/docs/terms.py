@@ -72,7 +72,7 @@ def banned(terms: Sequence[Term], *, chinese: bool) -> list[Banned]:
     found = []
     for term in terms:
         for word in term.avoid_zh if chinese else term.avoid:
-            pattern = re.escape(word) if chinese else rf"\b{re.escape(word)}\b"
+            pattern = re.escape(word) if chinese else rf"\b{re.escape(word)}s?\b"
             found.append(
                 Banned(re.compile(pattern, re.IGNORECASE), word, term.zh if chinese else term.en)
             )

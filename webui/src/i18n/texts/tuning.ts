@@ -219,7 +219,7 @@ export const tuning = {
   ],
   'shape.backlash': ['A ragged line with poor coherence', '粗糙曲线且相干性差'],
   'shape.backlash.text': [
-    'Play in a gearbox, a key or a coupling: the load is struck, not turned. No filter helps; remove the play, or keep the axis loaded to one side.',
+    'Backlash in a gearbox, a key or a coupling: the load is struck, not turned. No filter helps; remove the backlash, or keep the axis loaded to one side.',
     '减速机、键或联轴器有间隙：负载被撞击而非带动。滤波无效；请消除间隙，或使轴始终单侧受力。',
   ],
   'shape.friction': ['Flat at the left', '左端平坦'],
@@ -291,7 +291,7 @@ export const tuning = {
   'undo.notches': ['Notches were written.', '已写入陷波。'],
   'undo.gains': ['Gains were written.', '已写入增益。'],
   'undo.candidate': ['A set of gains and notches was written.', '已写入一组增益和陷波。'],
-  'undo.undo': ['A change was taken back.', '已撤销更改。'],
+  'undo.undo': ['A change was undone.', '已撤销更改。'],
   'undo.button': ['Undo', '撤销'],
   'undo.all': ['Undo all the same', '仍然撤销'],
   'undo.what': ['Values from before ({count})', '之前的值（{count}）'],
@@ -375,7 +375,7 @@ export const tuning = {
   'report.deleteTitle': ['Delete this report?', '删除此报告？'],
   'inertia.title': ['Inertia and friction', '惯量与摩擦'],
   'inertia.lead': [
-    'The axis moves forth and back within the limits; from torque and speed follow inertia, friction and gravity.',
+    'The axis makes reciprocating moves within the limits. Inertia, friction and gravity are computed from torque and speed.',
     '轴在限制内往复运动，由转矩和速度求出惯量、摩擦和重力。',
   ],
   'inertia.scheme': ['How it may travel', '运动方式'],
@@ -398,7 +398,7 @@ export const tuning = {
   'inertia.searchSpeed': ['Speed for the search', '搜索速度'],
   'inertia.repetitions': ['Repetitions', '重复次数'],
   'inertia.motor': ['Motor alone', '仅电机'],
-  'inertia.motorHelp': ['for the load ratio; empty: as known', '用于惯量比；留空用已知值'],
+  'inertia.motorHelp': ['for the inertia ratio; empty: as known', '用于惯量比；留空用已知值'],
   'inertia.start': ['Measure the inertia', '测量惯量'],
   'inertia.sure': ['The data support this answer.', '数据支持该结果。'],
   'inertia.unsure': ['The data do not support an answer.', '数据不足以得出结果。'],
@@ -496,7 +496,7 @@ export const tuning = {
   ],
   'autotune.apply': ['Write and verify the result', '写入并验证结果'],
   'autotune.moves': [
-    'The axis is enabled and moves several times for about a minute: forth and back, shaken, and stepped, within ±{travel} rev, {speed} rpm and {torque} % of rated torque. Keep everyone clear of the machine.',
+    'The axis is enabled and moves several times for about a minute (reciprocating moves, excitation and steps), within ±{travel} rev, {speed} rpm and {torque} % of rated torque. Keep everyone clear of the machine.',
     '轴将使能并运动多次，约一分钟：往复、激振和阶跃，限制在 ±{travel} 转、{speed} rpm、{torque}% 额定转矩内。请确保无人靠近。',
   ],
   'autotune.start': ['Start tuning', '开始整定'],
@@ -512,7 +512,7 @@ export const tuning = {
     '未写入任何内容：该轴原有的设置比所有设计都快，并已通过验证。',
   ],
   'autotune.force.takenBack': [
-    'It was verified ({mark}) and taken back: the gains are as before.',
+    'It was verified ({mark}) and undone: the gains are as before.',
     '已验证（{mark}），随后撤销：增益与之前相同。',
   ],
   'autotune.force.changed': [
@@ -524,7 +524,7 @@ export const tuning = {
     '断电前有效。如需保留，请将参数保存到驱动器。',
   ],
   'autotune.tried': [
-    'Tried before, and taken back because the measurement did not keep the promise:',
+    'Tried before, and undone because the measurement missed the prediction:',
     '之前尝试过，但测量不符合预测指标，已撤销：',
   ],
   'autotune.verification': ['Verification', '验证'],
