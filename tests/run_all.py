@@ -87,6 +87,7 @@ QUICK = [
     Check("page: types and lint", [*NPM, "run", "--silent", "check"], ROOT / "webui"),
     Check("page: unit tests", [*NPM, "run", "--silent", "test"], ROOT / "webui"),
     Check("client drift", [sys.executable, "tests/client_drift.py"]),
+    Check("terms and sentences", [sys.executable, ".ci/docs", "--check"]),
     Check("supply chain", [sys.executable, ".ci/supply", "--check"]),
 ]
 TIMED = [

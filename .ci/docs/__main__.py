@@ -1,7 +1,7 @@
 """The checks of texts: banned words of the term base, length of sentences, pictures.
 
-    python .ci/docs --check      fail where a text breaks a rule
-    python .ci/docs --coverage   how much of the profiles' texts is there in Chinese
+``python .ci/docs --check`` fails where a text breaks a rule; ``python .ci/docs --coverage`` prints
+how much of the profiles' texts is there in Chinese.
 """
 
 from __future__ import annotations

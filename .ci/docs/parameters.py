@@ -9,19 +9,19 @@ from profiles.loader import drive_names, load_profile
 from profiles.schema import Parameter, Profile
 
 HEAD = """
-Generated from the profile. *Takes effect*: at once, at the next enabling, after "Write settings" or after a
-power cycle. *Source*: number of the manual and line. Ranges and defaults are engineering values where the
-parameter has a unit.
+Generated from the profile. *Takes effect*: at once, at the next enabling, after "Write settings"
+or after a power cycle. *Source*: number of the manual and line. Ranges and defaults are
+engineering values where the parameter has a unit.
 """
 
 
 def index() -> str:
     """The list of the drives."""
     rows = [
-        f"| [{profile.title}]({profile.drive}.md) | {len(profile.parameters)} | {len(profile.faults)} |"
-        for profile in map(load_profile, drive_names())
+        f"| [{one.title}]({one.drive}.md) | {len(one.parameters)} | {len(one.faults)} |"
+        for one in map(load_profile, drive_names())
     ]
-    head = "# Parameters\n\nEvery parameter of each profile. The search of these pages finds names and keys.\n"
+    head = "# Parameters\n\nEvery parameter of each profile. The search finds names and keys.\n"
     return "\n".join([head, "| drive | parameters | faults |", "| --- | --- | --- |", *rows, ""])
 
 

@@ -15,14 +15,15 @@ FILE = ROOT / "docs" / "glossary" / "terms.yaml"
 
 HEAD = """# Glossary
 
-The terms of servodeck in English and Chinese. Pages, messages and documentation use these words and no
-others; `python .ci/docs --check` (part of `make test`) refuses the words in the last column.
+The terms of servodeck in English and Chinese. Pages, messages and documentation use these words
+and no others; `python .ci/docs --check` (part of `make test`) refuses the words in the last column.
 The data are in `docs/glossary/terms.yaml`.
 
-Sources: *CiA* 301, 305 and 402 (CANopen, LSS, drives), *IEC 61800-7* (drive interfaces), *ETG* 1000 and 6010
-(EtherCAT), *ISO 3864* and *ANSI Z535* (safety signs), *IEC 60204-1* and *IEC 61800-5-2* (stop categories,
-safety functions). A number such as 004:1826 is a line of a drive's manual. *Usage* marks a usual term of the
-field without a standard that defines it here.
+Sources: *CiA* 301, 305, 306 and 402 (CANopen, LSS, EDS, drives), *IEC 61800-7* (drive interfaces),
+*ETG* 1000, 2000 and 2100 (EtherCAT), *ISO 3864* and *ANSI Z535* (safety signs), *IEC 60204-1* and
+*IEC 61800-5-2* (stop categories, safety functions), *GB/T* where a national standard is known.
+*Usage* marks a usual term of the field without a standard that defines it here; *servodeck* one of
+ours.
 """
 
 
@@ -55,9 +56,9 @@ def load(file: Path = FILE) -> list[Term]:
     terms: list[Term] = []
     for field, records in yaml.safe_load(file.read_text("utf-8")).items():
         for record in records:
-            lists = {name: tuple(record.pop(name, ())) for name in ("avoid", "avoid_zh")}
+            avoid, avoid_zh = (tuple(record.pop(name, ())) for name in ("avoid", "avoid_zh"))
             try:
-                terms.append(Term(field=field, **record, **lists))
+                terms.append(Term(field=field, avoid=avoid, avoid_zh=avoid_zh, **record))
             except TypeError as error:
                 raise ValueError(f"{file.name}: {record}: {error}") from error
     names = [term.en.lower() for term in terms]
