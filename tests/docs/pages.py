@@ -48,11 +48,15 @@ def commands(page: Path) -> list[Shown]:
     return found
 
 
-def named(page: Path) -> list[tuple[int, tuple[str, ...]]]:
-    """Every call of servodeck that a page names anywhere: in blocks of code and inside lines."""
-    found = []
+def named(page: Path) -> list[tuple[int, str]]:
+    """Every call of servodeck that a page names: in blocks of code and inside lines."""
+    found, inside = [], False
     for number, line in enumerate(page.read_text("utf-8").splitlines(), 1):
-        inline = re.findall(r"`(servodeck [^`]+)`", line)
-        block = re.findall(r"^\s*(?:\$ |sudo )?(servodeck .+)$", line)
-        found += [(number, tuple(one.split())) for one in inline or block]
+        if line.strip().startswith("```"):
+            inside = not inside
+        elif inside:
+            calls = re.findall(r"^\s*(?:\$ )?servodeck (.+?)(?:   .*|\s*#.*)?$", line)
+            found += [(number, one) for one in calls]
+        else:
+            found += [(number, one) for one in re.findall(r"`servodeck ([^`]+)`", line)]
     return found
