@@ -100,6 +100,27 @@ def _words(file: Path, lines: Iterable[Line], rules: Sequence[Banned]) -> Iterat
                 yield Finding(file, line.number, f"“{rule.word}”: write “{rule.better}”")
 
 
+def long_texts() -> Iterator[Finding]:
+    """Sentences of messages and of the page that are longer than `LONGEST` words."""
+    for file in sorted(CATALOGUE.rglob("*.en.ftl")):
+        for number, line in enumerate(file.read_text("utf-8").splitlines(), 1):
+            text = re.sub(r"^\s*[\w.-]+ = ", "", re.sub(r"\{[^{}]*\}", "X", line))
+            yield from _long(file, number, _split(text))
+    for file in sorted(PAGE_TEXTS.glob("*.ts")):
+        if file.name.startswith("said"):
+            continue
+        for number, line in enumerate(file.read_text("utf-8").splitlines(), 1):
+            for single, double in re.findall(r"'((?:[^'\\]|\\.)*)'|\"([^\"]*)\"", line):
+                yield from _long(file, number, _split(single or double))
+
+
+def _long(file: Path, line: int, found: Iterable[str]) -> Iterator[Finding]:
+    for sentence in found:
+        count = len(re.findall(r"[\w’'`{}–-]+", sentence))
+        if count > LONGEST:
+            yield Finding(file, line, f"{count} words in one sentence: {sentence[:60]}…")
+
+
 def long_sentences() -> Iterator[Finding]:
     """Sentences of the read pages that are longer than `LONGEST` words."""
     for page in pages():
@@ -107,9 +128,7 @@ def long_sentences() -> Iterator[Finding]:
         if name.startswith((*REFERENCE, "zh/")):
             continue
         for line, sentence in sentences(page.read_text("utf-8")):
-            count = len(re.findall(r"[\w’'`–-]+", sentence))
-            if count > LONGEST:
-                yield Finding(page, line, f"{count} words in one sentence: {sentence[:60]}…")
+            yield from _long(page, line, [sentence])
 
 
 def sentences(text: str) -> Iterator[tuple[int, str]]:

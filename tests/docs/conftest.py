@@ -9,12 +9,23 @@ import pytest
 
 from tests.support.station import Station
 
+ROOT = Path(__file__).resolve().parents[2]
+STANDARD_BENCH = ROOT / "drivers" / "virtual" / "standard_bench.toml"
+
 
 @pytest.fixture(scope="module")
 def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
-    """What `servodeck demo` starts; the segment follows the frames, however late they come."""
+    """The drives of `servodeck demo` that the pages use.
+
+    The segment follows the frames, however late they come.
+    """
     folder = Path(tmp_path_factory.mktemp("walks"))
-    running = Station(folder, segment_options=["--lockstep"], steady=True)
+    head, *axes = STANDARD_BENCH.read_text("utf-8").split("[[axis]]")
+    used = [axis for axis in axes if 'drive = "mms7"' in axis or 'drive = "ds_c"' in axis]
+    assert len(used) == 5
+    bench = folder / "bench.toml"
+    bench.write_text("[[axis]]".join([head, *used]), "utf-8")
+    running = Station(folder, bench, segment_options=["--lockstep"], steady=True)
     running.start()
     yield running
     running.stop()
