@@ -28,8 +28,10 @@ fmt: $(VENV)/.dev ## format Python and TypeScript
 	$(BIN)/ruff check --fix .
 	cd webui && $(NPM) run fmt
 
-docs: $(VENV)/.dev ## the documentation, in site/
+docs: $(VENV)/.dev ## the documentation, in site/, and how much of the profiles' texts is there in Chinese
+	$(BIN)/python .ci/docs --check
 	$(BIN)/mkdocs build --strict
+	$(BIN)/python .ci/docs --coverage
 
 check-python:
 	@$(PYTHON) -c 'import sys; sys.exit("servodeck needs Python 3.11 or newer" if sys.version_info < (3, 11) else 0)'

@@ -33,7 +33,7 @@ REAL_TIME = [
     "tests/api/test_ethercat_segment.py", "tests/api/test_every_family.py",
     "tests/wire/ethercat_host",
     "tests/api/test_scope_streams.py", "tests/api/test_scope_soak.py",
-    "tests/api/test_stop_floods.py",
+    "tests/api/test_stop_floods.py", "tests/docs",
 ]  # fmt: skip
 #: Suites that compute and keep no time: what the others leave of the machine is enough for them.
 PATIENT = [
@@ -94,6 +94,7 @@ QUICK = [
     Check("page: types and lint", [*NPM, "run", "--silent", "check"], ROOT / "webui"),
     Check("page: unit tests", [*NPM, "run", "--silent", "test"], ROOT / "webui"),
     Check("client drift", [sys.executable, "tests/client_drift.py"]),
+    Check("terms and sentences", [sys.executable, ".ci/docs", "--check"]),
     Check("supply chain", [sys.executable, ".ci/supply", "--check"]),
 ]
 TIMED = [

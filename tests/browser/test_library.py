@@ -109,11 +109,11 @@ def test_tags_search_and_putting_aside(
     expect(row).to_be_visible()
     phone.get_by_label("Search").fill("")
     phone.get_by_role("button", name="Put other.sdset aside").click()
-    phone.get_by_role("dialog").get_by_role("button", name="Put aside").click()
+    phone.get_by_role("dialog").get_by_role("button", name="Archive").click()
     expect(phone.get_by_role("article", name="other.sdset")).to_have_count(0)
-    phone.get_by_label("What was put aside").check()
-    phone.get_by_role("button", name="Take other.sdset back").click()
-    phone.get_by_label("What was put aside").uncheck()
+    phone.get_by_label("Archived entries").check()
+    phone.get_by_role("button", name="Restore other.sdset").click()
+    phone.get_by_label("Archived entries").uncheck()
     expect(phone.get_by_role("article", name="other.sdset")).to_be_visible()
 
 

@@ -196,7 +196,7 @@ def test_escape_stops_a_jog(laptop: Page, bench: Bench) -> None:
 
 def _start_sequence(page: Page, bench: Bench) -> None:
     open_axis(page, bench.drive, "motion")
-    page.get_by_text("Back and forth", exact=True).first.click()
+    page.get_by_text("Reciprocating", exact=True).first.click()
     here = round(bench.state()["position"], 3)
     page.get_by_label("First position").fill(str(here))
     page.get_by_label("Second position").fill(str(here + 3))

@@ -116,7 +116,7 @@ def test_period_after_period_keeps_the_place_that_the_edges_tell() -> None:
 
 
 def test_a_sequence_that_another_one_replaced_is_refused() -> None:
-    with pytest.raises(LinkLost, match="X: the set-points do not come back"):
+    with pytest.raises(LinkLost, match="X: the setpoints do not come back"):
         aligned(noise(), recorded(np.flipud(noise())), "X")
 
 

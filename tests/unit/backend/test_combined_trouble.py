@@ -92,9 +92,9 @@ async def test_nothing_begins_to_move_on_its_way_off_the_bench(
         while not bench.motion._parting:  # noqa: ASYNC110 - a set has no event
             await asyncio.sleep(0)
     await asyncio.sleep(0.05)
-    with pytest.raises(Busy, match="taken off the bench"):
+    with pytest.raises(Busy, match="removed from the axis list"):
         begin(bench)
-    with pytest.raises(Busy, match="taken off the bench"):
+    with pytest.raises(Busy, match="removed from the axis list"):
         await bench.remove("x")
     servo.gate.set()
     await removing

@@ -26,7 +26,7 @@ from tests.virtual.tools.rig import WIDE, mechanics, settings_of
 ONE = mechanics((1e-4, 60.0, 0.006))
 TOOLS: dict[str, tuple[str, Callable[[DirectBench, Progress], Awaitable[object]]]] = {
     "inertia": (
-        "moving forth and back",
+        "reciprocating move",
         lambda b, p: inertia(b.axis, b.session, InertiaSettings(WIDE), p),
     ),
     "step": ("stepping", lambda b, p: step_response(b.axis, b.session, StepSettings(WIDE), p)),

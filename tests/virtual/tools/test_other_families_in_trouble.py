@@ -78,9 +78,9 @@ FAULT = {"r6l": "over_temperature", "ep3e": "over_temperature", "ds_c": "overloa
 midways = pytest.mark.parametrize(
     ("drive", "tool", "step"),
     [
-        ("r6l", "inertia", "moving forth and back"),
+        ("r6l", "inertia", "reciprocating move"),
         ("ep3e", "sweep", "measuring"),
-        ("ds_c", "inertia", "moving forth and back"),
+        ("ds_c", "inertia", "reciprocating move"),
     ],
     ids=list(FAULT),
 )
@@ -144,7 +144,7 @@ async def test_an_emergency_stop_that_is_released_lets_nothing_go_on() -> None:
     async with under("ds_c") as b:
         before = await settings_of(b.axis.drive, MODE)
         control = b.device.control  # type: ignore[attr-defined]
-        at = At("moving forth and back", lambda: control.emergency_stop(True))
+        at = At("reciprocating move", lambda: control.emergency_stop(True))
         with pytest.raises(Interrupted, match="left Operation enabled"):
             await b.measure("inertia", at.progress)
         assert at.done

@@ -87,8 +87,8 @@ async def settled(b: Bench | CanBench, before: dict[str, object]) -> bool:
 @pytest.mark.parametrize(
     ("drive", "part", "step", "fraction", "kind"),
     [
-        ("r6l", "inertia", "moving forth and back", 0.45, "power"),
-        ("mms7", "inertia", "moving forth and back", 0.45, "cable"),
+        ("r6l", "inertia", "reciprocating move", 0.45, "power"),
+        ("mms7", "inertia", "reciprocating move", 0.45, "cable"),
         ("ep3e", "sweep", "realisation 1 of 2", 0.3, "power"),
         ("r6l", "notches", "trying notch 2", 0.3, "power"),
         ("mms7", "verify", "6 of 6: measuring the tuned loop: measuring", 0.8, "power"),
@@ -113,7 +113,7 @@ async def test_over_ethercat(
 
 
 @pytest.mark.parametrize(
-    ("part", "step"), [("inertia", "moving forth and back"), ("sweep", "realisation 2 of 2")]
+    ("part", "step"), [("inertia", "reciprocating move"), ("sweep", "realisation 2 of 2")]
 )
 async def test_over_canopen(part: str, step: str) -> None:
     """The control supply of a DS_C, which has no watchdog, is off for two seconds."""

@@ -21,7 +21,7 @@ describe('what the server says of a job', () => {
     expect(
       said(
         zh,
-        'Axis 1: no candidate kept its promise when it was verified: ' +
+        'Axis 1: no design met its prediction in the verification: ' +
           '83 Hz: sensitivity 2.10 instead of 1.80; phase margin 31° instead of 45°; ' +
           'the time for one tuning was used up',
       ),

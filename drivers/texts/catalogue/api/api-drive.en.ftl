@@ -1,4 +1,4 @@
-api-drive_back-forth = Back and forth: { $member_drive }
+api-drive_back-forth = Reciprocating move: { $member_drive }
 api-drive_commands-motion-axis-enabled = { $drive }: { $parameter } commands motion and the axis is enabled
     .remedy = use the Motion page, which sets limits and a dead-man; or disable the axis
 api-drive_cyclic-exchange-not-run = { $drive }: the cyclic exchange does not run

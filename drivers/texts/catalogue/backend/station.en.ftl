@@ -1,6 +1,6 @@
 station_another-servodeck-uses-state = another servodeck uses the state folder { $folder }: two would write over one another's list of drives and move the same axes
     .remedy = end the other one, or choose another folder with --config
-station_being-taken-off-bench = { $drive } is being taken off the bench
+station_being-taken-off-bench = { $drive } is being removed from the axis list
     .remedy = wait until it is gone, then add it again if it is still needed
 station_cyclic-exchange-just-being = { $url }: the cyclic exchange is just being changed
     .remedy = wait for it

@@ -1,6 +1,6 @@
 station_another-servodeck-uses-state = 另一个 servodeck 正在使用状态文件夹 { $folder }：两者会互相覆盖驱动器列表并使相同的轴运动
     .remedy = 请结束另一个，或用 --config 选择其他文件夹
-station_being-taken-off-bench = { $drive } 正从调试台移除
+station_being-taken-off-bench = { $drive } 正从轴列表移除
     .remedy = 请等待移除完成，如仍需要再添加
 station_cyclic-exchange-just-being = { $url }：正在更改循环交换
     .remedy = 请等待

@@ -1,5 +1,5 @@
 canopen_adapter = CAN 适配器 { $name }：{ $why }
-canopen_adapter-bus-off-switched = CAN 适配器 { $channel }：总线关闭，因错误过多已自行断开
+canopen_adapter-bus-off-switched = CAN 适配器 { $channel }：总线离线（Bus-off），因错误过多已自行断开
     .remedy = 请检查各节点的比特率、CAN_H 与 CAN_L 之间的接线和终端电阻；适配器会自动重新启动
 canopen_adapter-closed = CAN 适配器 { $channel } 已关闭
 canopen_asking-nodes = 正在询问节点 { $group } 至 { $other_group }

@@ -1,4 +1,4 @@
-friction_actual-torque-not-change = { $drive }: its actual torque ({ $parameter }) does not change while the axis moves forth and back, so that friction cannot be known from it
+friction_actual-torque-not-change = { $drive }: its actual torque ({ $parameter }) does not change during a reciprocating move; friction cannot be computed from it
     .remedy = use a drive or a bus that reports the actual torque with every cycle
 friction_between-rpm-rpm-fastest = between { NUM($slowest_rpm, format: ".3g") } rpm and { NUM($fastest_rpm, format: ".3g") } rpm, the fastest speed that the limits of travel and speed leave, there is nothing to map
     .remedy = permit more travel or speed, or ask for a lower slowest speed

@@ -93,7 +93,7 @@ export const axis = {
   'procedures.run': ['Run', '执行'],
   'motion.tab.jog': ['Jog', '点动'],
   'motion.tab.move': ['Move', '移动'],
-  'motion.tab.sequence': ['Back and forth', '往复'],
+  'motion.tab.sequence': ['Reciprocating', '往复'],
   'motion.tab.homing': ['Homing', '回零'],
   'motion.unit': ['Units', '输入单位'],
   'motion.speed': ['Speed', '速度'],
@@ -211,7 +211,7 @@ export const axis = {
     'I agree for this one move. The drive’s travel limits are active and a hand is on the emergency stop.',
     '我同意本次移动。驱动器行程限位已启用，且手在急停按钮上。',
   ],
-  'sequence.title': ['Back and forth', '往复'],
+  'sequence.title': ['Reciprocating move', '往复运动'],
   'sequence.help': [
     'Moves between two absolute positions, with a pause at each.',
     '在两个绝对位置之间往复，每处停顿。',

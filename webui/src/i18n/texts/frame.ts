@@ -48,7 +48,7 @@ export const frame = {
     "trigger of the drive's own motion cleared",
     '已撤销驱动器自身的运动',
   ],
-  'stop.step.brake_applied': ['holding brake applied', '已施加保持制动器'],
+  'stop.step.brake_applied': ['holding brake applied', '抱闸已抱紧'],
   'stop.step.voltage_disabled': ['power switched off', '已切断动力'],
   'stop.step.process_data_ended': [
     "process data ended, so that the drive's watchdog trips",
@@ -133,7 +133,7 @@ export const frame = {
   'mode.Cyclic synchronous position': ['Cyclic synchronous position', '周期同步位置'],
   'mode.Cyclic synchronous velocity': ['Cyclic synchronous velocity', '周期同步速度'],
   'mode.Cyclic synchronous torque': ['Cyclic synchronous torque', '周期同步转矩'],
-  'bit.set-point acknowledged': ['set-point acknowledged', '设定值已确认'],
+  'bit.set-point acknowledged': ['setpoint acknowledged', '设定值已确认'],
   'bit.following error': ['following error', '跟随误差'],
   'bit.speed is zero': ['speed is zero', '速度为零'],
   'bit.maximum slippage': ['maximum slippage', '最大滑差'],

@@ -19,11 +19,11 @@ export const saidOfTuning = {
     '{hz} Hz 以上的响应不够确知：被折叠回来的成分将其掩盖。不据以上部分下结论；缩短周期可使其显现',
   ],
   'said.undoStale': [
-    '{name}: {key} is {raw} now, where this change had left {left}: it was changed again since, so nothing was taken back',
+    '{name}: {key} is {raw} now, where this change had left {left}: it was changed again since, so nothing was undone',
     '{name}：{key} 现为 {raw}，而此更改写入的是 {left}：之后又被修改过，因此未撤销',
   ],
   'said.rUndoStale': [
-    'look at the list of changes; take it back all the same, or write the value that you want',
+    'look at the list of changes; undo it all the same, or write the value that you want',
     '请查看更改列表；仍然撤销，或写入所需的值',
   ],
   'said.wSaturated': [
@@ -206,7 +206,7 @@ export const saidOfTuning = {
     'once more, gently: the load swings at {hz} Hz',
     '放缓重做一次：负载以 {hz} Hz 摆动',
   ],
-  'said.iMoving': ['moving forth and back', '往复运动中'],
+  'said.iMoving': ['reciprocating move', '往复运动中'],
   'said.iNoEnd': ['{axis} found no end within {rev} rev', '{axis} 在 {rev} rev 内未找到端点'],
   'said.iNoEndTry': [
     'use the free scheme if it turns without ends, or allow a longer search',
@@ -424,9 +424,9 @@ export const saidOfTuning = {
     'there was no time to try its notches again where samples were lost',
     '丢失采样后已没有时间再次尝试其陷波器',
   ],
-  'said.tNone': ['no candidate kept its promise when it was verified', '验证时没有方案达到预期'],
+  'said.tNone': ['no design met its prediction in the verification', '验证时没有方案达到预期'],
   'said.tNoneTry': [
-    'all parameters are as before; look for play and loose parts, measure again, or choose gains by hand',
+    'all parameters are as before; look for backlash and loose parts, measure again, or choose gains by hand',
     '所有参数均保持原样；请检查间隙和松动部件、重新测量，或手动选择增益',
   ],
   'said.tMechanics': [

@@ -14,7 +14,7 @@ export const saidTexts = {
   'said.load': ['Load {file} into {axis}', '将 {file} 载入 {axis}'],
   'said.firmware': ['Load firmware {file} into {axis}', '将固件 {file} 载入 {axis}'],
   'said.move': ['Move {axis} ({mode})', '移动 {axis}（{mode}）'],
-  'said.sequence': ['Back and forth', '往复运动'],
+  'said.sequence': ['Reciprocating move', '往复运动'],
   'said.home': ['Home {axis} (method {method})', '{axis} 回零（方式 {method}）'],
   'said.jog': ['Jog {axis}', '点动 {axis}'],
   'said.identify': ['Identification by the drive', '驱动器自行辨识'],

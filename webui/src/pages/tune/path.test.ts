@@ -1,10 +1,13 @@
 import { describe, expect, it } from 'vitest'
-import { type Known, later, nextStep, stepsDone, tunedAt } from './path'
+import { type Known, later, nextStep, STEPS, stepsDone, tunedAt } from './path'
 
 const at = (minute: number) => new Date(Date.UTC(2026, 2, 1, 12, minute)).toISOString()
 const start: Known = { ready: false, inertia: false, changed: null, measured: [], reported: null }
 
 describe('the guided path', () => {
+  it('has the order of the automatic tuning', () => {
+    expect(STEPS.join(' ')).toBe('checks inertia response notches gains verify report')
+  })
   it('begins with what must be right before anything moves', () => {
     expect(nextStep(stepsDone(start))).toBe('checks')
     expect(nextStep(stepsDone({ ...start, ready: true }))).toBe('inertia')

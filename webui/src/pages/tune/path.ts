@@ -1,11 +1,12 @@
 import type { MeasurementInfo } from '../../api/schema'
 
+/** The steps of *Tune automatically* (`autotune.*` of the catalogue), and the report after them. */
 export const STEPS = [
   'checks',
   'inertia',
-  'gains',
   'response',
   'notches',
+  'gains',
   'verify',
   'report',
 ] as const

@@ -1,0 +1,163 @@
+"""Checks of texts: banned words, length of sentences, pictures that exist."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from terms import ROOT, Banned, Term, banned
+
+DOCS = ROOT / "docs"
+CATALOGUE = ROOT / "drivers" / "texts" / "catalogue"
+PAGE_TEXTS = ROOT / "webui" / "src" / "i18n" / "texts"
+#: Words that a sentence may have outside of reference pages.
+LONGEST = 30
+#: Pages that are looked up and not read: their sentences may be longer.
+REFERENCE = (
+    "adr/", "architecture.md", "audit.md", "backup.md", "buses/", "drives/", "friction.md",
+    "import.md", "library.md", "not-operational.md", "parameter-sets.md", "recording.md",
+    "reference/", "scope.md", "security.md", "station.md", "tuning-accuracy.md",
+    "tuning.md", "virtual-drives.md", "pages.md", "safety.md", "handover.md", "install.md",
+    "remote-support.md", "command-line.md",
+)  # fmt: skip
+
+
+class Finding(NamedTuple):
+    """What is wrong at a place."""
+
+    file: Path
+    line: int
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.file.relative_to(ROOT)}:{self.line}: {self.text}"
+
+
+class Line(NamedTuple):
+    """A line of prose and where it stands."""
+
+    number: int
+    text: str
+
+
+def pages() -> list[Path]:
+    """Every page of the documentation."""
+    return sorted(DOCS.rglob("*.md"))
+
+
+def prose(text: str) -> Iterator[Line]:
+    """The lines of a page without code, neither in blocks nor inside a line."""
+    fence = ""
+    for number, line in enumerate(text.splitlines(), 1):
+        found = re.match(r"\s*(```+|~~~+)", line)
+        if found:
+            fence = "" if fence else found[1]
+            continue
+        if not fence:
+            yield Line(number, re.sub(r"`[^`]*`", "`code`", line))
+
+
+def words_in_pages(terms: Sequence[Term]) -> Iterator[Finding]:
+    """Banned words in the documentation."""
+    for page in pages():
+        rules = banned(terms, chinese=page.is_relative_to(DOCS / "zh"))
+        yield from _words(page, prose(page.read_text("utf-8")), rules)
+
+
+def words_in_messages(terms: Sequence[Term]) -> Iterator[Finding]:
+    """Banned words in the catalogue of messages, whose names are left out."""
+    for file in sorted(CATALOGUE.rglob("*.ftl")):
+        lines = (
+            Line(number, re.sub(r"^\s*[\w.-]+ = |\{[^{}]*\}", "", line))
+            for number, line in enumerate(file.read_text("utf-8").splitlines(), 1)
+            if not line.startswith("#")
+        )
+        yield from _words(file, lines, banned(terms, chinese=file.name.endswith(".zh.ftl")))
+
+
+def words_on_page(terms: Sequence[Term]) -> Iterator[Finding]:
+    """Banned words in the texts of the page; English and Chinese stand in one file.
+
+    ``said*.ts`` are left out: they are patterns of the server's sentences, not texts of the page.
+    """
+    rules = [*banned(terms, chinese=False), *banned(terms, chinese=True)]
+    for file in sorted(PAGE_TEXTS.glob("*.ts")):
+        if file.name.startswith("said"):
+            continue
+        lines = (
+            Line(number, re.sub(r"^\s*(//|/?\*).*|^\s*'[^']+':", "", line))
+            for number, line in enumerate(file.read_text("utf-8").splitlines(), 1)
+        )
+        yield from _words(file, lines, rules)
+
+
+def _words(file: Path, lines: Iterable[Line], rules: Sequence[Banned]) -> Iterator[Finding]:
+    for line in lines:
+        for rule in rules:
+            if rule.pattern.search(line.text):
+                yield Finding(file, line.number, f"“{rule.word}”: write “{rule.better}”")
+
+
+def long_texts() -> Iterator[Finding]:
+    """Sentences of messages and of the page that are longer than `LONGEST` words."""
+    for file in sorted(CATALOGUE.rglob("*.en.ftl")):
+        for number, line in enumerate(file.read_text("utf-8").splitlines(), 1):
+            text = re.sub(r"^\s*[\w.-]+ = ", "", re.sub(r"\{[^{}]*\}", "X", line))
+            yield from _long(file, number, _split(text))
+    for file in sorted(PAGE_TEXTS.glob("*.ts")):
+        if file.name.startswith("said"):
+            continue
+        for number, line in enumerate(file.read_text("utf-8").splitlines(), 1):
+            for single, double in re.findall(r"'((?:[^'\\]|\\.)*)'|\"([^\"]*)\"", line):
+                yield from _long(file, number, _split(single or double))
+
+
+def _long(file: Path, line: int, found: Iterable[str]) -> Iterator[Finding]:
+    for sentence in found:
+        count = len(re.findall(r"[\w’'`{}–-]+", sentence))
+        if count > LONGEST:
+            yield Finding(file, line, f"{count} words in one sentence: {sentence[:60]}…")
+
+
+def long_sentences() -> Iterator[Finding]:
+    """Sentences of the read pages that are longer than `LONGEST` words."""
+    for page in pages():
+        name = page.relative_to(DOCS).as_posix()
+        if name.startswith((*REFERENCE, "zh/")):
+            continue
+        for line, sentence in sentences(page.read_text("utf-8")):
+            yield from _long(page, line, [sentence])
+
+
+def sentences(text: str) -> Iterator[tuple[int, str]]:
+    """The sentences of a page with the line at which their paragraph begins."""
+    start, paragraph = 0, ""
+    for line in [*prose(text), Line(0, "")]:
+        bare = line.text.strip()
+        alone = re.match(r"([-*] |\d+\. |#|!!!|\||!\[)", bare)
+        if not bare or alone:
+            yield from ((start, one) for one in _split(paragraph))
+            paragraph = ""
+        if bare.startswith("|"):
+            yield from (
+                (line.number, one) for cell in bare.split("|") for one in _split(cell.strip())
+            )
+        elif bare and not bare.startswith(("!!!", "![")):
+            start = line.number if not paragraph else start
+            paragraph += " " + re.sub(r"^([-*]|\d+\.|#+) ", "", bare)
+
+
+def _split(paragraph: str) -> list[str]:
+    plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", paragraph.strip())
+    return [one for one in re.split(r"(?<=[.!?:;])\s+", plain) if one]
+
+
+def missing_pictures() -> Iterator[Finding]:
+    """Pictures that a page shows and that are no files."""
+    for page in pages():
+        for line in prose(page.read_text("utf-8")):
+            for target in re.findall(r"!\[[^\]]*\]\(([^)]+)\)", line.text):
+                if not (page.parent / target).is_file():
+                    yield Finding(page, line.number, f"there is no picture {target}")
