@@ -337,14 +337,9 @@ class SamplesLost(NotAllowed):
 
 def samples_lost(axis: Axis, tries: int) -> SamplesLost:
     """That so many tries of one value all lost samples."""
-    words = f"samples were lost in {tries} tries of a notch in a row"
     if tries < ATTEMPTS:
-        words = "there was no time to try its notches again where samples were lost"
-    return SamplesLost(
-        f"{axis.drive.name}: {words}",
-        drive=axis.drive.name,
-        remedy="look at the link quality; the computer or the bus is overloaded",
-    )
+        return SamplesLost("notch.samples-lost-no-time", drive=axis.drive.name)
+    return SamplesLost("notch.samples-lost", drive=axis.drive.name, tries=tries)
 
 
 def _meaning(

@@ -104,7 +104,8 @@ function useTexts(): Language {
 
 /** What the server says by code and facts, in the language of the page. */
 export interface Say {
-  message: (message: Message, otherwise?: string) => string
+  /** The words of a message; `otherwise` where there is none, as in files of older versions. */
+  message: (message: Message | null | undefined, otherwise?: string) => string
   detail: (problem: Problem) => string
   remedy: (problem: Problem) => string
   title: (job: JobInfo) => string
@@ -120,7 +121,7 @@ export function useSay(): Say {
 export function sayIn(to: Language): Say {
   const t: T = (key, variables) => translate(to, key, variables)
   return {
-    message: (message, otherwise) => words(to, message, otherwise),
+    message: (message, otherwise) => (message ? words(to, message, otherwise) : (otherwise ?? '')),
     detail: (problem) =>
       problem.code
         ? words(to, { code: problem.code, params: problem.params ?? {} }, problem.detail)

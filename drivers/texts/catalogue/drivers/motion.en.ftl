@@ -1,3 +1,4 @@
+motion_account-has-another-role = the account of whoever began it has another role
 motion_beyond-limit = { $quantity ->
     [position] position
     [speed] speed
@@ -28,6 +29,9 @@ motion_permission-move-ended = { $drive }: { $purpose }: the permission to move 
     .remedy = begin the motion anew when it is safe
 motion_position = the position is beyond its limit
 motion_put-energy-motor-not = { $drive }: { $parameter } { $key } can put energy into the motor, so it is not written as a parameter
+motion_session-is-over = the session of whoever began it is over
 motion_speed = the speed is beyond its limit
+motion_stop-was-pressed = STOP was pressed
+motion_time-is-over = its time is over
 motion_torque = the torque is beyond its limit
 motion_unfit = a setpoint does not fit its object: the axis is braked

@@ -1,3 +1,4 @@
+motion_account-has-another-role = 启动者的账户角色已更改
 motion_beyond-limit = { $quantity ->
     [position] 位置
     [speed] 速度
@@ -28,6 +29,9 @@ motion_permission-move-ended = { $drive }：{ $purpose }：运动许可已结束
     .remedy = 请在安全时重新开始运动
 motion_position = 位置超出限值
 motion_put-energy-motor-not = { $drive }：{ $parameter } { $key } 可向电机输入能量，因此不作为参数写入
+motion_session-is-over = 启动者的会话已结束
 motion_speed = 速度超出限值
+motion_stop-was-pressed = 已按下 STOP
+motion_time-is-over = 其时间已到
 motion_torque = 转矩超出限值
 motion_unfit = 设定值不适合其对象：轴已制动

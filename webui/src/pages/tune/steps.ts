@@ -1,4 +1,4 @@
-import type { AxisState, DriveSummary } from '../../api/schema'
+import type { AxisState, DriveSummary, MessageInfo } from '../../api/schema'
 
 /** One thing that must be right before an axis is tuned. */
 export interface Check {
@@ -6,6 +6,7 @@ export interface Check {
   ok: boolean
   /** What is in the way, as the drive or the server says it. */
   detail: string
+  message?: MessageInfo | null
   /** Nothing is in the way of measuring; it is only good to know. */
   optional?: boolean
 }
@@ -18,7 +19,7 @@ export function preChecks(
 ): Check[] {
   const { holder, mine } = drive.lease
   return [
-    { name: 'answers', ok: state?.fresh === true, detail: state?.problem ?? '' },
+    { name: 'answers', ok: state?.fresh === true, detail: state?.problem ?? '', message: state?.problem_message ?? null },
     { name: 'control', ok: mine || holder === null, detail: mine ? '' : (holder ?? '') },
     {
       name: 'faults',
