@@ -174,7 +174,7 @@ async def again(
         # Where the second one fails, a more careful design must still be possible.
         if trials.time_left.verifications() < LOOKS:
             return first, replace(told, outcome="time")
-        trials.progress(0.6, text("autotune.designing-axis-loop-shows"))
+        trials.progress(0.6, text("autotune.designing-axis-loop-shows", step=4, steps=6))
         lines = loop_lines(first.verified.seen)
         controller = _controller(trials, candidate, lines.frequency_hz)
         try:

@@ -64,7 +64,7 @@ async def first_kept(
             if not waiting:
                 break
         candidate = waiting.pop(0)
-        progress(0.65, text("autotune.applying"))
+        progress(0.65, text("autotune.applying", step=5, steps=6))
         raw = await plan(axis, candidate, check.inertia_kgm2, check.motor_inertia_kgm2)
         earlier = {key: await axis.drive.raw(key) for key in raw}
         # Noted for the next server: killed here, this one would leave what nobody has verified.
@@ -109,9 +109,9 @@ def _in_turn(waiting: Sequence[Candidate], hummed: Candidate, less: Candidate) -
 def stages(progress: Progress) -> tuple[Progress, Progress, Progress]:
     """The three parts of a verification, as parts of the whole."""
     return (
-        part(progress, 0.7, 0.72, text("autotune.verifying-standstill")),
-        part(progress, 0.72, 0.92, text("autotune.measuring-tuned-loop")),
-        part(progress, 0.92, 0.99, text("autotune.step")),
+        part(progress, 0.7, 0.72, text("autotune.verifying-standstill", step=6, steps=6)),
+        part(progress, 0.72, 0.92, text("autotune.measuring-tuned-loop", step=6, steps=6)),
+        part(progress, 0.92, 0.99, text("autotune.step", step=6, steps=6)),
     )
 
 

@@ -202,7 +202,7 @@ class Trials:
         """Verified like a design; nothing is written."""
         candidate = self.had.candidate
         assert candidate is not None
-        self.progress(0.65, text("autotune.faster-designs-left"))
+        self.progress(0.65, text("autotune.faster-designs-left", step=5, steps=6))
         try:
             with self.time_left.verifying():
                 verified = await verify(

@@ -125,7 +125,7 @@ async def autotune(
         DriveError: as the single tools.
     """
     time_left = TimeLeft.of(settings.budget_s, cycle_s(session))
-    progress(0.0, text("autotune.pre-checks"))
+    progress(0.0, text("autotune.pre-checks", step=1, steps=6))
     facts = await _pre_checks(axis, settings)
     async with stopping_hard(axis, settings.envelope.speed_rpm):
         found = await _tuned(axis, session, settings, facts, progress, keep, time_left)
@@ -150,7 +150,7 @@ async def _tuned(
             axis, session, settings, facts, gains, progress, keep, time_left, home
         )
     facts = sweep_evaluation.completed(facts, found.mechanics)
-    progress(0.6, text("autotune.notches-gains"))
+    progress(0.6, text("autotune.notches-gains", step=4, steps=6))
     found = _with(found, await _design(axis, session, settings, facts, found))
     if not settings.apply:
         return found
@@ -178,7 +178,8 @@ async def _measured(
                 rated_torque_nm=settings.rated_torque_nm,
                 motor_inertia_kgm2=settings.motor_inertia_kgm2,
             ),
-            part(progress, 0.05, 0.3, text("autotune.inertia-and-friction")), keep, moving,
+            part(progress, 0.05, 0.3, text("autotune.inertia-and-friction", step=2, steps=6)),
+            keep, moving,
         )  # fmt: skip
         if moving.left_out:
             time_left.give_up(_ONE_MOVE)
@@ -187,7 +188,8 @@ async def _measured(
         playing = time_left.measuring(learning_s(axis, how, facts, outcome))
         mechanics = await sweep_tool.sweep(
             axis, session, _sweep_settings(settings, outcome),
-            part(progress, 0.3, 0.5, text("autotune.frequency-response")), keep, playing,
+            part(progress, 0.3, 0.5, text("autotune.frequency-response", step=3, steps=6)),
+            keep, playing,
         )  # fmt: skip
         time_left.lossy = playing.lossy
         if playing.left_out:
@@ -196,7 +198,7 @@ async def _measured(
         plain = await learn_notches(
             axis, session, how,
             sweep_evaluation.completed(facts, mechanics), outcome, mechanics,
-            part(progress, 0.5, 0.6, text("autotune.what-notches-do")), time_left,
+            part(progress, 0.5, 0.6, text("autotune.what-notches-do", step=3, steps=6)), time_left,
         )  # fmt: skip
     return AutotuneResult(
         outcome,

@@ -17,6 +17,7 @@ from backend.tools.autotune.time_budget import TimeLeft
 from backend.tools.notch.meaning import NotchMeaning
 from backend.tools.sweep.evaluation import SweepResult
 from backend.work.jobs import Progress
+from drivers.texts.message import Text
 
 
 def measured(*modes: tuple[float, float, float]) -> SweepResult:
@@ -83,7 +84,7 @@ async def test_notches_are_tried_beside_a_loop_where_the_mechanics_were(
 async def said_of(
     loop: str = "none", scheme: str = "free", gravity_nm: float = 0.0,
     time_left: TimeLeft | None = None,
-) -> str:  # fmt: skip
+) -> Text | None:  # fmt: skip
     """What learning says, of an axis with a resonance."""
 
     async def stands() -> int:
@@ -129,6 +130,6 @@ async def test_notches_are_learned_only_where_a_design_can_be_verified_after_it(
     assert [meaning.centre_hz for meaning in known][-1:] == (
         [130.0] if fits else [120.0] if before else []
     )
-    told = " ".join([said, *left.given_up])
+    told = " ".join(str(each) for each in [said, *left.given_up])
     assert ("designed without notches" in told) is (not fits and before is None)
     assert ("fewer of their values" in told) is (fits or before is not None)

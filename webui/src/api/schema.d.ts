@@ -3349,6 +3349,8 @@ export interface components {
              * @description why the reading failed, or empty
              */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /** State */
             state: string;
             /** Status Word */
@@ -3383,8 +3385,13 @@ export interface components {
         AxisStopInfo: {
             /** Drive */
             drive: string;
-            /** Problem */
+            /**
+             * Problem
+             * @description why it was in vain, or empty
+             */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /**
              * Speed
              * @description measured last, magnitude
@@ -5430,9 +5437,15 @@ export interface components {
             load_ratio: number | null;
             /**
              * Load Ratio Against
-             * @description what it compares with; empty without a ratio
+             * @description what it compares with, in words; empty without a ratio
+             * @default
              */
             load_ratio_against: string;
+            /**
+             * Load Ratio Reference
+             * @description what it compares with
+             */
+            load_ratio_reference?: ("given" | "drive" | "stored") | null;
             /**
              * Measurements
              * @description names of the stored raw data
@@ -5456,6 +5469,12 @@ export interface components {
             /** R2 */
             r2: number;
             /**
+             * Reasons
+             * @description why it is not identifiable
+             * @default []
+             */
+            reasons: ("at-limit" | "one-direction" | "too-little-acceleration" | "torque-opposes-acceleration" | "negative-friction" | "does-not-follow" | "backlash" | "below-motor-inertia" | "too-few-samples")[];
+            /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
@@ -5465,7 +5484,11 @@ export interface components {
              * @enum {string}
              */
             unit: "SI" | "torque as a share of rated torque";
-            /** Verdict */
+            /**
+             * Verdict
+             * @description of reasons, in words; ok where there are none
+             * @default ok
+             */
             verdict: string;
             /** Viscous Nms */
             viscous_nms: number | null;
@@ -5717,6 +5740,7 @@ export interface components {
              * @description in English
              */
             title: string;
+            /** @description of text, as code and facts */
             title_message: components["schemas"]["MessageInfo"];
         };
         /**
@@ -6196,6 +6220,8 @@ export interface components {
              * @enum {string}
              */
             level: "info" | "warning" | "error";
+            /** @description of text, as code and facts */
+            message: components["schemas"]["MessageInfo"];
             /** Person */
             person: string;
             /** Text */
@@ -6541,6 +6567,8 @@ export interface components {
              * @default
              */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /** Up */
             up: boolean;
             /** Url */
@@ -6646,8 +6674,13 @@ export interface components {
             /** Enabled */
             enabled: boolean;
             notch: components["schemas"]["NotchShape"] | null;
-            /** Note */
+            /**
+             * Note
+             * @description what is known of it, or empty
+             */
             note: string;
+            /** @description of note */
+            note_message?: components["schemas"]["MessageInfo"] | null;
             /** Raw */
             raw: {
                 [key: string]: number;
@@ -6762,6 +6795,8 @@ export interface components {
              * @description what to do there, for an object that energises
              */
             motion_how: string;
+            /** @description of motion_how */
+            motion_how_message?: components["schemas"]["MessageInfo"] | null;
             /**
              * Motion Page
              * @description page on which an object that energises is used; empty for all others
@@ -8525,6 +8560,8 @@ export interface components {
              * @default
              */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /**
              * Url
              * @description bus URL to start from
@@ -8875,6 +8912,13 @@ export interface components {
                 [key: string]: string;
             };
             /**
+             * Failed Messages
+             * @description of failed, as code and facts
+             */
+            failed_messages?: {
+                [key: string]: components["schemas"]["MessageInfo"];
+            };
+            /**
              * Stopped
              * @description drives whose axis stands by what it measures
              */
@@ -8903,8 +8947,13 @@ export interface components {
             };
             /** Parameter */
             parameter: string | null;
-            /** Problem */
+            /**
+             * Problem
+             * @description why it was in vain, or empty
+             */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
         };
         /**
          * StopTaken

@@ -1,6 +1,5 @@
 import { href } from '../../app/router'
-import { useT } from '../../i18n'
-import { said } from '../../i18n/said'
+import { useSay, useT } from '../../i18n'
 import { useAxisState, useDrive, useLink } from '../../live/store'
 import { useJobEnd } from '../../widgets/JobNote'
 import { Panel } from '../../widgets/Panel'
@@ -28,6 +27,7 @@ import { preChecks, ready } from './steps'
 /** The guided path; every step can also be done alone. */
 export function TunePage({ drive }: { drive: string }) {
   const t = useT()
+  const say = useSay()
   const summary = useDrive(drive)
   const state = useAxisState(drive)
   const { buses, refresh } = useBuses()

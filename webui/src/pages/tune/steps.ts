@@ -43,10 +43,12 @@ export function preChecks(
 /** Whether a measurement may be asked for. */
 export const ready = (checks: Check[]): boolean => checks.every((each) => each.ok || each.optional)
 
-/** Number and count of the steps of a job that names them `2 of 6: …`; null before the first. */
-export function stepOf(step: string): { now: number; of: number } | null {
-  const match = /^(\d+) of (\d+):/.exec(step)
-  return match ? { now: Number(match[1]), of: Number(match[2]) } : null
+/** Number and count of the steps of a job that counts them; null for others, and before the first. */
+export function stepOf(step: MessageInfo): { now: number; of: number } | null {
+  const first = step.params?.part0
+  if (typeof first === 'object' && first) return stepOf(first)
+  const { step: now, steps: of } = step.params ?? {}
+  return typeof now === 'number' && typeof of === 'number' ? { now, of } : null
 }
 
 /** A value with its unit, `1.23·10⁻⁴ kg·m²`; a dash where there is none. */
