@@ -29,24 +29,11 @@ from backend.drive.drive import Drive
 from backend.tools.measuring.temporary import write_settings
 from backend.tools.notch.meaning import NotchMeaning
 from drivers.errors import NotAllowed, OutOfRange
-from drivers.texts.message import Text, prose, text
+from drivers.texts.message import Text, Unsuitable, cause_of, text
 from profiles.schema import NotchSlot, NotchSpec, Parameter, Profile
 
 #: Depth shown for families whose manual prints none; the effect has to be measured.
 UNKNOWN_DEPTH_DB = -40.0
-
-
-class NotPossible(ValueError):
-    """A drive's notch cannot be computed; ``why`` as a message."""
-
-    def __init__(self, why: Text) -> None:
-        super().__init__(why)
-        self.why = why
-
-
-def _why(error: ValueError) -> Text:
-    """What a computation says; its own arithmetic has no message of the catalogue."""
-    return error.why if isinstance(error, NotPossible) else prose(str(error))
 
 
 @dataclass(frozen=True)
@@ -134,7 +121,7 @@ def encode(
                 drive=drive,
                 value=f"{notch.center_hz:g} Hz",
                 number=number + 1,
-                cause=_why(error),
+                cause=cause_of(error),
             ) from error
     raw |= _enable(profile, slot, notch is not None, enable_now)
     return Preview(number, notch, raw, made, note)
@@ -172,14 +159,14 @@ def _encoded(
     keys = profile.by_key
     if spec.encoding == "coefficients":
         if spec.sample_time_s is None:
-            raise NotPossible(text("notch.loop-period-unknown"))
+            raise Unsuitable(text("notch.loop-period-unknown"))
         stored = encode_coefficients(notch, spec.sample_time_s)
         names = (slot.a1_key, slot.a2_key, slot.b1_key, slot.b2_key)
         values = (stored.a1, stored.a2, stored.b1, stored.b2)
         raw = {k: v for k, v in zip(names, values, strict=True) if k is not None}
         return raw, realised(stored, spec.sample_time_s), None
     if slot.frequency_key is None or slot.width_key is None:
-        raise NotPossible(text("notch.parameters-not-named"))
+        raise Unsuitable(text("notch.parameters-not-named"))
     frequency, width = keys[slot.frequency_key], keys[slot.width_key]
     if spec.encoding in ("hz_width", "hz_levels"):
         return _by_measure(profile, slot, notch, meaning)
@@ -189,7 +176,7 @@ def _encoded(
         shown = decode_hz_width_db(hz, wide, db)
         made = RealisedNotch(shown.center_hz, shown.width_hz, shown.depth_db, 0.0, True)
         return {slot.frequency_key: hz, slot.width_key: wide, slot.depth_key: db}, made, None
-    raise NotPossible(text("notch.parameters-not-named"))
+    raise Unsuitable(text("notch.parameters-not-named"))
 
 
 def _by_measure(
@@ -200,7 +187,7 @@ def _by_measure(
     frequency, width = keys[slot.frequency_key or ""], keys[slot.width_key or ""]
     depth = None if slot.depth_key is None else _range(keys[slot.depth_key])
     if meaning is None and depth is not None:
-        raise NotPossible(text("notch.levels-not-explained"))
+        raise Unsuitable(text("notch.levels-not-explained"))
     made = meaning or NotchMeaning(notch.center_hz)
     hz, wide, deep = made.encoded(notch, _range(frequency), _range(width), depth)
     raw = {frequency.key: hz, width.key: wide}
@@ -223,7 +210,7 @@ def response(
     """
     spec = profile.notch
     if spec is None:
-        raise NotPossible(text("notch.family-documents-none"))
+        raise Unsuitable(text("notch.family-documents-none"))
     if spec.encoding == "coefficients" and spec.sample_time_s is not None:
         stored = encode_coefficients(notch, spec.sample_time_s)
         return coefficients_response(stored, frequency_hz, spec.sample_time_s)
@@ -246,7 +233,7 @@ def _possible(profile: Profile, notch: Notch, meaning: NotchMeaning | None) -> P
     try:
         return encode(profile, profile.drive, 0, notch, None, meaning)
     except OutOfRange as error:
-        raise NotPossible(error.text) from error
+        raise Unsuitable(error.text) from error
 
 
 async def read_notches(drive: Drive, meaning: NotchMeaning | None = None) -> tuple[SlotState, ...]:
@@ -274,7 +261,7 @@ async def _read(
     try:
         return _decoded(spec, slot, number, raw, enabled, meaning)
     except ValueError as error:
-        return SlotState(number, enabled, None, None, raw, _why(error) if enabled else None)
+        return SlotState(number, enabled, None, None, raw, cause_of(error) if enabled else None)
 
 
 def _decoded(

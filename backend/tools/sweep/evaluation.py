@@ -40,7 +40,7 @@ from backend.tools.measuring.recording import Recording
 from backend.tools.measuring.waveform import Waveform
 from backend.tools.sweep.speed_injection import speed_gain
 from drivers.texts.answers import sentences
-from drivers.texts.message import Text, text
+from drivers.texts.message import Text, Unsuitable, text
 
 Records = tuple[tuple[excite.Sequence, Recording], ...]
 Kind = Literal["mechanics", "speed_loop", "position_loop"]
@@ -155,10 +155,7 @@ def evaluate(
     inertia = _known_inertia(settings) if facts.torque_known else None
     taken = _taken(records)
     if (cycles := mean_cycles(taken)) is not None:
-        raise ValueError(
-            f"the drive reports its speed as the mean of {cycles} cycles, from which mechanics "
-            "cannot be told; switch that averaging off, or take another cycle time"
-        )
+        raise Unsuitable(text("sweep.speed-is-mean", cycles=cycles))
     if by_speed:
         found, taken = _by_reference(records, path, integral_hz, inertia, hold_known=known)
     else:

@@ -34,6 +34,7 @@ sweep_realisations-possible = 1 to 8 realisations are possible
 sweep_recording-cannot-evaluated = { $drive }: the recording cannot be evaluated: { $cause }
     .remedy = raise the excitation, or look for lost samples and saturated torque
 sweep_slow-or-filtered = beside a closed loop a torque that follows slowly and a 6077h that is filtered look alike: no model is made, and nothing is designed from one; measure without a loop, or look for filters of the torque and of its reading in the drive
+sweep_speed-is-mean = the drive reports its speed as the mean of { $cycles } cycles, from which mechanics cannot be told; switch that averaging off, or take another cycle time
 sweep_stepped-sine-lasts-too = a stepped sine lasts too long for an axis that no loop holds
     .remedy = measure it with the speed loop closed
 sweep_still-turns-after-speed = { $drive } still turns after its speed was tried

@@ -34,6 +34,7 @@ sweep_realisations-possible = 激励次数可为 1 至 8
 sweep_recording-cannot-evaluated = { $drive }：无法分析该记录：{ $cause }
     .remedy = 请增大激励，或检查丢失的采样和转矩饱和
 sweep_slow-or-filtered = 在闭环下，转矩响应慢与 6077h 经过滤波无法区分：不建立模型，也不据此设计；请在无回路时测量，或检查驱动器中转矩及其读数的滤波器
+sweep_speed-is-mean = 驱动器上报的速度是 { $cycles } 个周期的平均值，无法由此辨识机械特性；请关闭该平均，或选择其他周期
 sweep_stepped-sine-lasts-too = 对于没有闭环保持的轴，步进正弦持续时间过长
     .remedy = 请在速度环闭合时测量
 sweep_still-turns-after-speed = { $drive } 在试验速度之后仍在转动
