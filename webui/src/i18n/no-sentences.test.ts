@@ -11,7 +11,10 @@ const files: Record<string, string> = import.meta.glob(['../**/*.ts', '../**/*.t
 const SENTENCE = String.raw`(?:detail|remedy|problem|message|verdict|title|step|note|text|why|reason|warnings?|notes|tried|failed(?:\[\w+\])?)`
 const READS = [
   // `job.step.includes('…')`, `row.problem.startsWith('…')`, `each.text.match(…)`
-  new RegExp(String.raw`\.${SENTENCE}\??\.(?:includes|startsWith|endsWith|match|matchAll|search|indexOf)\(`, 'g'),
+  new RegExp(
+    String.raw`\.${SENTENCE}\??\.(?:includes|startsWith|endsWith|match|matchAll|search|indexOf)\(`,
+    'g',
+  ),
   // `/…/.test(problem.detail)`, `pattern.exec(job.step)`
   new RegExp(String.raw`\.(?:test|exec)\(\w+(?:\??\.\w+)*\.${SENTENCE}\)`, 'g'),
   // `entry.text === 'STOP'`, `result.verdict !== 'ok'`: words of a sentence, with a blank or not

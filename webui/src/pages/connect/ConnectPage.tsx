@@ -93,7 +93,8 @@ export function ConnectPage() {
                     {each.label}
                     <small>
                       {t(`connect.kind.${each.kind}`)}
-                      {!each.usable && ` · ${say.message(each.problem_message, each.problem) || t('connect.unusable')}`}
+                      {!each.usable &&
+                        ` · ${say.message(each.problem_message, each.problem) || t('connect.unusable')}`}
                     </small>
                   </span>
                 </button>

@@ -41,7 +41,9 @@ export function PreChecks({
             </span>
             <span className="grow">
               {t(check.ok ? `tune.ok.${check.name}` : `tune.no.${check.name}`, { ms: cycleMs })}
-              {!check.ok && check.detail && <strong> {say.message(check.message, check.detail)}</strong>}
+              {!check.ok && check.detail && (
+                <strong> {say.message(check.message, check.detail)}</strong>
+              )}
             </span>
             {!check.ok && check.name === 'faults' && (
               <a href={`#/axis/${encodeURIComponent(drive.id)}/alarms`}>{t('page.alarms')}</a>

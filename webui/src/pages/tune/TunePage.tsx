@@ -61,7 +61,9 @@ export function TunePage({ drive }: { drive: string }) {
   const obstacle = !open
     ? t('start.noConnection')
     : missing
-      ? [t(`tune.no.${missing.name}`), say.message(missing.message, missing.detail)].join(' ').trim()
+      ? [t(`tune.no.${missing.name}`), say.message(missing.message, missing.detail)]
+          .join(' ')
+          .trim()
       : !limits.limits
         ? t('start.limits')
         : limits.agreed

@@ -19,7 +19,12 @@ export function preChecks(
 ): Check[] {
   const { holder, mine } = drive.lease
   return [
-    { name: 'answers', ok: state?.fresh === true, detail: state?.problem ?? '', message: state?.problem_message ?? null },
+    {
+      name: 'answers',
+      ok: state?.fresh === true,
+      detail: state?.problem ?? '',
+      message: state?.problem_message ?? null,
+    },
     { name: 'control', ok: mine || holder === null, detail: mine ? '' : (holder ?? '') },
     {
       name: 'faults',
