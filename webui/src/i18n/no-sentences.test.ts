@@ -8,7 +8,7 @@ const files: Record<string, string> = import.meta.glob(['../**/*.ts', '../**/*.t
 })
 
 /** Fields in which the server sends sentences. */
-const SENTENCE = String.raw`(?:detail|remedy|problem|message|verdict|title|step|note|text|why|reason|warnings?|notes|tried|failed(?:\[\w+\])?)`
+const SENTENCE = String.raw`(?:detail|remedy|problem|message|verdict|step|note|text|why|reason|warnings?|notes|tried|failed(?:\[\w+\])?)`
 const READS = [
   // `job.step.includes('…')`, `row.problem.startsWith('…')`, `each.text.match(…)`
   new RegExp(
@@ -17,8 +17,8 @@ const READS = [
   ),
   // `/…/.test(problem.detail)`, `pattern.exec(job.step)`
   new RegExp(String.raw`\.(?:test|exec)\(\w+(?:\??\.\w+)*\.${SENTENCE}\)`, 'g'),
-  // `entry.text === 'STOP'`, `result.verdict !== 'ok'`: words of a sentence, with a blank or not
-  new RegExp(String.raw`\.(?:detail|remedy|message|text|why)\s*[!=]==\s*'[^']+'`, 'g'),
+  // `entry.text === 'STOP'`; a token of an expression is the page's own
+  /\b(?!token\b)\w+\??\.(?:detail|remedy|message|text|why)\s*[!=]==\s*'[^']+'/g,
 ]
 
 function reads(source: string): string[] {
