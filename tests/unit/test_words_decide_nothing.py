@@ -53,6 +53,14 @@ ALLOWED: dict[tuple[str, str], str] = {
         'elif code == errno.EAFNOSUPPORT or "AF_CAN" in text:',
     ): "Python without SocketCAN raises AttributeError or OSError without a number",
     (
+        "backend/api/drive/routes.py",
+        "reason = request.reason.strip()",
+    ): "a person's own words, which must not be empty",
+    (
+        "backend/recording/library.py",
+        "fitting = [s for s in found if all(word in s.words() for word in words)]",
+    ): "a person searches recordings by the words in their descriptions",
+    (
         "backend/commands/values.py",
         "print(words.rstrip())",
     ): "what is printed has no space at its end",
