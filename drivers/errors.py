@@ -23,7 +23,7 @@ from __future__ import annotations
 from enum import Enum
 
 from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted
-from drivers.texts.message import Param, Text, as_text
+from drivers.texts.message import Param, Text, as_text, text
 
 
 class DriveError(Exception):
@@ -104,6 +104,11 @@ class DriveError(Exception):
 
     def __str__(self) -> str:
         return self.message
+
+
+def internal_error(error: Exception) -> Text:
+    """What says that an error is ours, with what Python calls it."""
+    return text("error.internal", kind=type(error).__name__, detail=str(error))
 
 
 def _fact(value: object) -> Param:

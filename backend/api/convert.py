@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from backend.api import models
 from backend.api.drive import models_axis, models_parameters
 from backend.api.drive.convert_stop import turning
-from backend.api.errors import message_of, problem_of
+from backend.api.errors import message_of, message_or_none, problem_of, words_of
 from backend.api.sets import models as models_sets
 from backend.api.station import models as models_bench
 from backend.drive.drive import Drive
@@ -21,11 +21,13 @@ from backend.station.connected_drive import Member
 from backend.station.matching import match_profiles
 from backend.station.monitor import Snapshot
 from backend.tools.moves.procedures import describe
+from backend.tools.spoken import result_in_language
 from backend.work.jobs import Job
 from backend.work.journal import Entry
 from drivers import cia402
 from drivers.cia402 import Mode
 from drivers.link import Found, Link, LinkQuality
+from drivers.texts.message import language
 from profiles.schema import ConfirmStep, Fault, Parameter, Procedure
 
 
@@ -158,7 +160,8 @@ def axis_state(bench: Bench, member: Member, now: Snapshot) -> models_axis.AxisS
         drive=member.drive.id,
         time=moment(now.time),
         fresh=now.fresh,
-        problem=now.problem,
+        problem=words_of(now.problem),
+        problem_message=message_or_none(now.problem),
         state=now.state.value,
         status_word=now.status_word,
         mode=now.mode,
@@ -247,7 +250,8 @@ def parameter_row(
         motion=motion_of(parameter),
         safe_in_motion=parameter.safe_in_motion,
         motion_page="" if door is None else door.page,
-        motion_how="" if door is None else door.how,
+        motion_how=words_of(None if door is None else door.how),
+        motion_how_message=message_or_none(None if door is None else door.how),
         help=parameter.help,
         source=parameter.source,
         also_printed=list(parameter.also_printed),
@@ -288,7 +292,7 @@ def job(known: Job) -> models.JobInfo:
         started=moment(known.started),
         ended=moment(known.ended) if known.ended else None,
         motion=known.motion,
-        result=known.result,
+        result=known.result and result_in_language(known.result, language()),
         problem=problem_of(known.error) if known.error else None,
     )
 
@@ -370,5 +374,6 @@ def log_entry(entry: Entry) -> models.LogEntry:
         level=entry.level,
         drive=entry.drive,
         person=entry.person,
-        text=entry.text,
+        text=words_of(entry.message),
+        message=message_of(entry.message),
     )

@@ -119,6 +119,16 @@ def message_of(message: Text) -> MessageInfo:
     return MessageInfo.model_validate(message.to_wire())
 
 
+def message_or_none(message: Text | None) -> MessageInfo | None:
+    """A message for the API, where there is one."""
+    return None if message is None else message_of(message)
+
+
+def words_of(message: Text | None) -> str:
+    """The sentence in the language of whoever asks; empty where there is none."""
+    return "" if message is None else message.words(language())
+
+
 def _status(error: DriveError) -> int:
     if isinstance(error, NotFound):
         return 404

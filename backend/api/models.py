@@ -87,3 +87,4 @@ class LogEntry(Message):
     drive: str | None
     person: str
     text: str
+    message: MessageInfo = Field(description="of text, as code and facts")

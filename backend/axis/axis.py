@@ -26,7 +26,7 @@ from backend.stopping.quick_stop import quick_stop_keys, raise_quick_stop
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, OutOfRange, ProtocolError
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 from profiles.schema import Raw
 
 __all__ = ["Axis", "Envelope"]
@@ -45,7 +45,7 @@ class Axis(ScaledAxis):
         self.enabled_by: str | None = None
         self._standing: Grant | None = None
         #: Told why, when nobody may leave the axis enabled any longer; power is to be taken off.
-        self.unattended: Callable[[str], None] = lambda _why: None
+        self.unattended: Callable[[Text], None] = lambda _why: None
 
     @property
     def left_enabled(self) -> bool:

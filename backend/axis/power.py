@@ -28,7 +28,7 @@ from drivers.codec import encode
 from drivers.dialect import dialect_of
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError
 from drivers.link import OwnsPowerState
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 from profiles.schema import Fault
 
 #: Longest time that one change of the power state may take (brake and bus included).
@@ -331,13 +331,15 @@ class PowerState:
     def stop_step(
         self,
         code: StepCode,
-        problem: str = "",
+        problem: Text | None = None,
         parameter: str | None = None,
         figures: dict[str, float] | None = None,
     ) -> None:
         """Note a step of STOP; with a problem it was tried in vain."""
         at_s = time.monotonic() - self._stop_began_s
-        self.stop_steps.append(StopStep(code, at_s, not problem, parameter, figures or {}, problem))
+        self.stop_steps.append(
+            StopStep(code, at_s, problem is None, parameter, figures or {}, problem)
+        )
 
     async def quick_stop(self) -> None:
         """Stop now, by one write; harmless when nothing moves.

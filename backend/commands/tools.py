@@ -18,6 +18,7 @@ from backend.commands.options import Json, Server
 from backend.commands.session import progress
 from backend.tools.registry import BY_KIND
 from backend.tools.tool import AnyTool, Option, Row, Run, ToolResult
+from drivers.texts.message import language, text
 
 _WHERE: dict[str, tuple[Any, object]] = {
     "url": (measure.Url, None), "station": (measure.Station, 1), "profile": (measure.Profile, None),
@@ -63,20 +64,21 @@ def command_of(tool: AnyTool) -> Callable[..., None]:
 
 def lines_of(tool: AnyTool, result: ToolResult) -> list[str]:
     """What a person is shown of a result."""
-    section = tool.report(result)
-    lines = [tool.text(note.name, values=note.values) for note in section.notes]
+    section = tool.report(result.in_language(language()))
+    lines = [tool.text(note.name, language(), note.values) for note in section.notes]
     return lines + [
-        f"{tool.text(row.name, values=row.values)}: {_shown(row)}" for row in section.rows
+        f"{tool.text(row.name, language(), row.values)}: {_shown(row)}" for row in section.rows
     ]
 
 
 def _shown(row: Row) -> str:
     if row.value is None:
-        return "cannot be known"
-    text = f"{row.value:.4g} {row.unit}".rstrip()
+        return text("command.cannot-be-known").words(language())
+    shown = f"{row.value:.4g} {row.unit}".rstrip()
     if row.ci95 is None or None in row.ci95:
-        return text
-    return f"{text} ({row.ci95[0]:.4g} to {row.ci95[1]:.4g})"
+        return shown
+    low, high = f"{row.ci95[0]:.4g}", f"{row.ci95[1]:.4g}"
+    return text("command.value-between", value=shown, low=low, high=high).words(language())
 
 
 def _options(tool: AnyTool) -> Iterator[tuple[str, tuple[Any, object]]]:

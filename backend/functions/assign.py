@@ -19,6 +19,7 @@ from backend.motion.doors import door_of
 from backend.motion.grant import NotGranted
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
+from drivers.texts.message import text
 from profiles.schema import Parameter, Raw
 
 #: For so long the shaft is watched; a drive's own jog turns it at once.
@@ -150,7 +151,7 @@ def _require_setting(axis: Axis, parameter: Parameter) -> None:
             "functions.command-not-setting",
             drive=drive.name,
             parameter=key,
-            remedy=f"{door.how} ({door.route})",
+            remedy=text("motion.by-door", how=door.how, route=door.route),
             key=parameter.name,
             how=door.how,
             route=door.route,

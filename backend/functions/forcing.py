@@ -333,8 +333,8 @@ class ForcingSessions:
         return ""
 
 
-def _end_for(session: ForcingSession, why: str) -> None:
-    session.reason = session.reason or why
+def _end_for(session: ForcingSession, why: Text) -> None:
+    session.reason = session.reason or why.words()
 
 
 def _words(session: ForcingSession) -> Text:

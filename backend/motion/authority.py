@@ -18,6 +18,7 @@ from backend.motion.envelope import Envelope
 from backend.motion.grant import Grant, NotGranted
 from backend.people.identity import acting_person, acting_session
 from drivers.errors import Busy
+from drivers.texts.message import Text, text
 
 #: No motion is permitted for longer than this without being asked for anew.
 LONGEST_S = 4 * 3600.0
@@ -26,18 +27,20 @@ UNATTENDED_S = 600.0
 
 #: Called with the reason when a grant ends before the work that holds it: its time is over, or
 #: whoever asked for it may move nothing any more.
-Ended = Callable[[str], None]
+Ended = Callable[[Text], None]
+
+_TIME_OVER = text("motion.time-is-over")
 
 _held: ContextVar[tuple[Grant, ...]] = ContextVar("grants", default=())
 
 
 @dataclass(slots=True, eq=False)
 class _Record:
-    """A grant that was issued and is not given back. ``why`` it ended, empty while it is live."""
+    """A grant that was issued and is not given back. ``why`` it ended, None while it is live."""
 
     grant: Grant
     ended: Ended | None
-    why: str = ""
+    why: Text | None = None
     timer: asyncio.TimerHandle | None = None
 
 
@@ -103,8 +106,8 @@ class MotionAuthority:
         record = self._record(grant)
         if grant.drive != drive or record is None or not grant.covers(key):
             raise NotGranted("motion.move-axis-permission-hand", drive=name, parameter=key)
-        why = record.why or ("its time is over" if time.monotonic() > grant.until else "")
-        if why and not restores:
+        why = record.why or (_TIME_OVER if time.monotonic() > grant.until else None)
+        if why is not None and not restores:
             raise NotGranted(
                 "motion.permission-move-ended",
                 drive=name,
@@ -120,7 +123,7 @@ class MotionAuthority:
         self,
         drive: str,
         name: str,
-        purpose: str,
+        purpose: str | Text,
         *,
         envelope: Envelope | None = None,
         keys: frozenset[str] | None = None,
@@ -143,7 +146,7 @@ class MotionAuthority:
             _held.set(tuple(each for each in _held.get() if each is not grant))
             self.end(grant)
 
-    def standing(self, drive: str, purpose: str, *, lasts_s: float, ended: Ended) -> Grant:
+    def standing(self, drive: str, purpose: str | Text, *, lasts_s: float, ended: Ended) -> Grant:
         """A grant for an axis that is left enabled, until `end`; it takes the place of an older."""
         for record in list(self._records.get(drive, ())):
             if record.grant.standing:
@@ -167,7 +170,7 @@ class MotionAuthority:
             del self._records[grant.drive]
         self._changed(grant.drive)
 
-    def revoke(self, drive: str, why: str) -> None:
+    def revoke(self, drive: str, why: Text) -> None:
         """All grants of this axis end now, whoever holds them: nothing is commanded any more.
 
         Their holders are not told: whoever calls this brings the axis to rest.
@@ -176,7 +179,7 @@ class MotionAuthority:
             record.why = record.why or why
         self._changed(drive)
 
-    def end_of(self, session: str, why: str) -> None:
+    def end_of(self, session: str, why: Text) -> None:
         """All grants asked for by this session, token or invitation end now, on every axis.
 
         Their holders are told, as when the time of a grant is over: each brings its axis to rest.
@@ -187,19 +190,19 @@ class MotionAuthority:
             if record.grant.session == session:
                 self._expire(record, why)
 
-    def _expire(self, record: _Record, why: str = "its time is over") -> None:
+    def _expire(self, record: _Record, why: Text = _TIME_OVER) -> None:
         if record.why:
             return
         record.why = why
         self._changed(record.grant.drive)
         if record.ended is not None:
-            record.ended(record.why)
+            record.ended(why)
 
     def _issue(
         self,
         drive: str,
         name: str,
-        purpose: str,
+        purpose: str | Text,
         envelope: Envelope | None,
         keys: frozenset[str] | None,
         lasts_s: float,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from backend.motion.grant import NotGranted
+from drivers.texts.message import Text, text
 from profiles.schema import Parameter, Profile
 
 Page = Literal["", "motion", "io", "parameters"]
@@ -20,29 +21,29 @@ class Door:
 
     page: Page
     route: str
-    how: str
+    how: Text
 
 
 _POWER = Door(
     "motion",
     f"POST {_DRIVE}/transition",
-    "enable the axis and choose its mode on the Motion page",
+    text("motion.door-power"),
 )
 _MOVE = Door(
     "motion",
     f"POST {_DRIVE}/jobs/move",
-    "move the axis on the Motion page, which sets limits and a dead-man",
+    text("motion.door-move"),
 )
-_FORCE = Door("io", f"POST {_DRIVE}/io/forcing/{{name}}", "overrule terminals on the I/O page")
+_FORCE = Door("io", f"POST {_DRIVE}/io/forcing/{{name}}", text("motion.door-force"))
 _ASSIGN = Door(
     "io",
     f"PUT {_DRIVE}/motion-settings/{{key}}",
-    "choose what a terminal does on the I/O page, with the axis disabled",
+    text("motion.door-assign"),
 )
 _SET = Door(
     "",
     f"PUT {_DRIVE}/motion-settings/{{key}}",
-    "somebody with the right to move sets it, with the axis disabled",
+    text("motion.door-set"),
 )
 #: Roles that are the power state; every other role that energises is a set-point.
 _POWER_ROLES = frozenset({"control_word", "mode"})
@@ -66,7 +67,7 @@ def door_of(profile: Profile, parameter: Parameter) -> Door:
             return Door(
                 "parameters",
                 f"POST {_DRIVE}/procedures/{procedure.name}",
-                f"run the procedure “{procedure.title}”",
+                text("motion.door-procedure", title=procedure.title),
             )
     return _SET
 
@@ -78,7 +79,7 @@ def refused(drive: str, profile: Profile, parameter: Parameter) -> NotGranted:
         "motion.put-energy-motor-not",
         drive=drive,
         parameter=parameter.key,
-        remedy=f"{door.how} ({door.route})",
+        remedy=text("motion.by-door", how=door.how, route=door.route),
         key=parameter.name,
         how=door.how,
         route=door.route,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from backend.motion.envelope import Envelope
 from drivers.errors import NotAllowed
+from drivers.texts.message import Text
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,7 +26,7 @@ class Grant:
 
     drive: str
     actor: str
-    purpose: str
+    purpose: str | Text
     until: float
     envelope: Envelope | None = None
     keys: frozenset[str] | None = None

@@ -15,6 +15,7 @@ from backend.parameters import set_file as parameter_set
 from backend.station.bench import Bench
 from backend.station.connected_drive import Member
 from drivers.errors import DriveError
+from drivers.texts.answers import sentence
 
 #: A mute drive must not keep the samples of the others waiting.
 GEARING_TIMEOUT_S = 2.0
@@ -116,6 +117,7 @@ def state(member: Member) -> dict[str, Any]:
     snapshot = member.monitor.snapshot
     content = asdict(snapshot)
     content["state"] = str(snapshot.state)
+    content |= sentence("problem", snapshot.problem)
     content["faults"] = [
         {
             "code": f.code,

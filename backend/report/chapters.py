@@ -79,7 +79,7 @@ def _sweep(measured: Measured, view: SweepView, words: Words) -> list[Block]:
     if view.saturated_share > 0.0:
         share = fixed(view.saturated_share * 100, 1, "%")
         blocks.append(Note(words("warn.saturated", share=share), "warn"))
-    return [*blocks, *(Note(each, "warn") for each in view.warnings)]
+    return [*blocks, *(Note(each, "warn") for each in view.cautions(words.language))]
 
 
 def _bode(view: SweepView, other: SweepView | None, words: Words) -> Figure:

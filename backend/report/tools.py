@@ -24,7 +24,7 @@ def kind_title(kind: str, words: Words) -> str:
 def tool_blocks(kind: str, result: ToolResult, words: Words) -> list[Block]:
     """Notes, parameters with their intervals, and charts."""
     tool = BY_KIND[kind]
-    section: Section = tool.report(result)
+    section: Section = tool.report(result.in_language(words.language))
     head = (words("quantity"), words("value"), words("interval"))
     rows = tuple(
         (tool.text(row.name, words.language, row.values), significant(row.value, row.unit, 3),
@@ -42,7 +42,7 @@ def tool_blocks(kind: str, result: ToolResult, words: Words) -> list[Block]:
 def tool_verdict(kind: str, result: ToolResult, words: Words) -> Note:
     """The first note of the section, with the tool's title."""
     tool = BY_KIND[kind]
-    first = _note(tool, tool.report(result).notes[0], words)
+    first = _note(tool, tool.report(result.in_language(words.language)).notes[0], words)
     return Note(f"{tool.text('title', words.language)}: {first.text}", first.tone)
 
 

@@ -9,6 +9,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from backend.library.measurements import BadMeasurement
 from backend.tools.registry import BY_KIND
 from backend.tools.tool import ToolResult
+from drivers.texts.answers import messages_in
+from drivers.texts.message import Language
 
 
 class View(BaseModel):
@@ -45,6 +47,12 @@ class SweepView(View):
     trusted: bool
     saturated_share: float
     warnings: list[str]
+    warning_messages: list[dict[str, object]] | None = None
+
+    def cautions(self, language: Language) -> list[str]:
+        """The warnings in a language; of a file of an older version as they stand in it."""
+        facts = {"warnings": self.warnings, "warning_messages": self.warning_messages}
+        return [each.words(language) for each in messages_in(facts, "warnings", "warning")]
 
 
 class StepNumbers(View):

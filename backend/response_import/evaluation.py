@@ -25,6 +25,8 @@ from backend.response_import.contents import Table, read_table
 from backend.response_import.errors import BadRecording
 from backend.response_import.signals import Signals, signals_of
 from backend.response_import.units import Scale, scale_of
+from drivers.texts.answers import sentences
+from drivers.texts.message import Text, text
 
 Structure = Literal["unknown", "motor_speed", "load_speed", "speed_loop"]
 #: Between where a load counts as compliant, medium and stiff, as for measurements of our own.
@@ -206,7 +208,7 @@ def _as_json(
             "real_poles_hz": sorted(model.poles_hz) if model is not None else [],
         },
         "axis": axis,
-        "warnings": _warnings(found, axis),
+        **sentences("warnings", _warnings(found, axis), "warning"),
     }
 
 
@@ -266,47 +268,28 @@ def _load(found: ForeignResponse) -> LoadClass:
     return "medium" if first < _MEDIUM_HZ else "stiff"
 
 
-def _warnings(found: ForeignResponse, axis: dict[str, object] | None) -> list[str]:
-    words = []
+def _warnings(found: ForeignResponse, axis: dict[str, object] | None) -> list[Text]:
+    said = []
     if found.excitation != "periodic":
-        words.append(
-            "the excitation does not repeat itself: what friction and backlash distort is told "
-            "from noise in part only; record at least four periods of a multisine for more"
-        )
+        said.append(text("import.not-periodic"))
     elif found.periods_used < 4:
-        words.append(
-            f"only {found.periods_used} settled periods: the noise is known roughly; record four "
-            "or more"
-        )
+        said.append(text("import.few-periods", periods=found.periods_used))
     if found.clipped_share > _CLIPPED:
-        words.append(
-            f"the input stands at its highest or lowest value for {found.clipped_share:.0%} of "
-            "the time: it is limited, or a sequence of two levels"
-        )
+        said.append(text("import.input-clipped", share=found.clipped_share))
     if axis is not None and isinstance(wrong := axis.get("contradiction"), dict):
-        words.append(_refuted(Contradiction(**wrong)))
+        said.append(_refuted(Contradiction(**wrong)))
     if axis is not None and axis.get("verdict") == "no-rigid-part":
-        words.append(
-            "no inertia: the lowest frequencies do not show how friction and inertia share the "
-            "torque; excite lower frequencies"
-        )
+        said.append(text("import.no-rigid-part"))
     if found.fit is None:
-        words.append("no model explains the response: no modes are told")
-    return words
+        said.append(text("import.no-model"))
+    return said
 
 
-def _refuted(wrong: Contradiction) -> str:
-    filtered = (
-        f" A first-order filter at {wrong.filter_hz:.3g} Hz in the recorded speed would explain "
-        "it: if the recording has one, give it as output filter."
-        if wrong.filter_hz is not None
-        else ""
-    )
-    return (
-        f"the phase is {wrong.phase_deg:.0f}° at {wrong.frequency_hz:.0f} Hz; from a torque to the "
-        "speed of the same shaft it stays within ±90°. The output is filtered, late, or another "
-        f"shaft's: no inertia, notch or gain is concluded.{filtered}"
-    )
+def _refuted(wrong: Contradiction) -> Text:
+    facts = {"phase_deg": wrong.phase_deg, "frequency_hz": wrong.frequency_hz}
+    if wrong.filter_hz is None:
+        return text("import.not-collocated", **facts)
+    return text("import.not-collocated-or-filtered", **facts, filter_hz=wrong.filter_hz)
 
 
 def _numbers(values: FloatArray) -> list[float | None]:

@@ -15,6 +15,7 @@ from backend.tools.measuring.recording import Recording
 from backend.tools.registry import BY_KIND
 from backend.tools.step import run as step_tool
 from backend.tools.sweep import evaluation as sweep_evaluation
+from drivers.texts.message import cause_of
 
 #: Numbers nearer than this share are the same: another computer sums in another order.
 _SAME = 1e-6
@@ -71,7 +72,7 @@ def recompute(measurement: Measurement) -> dict[str, object]:
         ValueError, KeyError, TypeError, IndexError, AttributeError, ArithmeticError, MemoryError,
     ) as error:  # fmt: skip
         raise BadMeasurement(
-            "station.measurement-not-complete", value=measurement.kind, cause=str(error)
+            "station.measurement-not-complete", value=measurement.kind, cause=cause_of(error)
         ) from error
     raise BadMeasurement("station.measurement-kind-nothing-evaluate", value=measurement.kind)
 

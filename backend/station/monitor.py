@@ -20,7 +20,8 @@ from backend.stopping.turning import Turning, TurnWatch, told
 from backend.work.journal import Journal, Level
 from drivers import cia402
 from drivers.cia402 import State
-from drivers.errors import DriveError
+from drivers.errors import DriveError, internal_error
+from drivers.texts.message import Text, text
 from profiles.schema import Fault
 
 log = logging.getLogger(__name__)
@@ -75,7 +76,7 @@ class Snapshot:
 
     time: float
     fresh: bool
-    problem: str = ""
+    problem: Text | None = None
     state: State = State.UNKNOWN
     status_word: int | None = None
     mode: int | None = None
@@ -102,7 +103,7 @@ class Monitor:
         may_turn: Callable[[], bool] = lambda: True,
     ) -> None:
         self.axis = axis
-        self.snapshot = Snapshot(time.time(), fresh=False, problem="not read yet")
+        self.snapshot = Snapshot(time.time(), fresh=False, problem=text("station.not-read-yet"))
         #: The live connections that look at it.
         self.watchers: set[str] = set()
         self._journal = journal
@@ -141,7 +142,7 @@ class Monitor:
             except Exception as error:
                 # A watch that ended unseen would show the last state as the present one for ever.
                 log.exception("the state of %s cannot be shown", self.axis.drive.name)
-                problem = f"internal error: {type(error).__name__}: {error}"
+                problem = internal_error(error)
                 self.snapshot = replace(self.snapshot, fresh=False, problem=problem)
             self._wake.clear()
             period = WATCHED_S if self.watchers else IDLE_S
@@ -163,8 +164,9 @@ class Monitor:
     async def _poll(self, read: Callable[[], Awaitable[Snapshot]]) -> Snapshot:
         before = self.snapshot
         if await self.axis.repeat_stop():
-            text = f"{self.axis.drive.name}: the stop that had not reached it was sent again"
-            self._journal.add(text, level="warning", drive=self.axis.drive.id)
+            drive = self.axis.drive
+            again = text("station.stop-sent-again", drive=drive.name)
+            self._journal.add(again, level="warning", drive=drive.id)
         if self.axis.drive.rest.held:
             return before
         try:
@@ -172,7 +174,7 @@ class Monitor:
         except DriveError as error:
             self._asked_s = -math.inf
             snapshot = replace(
-                before, time=time.time(), fresh=False, problem=error.message, turning=None
+                before, time=time.time(), fresh=False, problem=error.text, turning=None
             )
         self.snapshot = snapshot
         self._record(before, snapshot)
@@ -278,9 +280,9 @@ class Monitor:
     def _record(self, before: Snapshot, now: Snapshot) -> None:
         drive = self.axis.drive
         if before.fresh and not now.fresh:
-            self._journal.add(now.problem, level="error", drive=drive.id)
+            self._journal.add(now.problem or "", level="error", drive=drive.id)
         if now.fresh and not before.fresh:
-            self._journal.add(f"{drive.name} answers", drive=drive.id)
+            self._journal.add(text("station.answers", drive=drive.name), drive=drive.id)
             if before.status_word is not None or drive.owed:
                 self._returned()
         if not now.fresh:
@@ -291,9 +293,10 @@ class Monitor:
         for fault in now.faults:
             if fault.code not in old:
                 level: Level = "error" if fault.kind == "fault" else "warning"
-                self._journal.add(
-                    f"{fault.kind} {fault.code} {fault.name}", level=level, drive=drive.id
+                line = text(
+                    "station.fault", kind=fault.kind, fault_code=fault.code, fault_name=fault.name
                 )
+                self._journal.add(line, level=level, drive=drive.id)
 
 
 def _scaled(units: AxisUnits, name: str, reading: Reading | None) -> float | None:

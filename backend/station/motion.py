@@ -13,7 +13,8 @@ from backend.station.connected_drive import Member
 from backend.stopping.facts import AxisStop, Verdict
 from backend.stopping.told import told
 from backend.stopping.watch import StopWatch
-from drivers.errors import Busy, DriveError
+from drivers.errors import Busy, DriveError, internal_error
+from drivers.texts.message import Text, text
 
 if TYPE_CHECKING:
     from backend.station.bench import Bench
@@ -27,7 +28,7 @@ class Motion:
 
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
-        self._stops: set[asyncio.Task[dict[str, str]]] = set()
+        self._stops: set[asyncio.Task[dict[str, Text | None]]] = set()
         self._later: set[asyncio.Task[None]] = set()
         #: What watches each stopped axis, by drive: it goes on when nobody waits for it.
         self._watches: dict[str, asyncio.Task[AxisStop]] = {}
@@ -105,35 +106,35 @@ class Motion:
             return contextlib.nullcontext()
         drive = member.drive
 
-        def ended(_why: str) -> None:
+        def ended(_why: Text) -> None:
             if job.task is not None:
                 job.task.cancel()
 
-        return self._bench.authority.granted(drive.id, drive.name, job.title, ended=ended)
+        return self._bench.authority.granted(drive.id, drive.name, job.title_text, ended=ended)
 
-    def unattended(self, drive_id: str, why: str) -> None:
+    def unattended(self, drive_id: str, why: Text) -> None:
         """Nobody may leave this axis enabled any longer: it loses its power."""
         member = self._bench.members.get(drive_id)
         if member is None or member.axis.stopped:
             return  # STOP takes the power off, and says what became of the axis
-        text = f"{member.drive.name} loses its power, nobody looks after it: {why}"
-        self._bench.journal.add(text, level="warning", drive=drive_id)
+        line = text("station.loses-power-unattended", drive=member.drive.name, why=why)
+        self._bench.journal.add(line, level="warning", drive=drive_id)
         task = asyncio.create_task(self.let_go(drive_id), name=f"unattended-{drive_id}")
         self._later.add(task)
         task.add_done_callback(self._later.discard)
 
-    async def stop(self, drive_ids: Sequence[str]) -> dict[str, str]:
+    async def stop(self, drive_ids: Sequence[str]) -> dict[str, Text | None]:
         """Quick stop of these drives, all at once; motion jobs are cancelled.
 
         The write does not wait for any job's cleanup, and goes out even when whoever asked for
-        it is gone by then. Returns drive id to problem, empty text where the drive took the stop.
+        it is gone by then. Returns drive id to problem, None where the drive took the stop.
         Whether the axis stands is watched from then on, and tells `standstill`.
         """
         members = [self._bench.member(drive_id) for drive_id in drive_ids]
         for member in members:
             # Before anything else runs: nothing in progress may enable the axis from here on.
             member.axis.stopped = True
-            self._bench.authority.revoke(member.drive.id, "STOP was pressed")
+            self._bench.authority.revoke(member.drive.id, text("motion.stop-was-pressed"))
             job = self._bench.jobs.moving(member.drive.id)
             if job is not None and job.stoppable and job.task is not None:
                 # Cancelled before the write, so that it sends nothing after it but its cleanup.
@@ -144,21 +145,21 @@ class Motion:
         self._bench.witness.stopped(drive_ids)
         return await asyncio.shield(task)
 
-    async def _stop(self, members: Sequence[Member]) -> dict[str, str]:
-        async def one(member: Member) -> str:
-            problem = ""
+    async def _stop(self, members: Sequence[Member]) -> dict[str, Text | None]:
+        async def one(member: Member) -> Text | None:
+            problem: Text | None = None
             try:
                 await member.axis.stop()
             except DriveError as error:
-                problem = error.message
+                problem = error.text
             self._begin_watch(member, problem)
             member.monitor.hurry()
             return problem
 
         problems = await asyncio.gather(*(one(member) for member in members))
-        return {m.drive.id: text for m, text in zip(members, problems, strict=True)}
+        return {m.drive.id: problem for m, problem in zip(members, problems, strict=True)}
 
-    def _begin_watch(self, member: Member, problem: str) -> None:
+    def _begin_watch(self, member: Member, problem: Text | None) -> None:
         """One watch of an axis at a time: STOP pressed again has sent its word again."""
         drive_id = member.drive.id
         if self.stopping(drive_id):
@@ -177,7 +178,7 @@ class Motion:
             except Exception as error:
                 # A watch that ended without a verdict must not pass for an axis that stands.
                 log.exception("the stop of %s cannot be watched", member.drive.name)
-                why = f"internal error: {type(error).__name__}: {error}"
+                why = internal_error(error)
                 found = AxisStop(drive_id, Verdict.STILL_MOVING, 0.0, problem=why)
             self._note(member, found)
             return found
@@ -186,10 +187,9 @@ class Motion:
 
     def _note(self, member: Member, found: AxisStop) -> None:
         member.monitor.hurry()
-        if found.verdict is not Verdict.STOPPED and not found.superseded:
-            self._bench.journal.add(
-                told(member.drive.name, found), level="error", drive=member.drive.id
-            )
+        line = told(member.drive.name, found)
+        if line is not None and not found.superseded:
+            self._bench.journal.add(line, level="error", drive=member.drive.id)
 
     async def standstill(self, drive_ids: Sequence[str]) -> list[AxisStop]:
         """What the last STOP of these drives has reached; waits for verdicts that are due.
@@ -237,8 +237,8 @@ class Motion:
         except DriveError as error:
             # Told to stop as soon as it answers, here or after it was put back on the bench.
             member.axis.owes_stop = True
-            text = f"{member.drive.name} may still be enabled: {error.message}"
-            self._bench.journal.add(text, level="error", drive=member.drive.id)
+            line = text("station.may-still-be-enabled", drive=member.drive.name, cause=error.text)
+            self._bench.journal.add(line, level="error", drive=member.drive.id)
 
     async def let_go_of_all(self) -> None:
         """Take the power off every axis of the bench, all at once; never raises."""
@@ -247,5 +247,5 @@ class Motion:
 
 def _unseen(drive_id: str) -> AxisStop:
     """Of an axis whose watch was ended before it had a verdict."""
-    why = "it was taken off the bench before it was seen to stand"
+    why = text("stopping.ended-unwatched")
     return AxisStop(drive_id, Verdict.UNREACHABLE, 0.0, problem=why)

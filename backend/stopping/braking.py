@@ -15,6 +15,7 @@ from backend.stopping.settings import OPTION, braking_option, known_settings
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError
+from drivers.texts.message import Text, text
 
 if TYPE_CHECKING:
     from backend.axis.power import PowerState
@@ -68,16 +69,17 @@ def torque_coasts(drive: Drive) -> bool:
 
 async def _take_speed_control(power: PowerState) -> bool:
     """Profile velocity with the target 0: the drive brakes by 6084h."""
-    drive, problem = power.drive, ""
+    problem: Text | None = None
+    drive = power.drive
     try:
         await drive.stop_by(drive.require("velocity_target"), 0)
         await drive.stop_by(drive.require("mode"), int(Mode.PV))
         if await drive.raw(drive.require("mode_display")) != Mode.PV:
-            problem = "the drive does not change its mode"
+            problem = text("stopping.mode-not-changed")
     except DriveError as error:
-        problem = error.message
+        problem = error.text
     power.stop_step(StepCode.SPEED_CONTROL, problem, drive.key("mode"), {"raw": float(Mode.PV)})
-    return not problem
+    return problem is None
 
 
 async def _let_quick_stop_brake(power: PowerState) -> bool:
@@ -85,17 +87,17 @@ async def _let_quick_stop_brake(power: PowerState) -> bool:
     option = braking_option(drive)
     if option is None:
         return False
-    problem = ""
+    problem: Text | None = None
     try:
         await drive.stop_by(OPTION, option)
         if await drive.raw(OPTION) != option:
-            problem = "the drive keeps its value"
+            problem = text("stopping.option-not-changed")
         elif power.option_before is None:
             power.option_before = before
     except DriveError as error:
-        problem = error.message
+        problem = error.text
     power.stop_step(StepCode.OPTION_SET, problem, OPTION, {"raw": float(option)})
-    return not problem
+    return problem is None
 
 
 def _seen_enabled(drive: Drive) -> bool:

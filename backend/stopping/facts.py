@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from drivers.texts.message import Text
+
 
 class Verdict(StrEnum):
     """What the measured motion says of an axis after STOP."""
@@ -43,7 +45,7 @@ class StopStep:
     done: bool = True
     parameter: str | None = None
     figures: dict[str, float] = field(default_factory=dict)
-    problem: str = ""
+    problem: Text | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +64,6 @@ class AxisStop:
     travelled: float | None = None
     travel_unit: str = "rev"
     steps: tuple[StopStep, ...] = ()
-    problem: str = ""
+    problem: Text | None = None
     superseded: bool = False
     """Somebody began a new motion before the verdict."""

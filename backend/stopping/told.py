@@ -1,20 +1,23 @@
-"""What STOP reached, in words for the log and for programs that show no verdicts."""
+"""What STOP reached, as messages for the log and for programs that show no verdicts."""
 
 from __future__ import annotations
 
 from backend.stopping.facts import AxisStop, Verdict
+from drivers.texts.message import Text, text
 
 
-def told(name: str, found: AxisStop) -> str:
-    """One sentence; empty for an axis that stands."""
-    speed = "" if found.speed is None else f" at {found.speed:.4g} {found.speed_unit}"
+def told(name: str, found: AxisStop) -> Text | None:
+    """What became of this axis and what to do; None for an axis that stands."""
+    # Without a measured speed the texts leave it out.
+    speed = "none" if found.speed is None else f"{found.speed:.4g}"
     match found.verdict:
         case Verdict.STOPPED:
-            return ""
+            return None
         case Verdict.COASTING:
-            return f"{name} has no power and coasts{speed} after STOP: keep away until it stands"
+            return text("stopping.coasts", drive=name, speed=speed, unit=found.speed_unit)
         case Verdict.STILL_MOVING:
-            return f"{name} still moves{speed} after STOP: use the machine's emergency stop"
+            return text("stopping.still-moves", drive=name, speed=speed, unit=found.speed_unit)
+        case Verdict.UNREACHABLE if found.problem is None:
+            return text("stopping.not-reached", drive=name)
         case Verdict.UNREACHABLE:
-            why = f" ({found.problem})" if found.problem else ""
-            return f"STOP did not reach {name}{why}: use the machine's emergency stop"
+            return text("stopping.not-reached-why", drive=name, why=found.problem)

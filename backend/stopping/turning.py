@@ -10,6 +10,7 @@ from enum import StrEnum
 
 from backend.scales.units import AxisUnits
 from drivers.cia402 import State
+from drivers.texts.message import Text, text
 
 #: Slower is noise, or a shaft that is held and trembles.
 TURNS_RPM = 8.0
@@ -90,9 +91,10 @@ class TurnWatch:
         )
 
 
-def told(name: str, turning: Turning) -> str:
+def told(name: str, turning: Turning) -> Text:
     """For the log."""
-    speed = f"{turning.speed:.4g} {turning.unit}"
-    if turning.kind is TurnKind.DISABLED:
-        return f"{name} turns at {speed} without power: by hand, by gravity or by the drive itself"
-    return f"{name} is enabled and turns at {speed} although nobody moves it here: press STOP"
+    powered = turning.kind is not TurnKind.DISABLED
+    return text(
+        "stopping.turns-with-power" if powered else "stopping.turns-without-power",
+        drive=name, speed=f"{turning.speed:.4g}", unit=turning.unit,
+    )  # fmt: skip

@@ -27,6 +27,7 @@ from backend.stopping.speed import LOOK_S, WINDOW_S, Sample, SpeedWatch, units_o
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, LinkTimeout
+from drivers.texts.message import Text, text
 from profiles.stopping import StopClear
 
 #: The ramp's own time gets this much more, and is at least and at most so long.
@@ -68,19 +69,19 @@ class StopWatch:
         self._unpowered_speed = 0.0
         self._until_s = 0.0
 
-    async def run(self, problem: str = "") -> AxisStop:
+    async def run(self, problem: Text | None = None) -> AxisStop:
         """Until the verdict. ``problem`` says why the first word did not go out."""
         axis, self._began_s = self._axis, time.monotonic()
         before = self._resting_at()
         try:
             units = await units_of(axis)
             self._watch = SpeedWatch(axis, units)
-            if before is not None and not problem:
+            if before is not None and problem is None:
                 await asyncio.sleep(before.at_s + WINDOW_S - time.monotonic())
             first = await self._watch.look()
         except DriveError as error:
-            return await self._silent(problem or error.message)
-        if not problem and before is not None and self._stood(before, first):
+            return await self._silent(problem or error.text)
+        if problem is None and before is not None and self._stood(before, first):
             return self._verdict(Verdict.STOPPED)
         self._until_s = self._began_s + SHORTEST_S
         await self._know_ramp()
@@ -119,7 +120,7 @@ class StopWatch:
         self._watch.take(now)
         return self._watch.stands(0.0)
 
-    async def _silent(self, problem: str) -> AxisStop:
+    async def _silent(self, problem: Text) -> AxisStop:
         """The first look failed: another within the time, then it is not reached."""
         while time.monotonic() - self._began_s < _SILENT_S:
             await asyncio.sleep(_LOOK_EVERY_S)
@@ -129,10 +130,10 @@ class StopWatch:
             except DriveError:
                 continue
             self._until_s = time.monotonic() + LONGEST_S
-            return await self._follow("")
+            return await self._follow(None)
         return self._verdict(Verdict.UNREACHABLE, problem)
 
-    async def _follow(self, problem: str) -> AxisStop:
+    async def _follow(self, problem: Text | None) -> AxisStop:
         watch, axis, ramp_known = self._watch, self._axis, False
         while True:
             if axis.permits != self._permits:
@@ -140,11 +141,11 @@ class StopWatch:
             await asyncio.sleep(_LOOK_EVERY_S)
             try:
                 if axis.owes_stop and await axis.repeat_stop():
-                    problem = ""
+                    problem = None
                 sample = await watch.look()
             except DriveError as error:
                 if time.monotonic() - (watch.answered_s or self._began_s) > _SILENT_S:
-                    return self._verdict(Verdict.UNREACHABLE, problem or error.message)
+                    return self._verdict(Verdict.UNREACHABLE, problem or error.text)
                 continue
             if watch.stands():
                 if axis.owes_stop:
@@ -212,11 +213,12 @@ class StopWatch:
         return True
 
     async def _disable_voltage(self) -> None:
-        axis, problem = self._axis, ""
+        problem: Text | None = None
+        axis = self._axis
         try:
             await shielded(self._power_off, LOOK_S, axis.drive.name)
         except DriveError as error:
-            problem = error.message
+            problem = error.text
         axis.stop_step(StepCode.VOLTAGE_DISABLED, problem)
 
     async def _power_off(self) -> None:
@@ -231,12 +233,12 @@ class StopWatch:
         """Whether there were process data to end."""
         if self._end_process_data is None:
             return False
-        problem = ""
+        problem: Text | None = None
         try:
             if not await self._end_process_data():
                 return False
         except DriveError as error:
-            problem = error.message
+            problem = error.text
         self._axis.stop_step(StepCode.PROCESS_DATA_ENDED, problem)
         return True
 
@@ -249,7 +251,8 @@ class StopWatch:
 
     async def _clear_one(self, entry: StopClear) -> bool:
         """Whether the drive answers."""
-        axis, drive, problem, answers = self._axis, self._axis.drive, "", True
+        axis, drive, answers = self._axis, self._axis.drive, True
+        problem: Text | None = None
         if drive.unreachable_why(drive.parameter(entry.key)):
             return True
         figures: dict[str, float] = {}
@@ -262,9 +265,9 @@ class StopWatch:
                 figures = {"before": float(before), "after": float(wanted)}
                 await drive.stop_by(entry.key, wanted)
         except (LinkLost, LinkTimeout, TimeoutError):
-            answers, problem = False, "no answer"
+            answers, problem = False, text("stopping.no-answer")
         except DriveError as error:
-            problem = error.message
+            problem = error.text
         code = StepCode.BRAKE_APPLIED if entry.kind == "brake" else StepCode.TRIGGER_CLEARED
         axis.stop_step(code, problem, entry.key, figures)
         return answers
@@ -280,11 +283,11 @@ class StopWatch:
                 await axis.drive.stop_by(OPTION, before)
                 axis.option_before = None
                 figures = {"raw": float(before)}
-                axis.stop_step(StepCode.OPTION_RESTORED, "", OPTION, figures)
+                axis.stop_step(StepCode.OPTION_RESTORED, None, OPTION, figures)
         except DriveError as error:
-            axis.stop_step(StepCode.OPTION_RESTORED, error.message, OPTION)
+            axis.stop_step(StepCode.OPTION_RESTORED, error.text, OPTION)
 
-    def _moving(self, sample: Sample, problem: str) -> AxisStop:
+    def _moving(self, sample: Sample, problem: Text | None) -> AxisStop:
         coasts = sample.state not in _POWERED and self._watch.slows()
         return self._verdict(Verdict.COASTING if coasts else Verdict.STILL_MOVING, problem)
 
@@ -293,7 +296,7 @@ class StopWatch:
         return self._verdict(found, superseded=True)
 
     def _verdict(
-        self, verdict: Verdict, problem: str = "", *, superseded: bool = False
+        self, verdict: Verdict, problem: Text | None = None, *, superseded: bool = False
     ) -> AxisStop:
         watch, axis = self._watch, self._axis
         units = watch.units

@@ -10,13 +10,14 @@ from __future__ import annotations
 import time
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from backend.people.rights import Right
 from backend.tools.measuring.repeats import Repeats
 from backend.work.jobs import Progress
+from drivers.texts.message import Language
 
 if TYPE_CHECKING:  # who only reads results or settings imports no analysis
     import numpy as np
@@ -90,6 +91,10 @@ class ToolResult(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     measurements: tuple[str, ...] = Field(default=(), description="names of the stored raw data")
+
+    def in_language(self, language: Language) -> Self:  # noqa: ARG002
+        """The same result, its sentences in a language where it has any beside its codes."""
+        return self
 
 
 @dataclass(frozen=True)

@@ -9,19 +9,30 @@ from dataclasses import dataclass
 from typing import Literal
 
 from backend.people.identity import acting_person
+from drivers.texts.message import Text, prose
 
 Level = Literal["info", "warning", "error"]
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One line; ``time`` in epoch seconds."""
+    """One line; ``time`` in epoch seconds, ``said`` a message or words that others made."""
 
     time: float
     level: Level
     drive: str | None
     person: str
-    text: str
+    said: str | Text
+
+    @property
+    def message(self) -> Text:
+        """What happened, as code and facts."""
+        return self.said if isinstance(self.said, Text) else prose(self.said)
+
+    @property
+    def text(self) -> str:
+        """What happened, in English."""
+        return self.message.words()
 
 
 class Journal:
@@ -38,10 +49,15 @@ class Journal:
         self._listeners.append(listener)
 
     def add(
-        self, text: str, *, level: Level = "info", drive: str | None = None, person: str = ""
+        self,
+        said: str | Text,
+        *,
+        level: Level = "info",
+        drive: str | None = None,
+        person: str = "",
     ) -> None:
         """Write an entry with the present time; without ``person`` it is of whoever acts."""
-        entry = Entry(time.time(), level, drive, person or acting_person(), text)
+        entry = Entry(time.time(), level, drive, person or acting_person(), said)
         self._entries.append(entry)
         for listener in self._listeners:
             listener(entry)

@@ -110,6 +110,22 @@ def text(code: str, /, **params: Param) -> Text:
     return Text(code, params)
 
 
+class Unsuitable(ValueError):
+    """A value or recording that a calculation cannot use; ``why`` as a message."""
+
+    def __init__(self, why: Text) -> None:
+        super().__init__(why)
+        self.why = why
+
+    def __str__(self) -> str:
+        return self.why.words()
+
+
+def cause_of(error: Exception) -> Text:
+    """What an error says: its message, or the words that a library or Python made."""
+    return error.why if isinstance(error, Unsuitable) else prose(str(error))
+
+
 def prose(words: str) -> Text:
     """Words that others made, such as a drive, an operating system or a person."""
     return Text(PROSE, {"words": words})

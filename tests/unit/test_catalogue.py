@@ -15,7 +15,7 @@ from fluent.syntax.visitor import Visitor
 
 from drivers.errors import DriveError
 from drivers.texts.message import REMEDY, Language, Text, is_code
-from drivers.texts.render import bundle, files, identifier, render
+from drivers.texts.render import CATALOGUE, bundle, files, identifier, render
 
 ROOT = Path(__file__).parents[2]
 LANGUAGES: tuple[Language, ...] = ("en", "zh")
@@ -93,6 +93,11 @@ def _first_arguments() -> Iterator[str]:
                     continue
                 if name in ("text", "Text") or name in ERRORS:
                     yield first.value
+
+
+def test_a_room_has_one_file() -> None:
+    found = sorted(CATALOGUE.rglob("*.en.ftl"))
+    assert len({each.name for each in found}) == len(found), "one would hide the other"
 
 
 ERRORS = {each.__name__ for each in _kinds_of(DriveError)}

@@ -10,6 +10,7 @@ few independent samples a filtered signal holds, and how long what is left swing
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from scipy.ndimage import convolve1d
@@ -41,7 +42,12 @@ _FEWEST = 20
 _RIGID = 6
 #: Share of the Coulomb friction that may have been taken for viscous friction.
 _TOLD_APART = 0.01
-_AT_LIMIT = "the torque was at its limit: raise the limit or lower the acceleration"
+
+#: Why data do not support an answer, in the order in which they are stated.
+Reason = Literal[
+    "at-limit", "one-direction", "too-little-acceleration", "torque-opposes-acceleration",
+    "negative-friction", "does-not-follow", "backlash", "below-motor-inertia", "too-few-samples",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -55,7 +61,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class InertiaResult:
-    """SI units at the motor shaft. ``verdict`` is "ok" or the plain reasons, one per line.
+    """SI units at the motor shaft. ``reasons`` say why it is not identifiable.
 
     ``identifiable`` is False when the data do not support an answer; the numbers are then what
     the regression said and must not be used.
@@ -68,7 +74,7 @@ class InertiaResult:
     load_ratio: float | None
     r2: float
     identifiable: bool
-    verdict: str
+    reasons: tuple[Reason, ...]
     beside: Beside = NOTHING_BESIDE
     """What the torque depends on beside inertia and friction."""
 
@@ -241,10 +247,10 @@ def _columns(
 def _nothing(saturated_share: float) -> InertiaResult:
     """The answer where there is next to nothing to regress over."""
     nothing = Interval(float("nan"), float("nan"), float("nan"))
-    reason = "too few samples in motion: raise travel or speed"
+    reasons: tuple[Reason, ...] = ("too-few-samples",)
     if saturated_share > 0.05:
-        reason += f"\n{_AT_LIMIT}"
-    return InertiaResult(nothing, nothing, nothing, nothing, None, 0.0, False, reason)
+        reasons += ("at-limit",)
+    return InertiaResult(nothing, nothing, nothing, nothing, None, 0.0, False, reasons)
 
 
 def _intervals(
@@ -300,10 +306,10 @@ def _regress(
     if motor_inertia_kgm2 is not None:
         ratio = parts[0].value / motor_inertia_kgm2 - 1.0
         if ratio < -0.1:
-            reasons.append("the result is below the motor's own inertia: check the motor data")
+            reasons.append("below-motor-inertia")
     result = InertiaResult(
         parts[0], parts[1], parts[2], parts[3], ratio, r2,
-        not reasons, "\n".join(reasons) or "ok",
+        not reasons, tuple(reasons),
     )  # fmt: skip
     return result, np.asarray(x / scale)
 
@@ -316,30 +322,26 @@ def _reasons(
     parts: list[Interval],
     r2: float,
     saturated_share: float,
-) -> list[str]:
+) -> list[Reason]:
     """Why the data do not support an answer."""
-    reasons = []
+    reasons: list[Reason] = []
     inertia = parts[0]
     if saturated_share > 0.05:
-        reasons.append(_AT_LIMIT)
+        reasons.append("at-limit")
     if np.min(a[:, 1]) >= 0 or np.max(a[:, 1]) <= 0:
-        reasons.append("motion in one direction only: friction and gravity cannot be told apart")
+        reasons.append("one-direction")
     accelerating = float(np.std(a[:, 0])) * abs(inertia.value)
     noise = float(np.sqrt(np.average(residual**2, weights=weight)))
     if accelerating < 3 * noise or inertia.high - inertia.low > 0.3 * abs(inertia.value):
-        reasons.append(
-            "too little acceleration for the noise: raise acceleration, torque or travel"
-        )
+        reasons.append("too-little-acceleration")
     if inertia.value <= 0:
-        reasons.append("the torque opposes the acceleration: wrong sign of torque or velocity")
+        reasons.append("torque-opposes-acceleration")
     if parts[2].high < 0:
-        reasons.append(
-            "friction comes out negative: something beside inertia and friction drives the axis"
-        )
+        reasons.append("negative-friction")
     if r2 < 0.8 and accelerating >= 3 * noise:
-        reasons.append("the moves do not follow inertia and friction (R² below 0.8)")
+        reasons.append("does-not-follow")
     if _looks_like_backlash(a, b, residual):
-        reasons.append("knocks after each change of the torque's sign: backlash in the drive train")
+        reasons.append("backlash")
     return reasons
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from backend.api.drive import models_axis
+from backend.api.errors import message_of, message_or_none, words_of
 from backend.station.bench import Bench
 from backend.stopping.facts import AxisStop, Verdict
 from backend.stopping.told import told
 from backend.stopping.turning import Turning
+from drivers.texts.message import text
 
 
 def turning(found: Turning | None) -> models_axis.TurningInfo | None:
@@ -27,7 +29,8 @@ def axis_stop(found: AxisStop) -> models_axis.AxisStopInfo:
             done=step.done,
             parameter=step.parameter,
             figures=step.figures,
-            problem=step.problem,
+            problem=words_of(step.problem),
+            problem_message=message_or_none(step.problem),
         )
         for step in found.steps
     ]
@@ -40,7 +43,8 @@ def axis_stop(found: AxisStop) -> models_axis.AxisStopInfo:
         travelled=found.travelled,
         travel_unit=found.travel_unit,
         steps=steps,
-        problem=found.problem,
+        problem=words_of(found.problem),
+        problem_message=message_or_none(found.problem),
         superseded=found.superseded,
     )
 
@@ -50,14 +54,15 @@ def stop_result(
 ) -> models_axis.StopResult:
     """Verdicts of these drives; one without a verdict has not been stopped."""
     failed = {
-        each.drive: told(bench.name_of(each.drive), each)
+        each.drive: why
         for each in found
-        if each.verdict is not Verdict.STOPPED
+        if (why := told(bench.name_of(each.drive), each)) is not None
     }
     judged = {each.drive for each in found}
-    failed |= {drive: "not on this bench" for drive in wanted if drive not in judged}
+    failed |= {drive: text("stopping.not-on-bench") for drive in wanted if drive not in judged}
     return models_axis.StopResult(
         stopped=[each.drive for each in found if each.verdict is Verdict.STOPPED],
-        failed=failed,
+        failed={drive: words_of(why) for drive, why in failed.items()},
+        failed_messages={drive: message_of(why) for drive, why in failed.items()},
         axes=[axis_stop(each) for each in found],
     )

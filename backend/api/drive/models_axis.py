@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from backend.api.models import Message
+from backend.api.models import Message, MessageInfo
 
 
 class ActiveFault(Message):
@@ -39,6 +39,7 @@ class AxisState(Message):
     time: datetime
     fresh: bool = Field(description="False when the last reading failed; values are then old")
     problem: str = Field(description="why the reading failed, or empty")
+    problem_message: MessageInfo | None = Field(default=None, description="of problem")
     state: str
     status_word: int | None
     mode: int | None
@@ -114,7 +115,8 @@ class StopStepInfo(Message):
     done: bool
     parameter: str | None
     figures: dict[str, float]
-    problem: str
+    problem: str = Field(description="why it was in vain, or empty")
+    problem_message: MessageInfo | None = Field(default=None, description="of problem")
 
 
 class AxisStopInfo(Message):
@@ -128,7 +130,8 @@ class AxisStopInfo(Message):
     travelled: float | None = Field(description="since STOP, magnitude")
     travel_unit: str
     steps: list[StopStepInfo]
-    problem: str
+    problem: str = Field(description="why it was in vain, or empty")
+    problem_message: MessageInfo | None = Field(default=None, description="of problem")
     superseded: bool = Field(description="a new motion began before the verdict")
 
 
@@ -138,5 +141,8 @@ class StopResult(Message):
     stopped: list[str] = Field(description="drives whose axis stands by what it measures")
     failed: dict[str, str] = Field(
         description="all others: not reached, coasting or still moving, and what to do"
+    )
+    failed_messages: dict[str, MessageInfo] = Field(
+        default_factory=dict, description="of failed, as code and facts"
     )
     axes: list[AxisStopInfo] = Field(description="each axis' verdict")

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import ConfigDict, Field, field_validator
 
-from backend.api.models import Message, Problem, Raw
+from backend.api.models import Message, MessageInfo, Problem, Raw
 
 
 class ParameterInfo(Message):
@@ -40,6 +40,7 @@ class ParameterInfo(Message):
         description="page on which an object that energises is used; empty for all others"
     )
     motion_how: str = Field(description="what to do there, for an object that energises")
+    motion_how_message: MessageInfo | None = Field(default=None, description="of motion_how")
     help: str
     source: str
     also_printed: list[str]

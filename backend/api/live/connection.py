@@ -51,6 +51,7 @@ from backend.people.identity import Actor, Identity, acting
 from backend.people.station import People
 from backend.station.bench import Bench
 from drivers.errors import DriveError
+from drivers.texts.message import text
 
 #: Messages that wait for a slow page; states, values and drive lists coalesce and do not count.
 QUEUE = 500
@@ -238,11 +239,12 @@ class Connection:
         drives = [request.drive] if request.drive else list(self._bench.members)
         known = [drive for drive in drives if drive in self._bench.members]
         problems = await self._bench.motion.stop(known)
-        self._bench.journal.add("STOP", level="warning", drive=request.drive)
-        failed = {drive: text for drive, text in problems.items() if text}
-        self.send(StopTaken(drives=known, problems=failed))
-        for drive, text in failed.items():
-            failure = DriveError("api-live.stop-not-reach", drive=drive, text=text)
+        self._bench.journal.add(text("station.stop-pressed"), level="warning", drive=request.drive)
+        failed = {drive: why for drive, why in problems.items() if why is not None}
+        problems_of = {drive: why.words() for drive, why in failed.items()}
+        self.send(StopTaken(drives=known, problems=problems_of))
+        for drive, why in failed.items():
+            failure = DriveError("api-live.stop-not-reach", drive=drive, text=why)
             self.send(Refused(request="stop", problem=problem_of(failure)))
         # The connection goes on meanwhile: STOP may be pressed again.
         task = asyncio.create_task(self._stopped(drives, known), name=f"stop-answer-{self.id}")

@@ -21,6 +21,7 @@ from backend.station.bench import Bench
 from backend.station.monitor import Snapshot
 from backend.work.jobs import Job
 from backend.work.journal import Entry
+from drivers.texts.message import text
 
 
 class LiveHub:
@@ -67,14 +68,14 @@ class LiveHub:
             if connection.identity.session == session:
                 connection.release(None, "the session is over")
         self._sockets.end(session)
-        self.bench.authority.end_of(session, "the session of whoever began it is over")
+        self.bench.authority.end_of(session, text("motion.session-is-over"))
 
     def _lowered(self, session: str) -> None:
         """An account may move nothing any more: what it still moves is brought to rest."""
         for connection in self._each():
             if connection.identity.session == session:
                 connection.release(None, "the account has another role now")
-        self.bench.authority.end_of(session, "the account of whoever began it has another role")
+        self.bench.authority.end_of(session, text("motion.account-has-another-role"))
 
     def _each(self) -> list[Connection]:
         return list(self.connections.values())

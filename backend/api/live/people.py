@@ -36,6 +36,7 @@ from backend.people.identity import Identity
 from backend.people.station import People
 from backend.people.throttle import Bucket
 from backend.station.bench import Bench
+from drivers.texts.message import text
 
 #: Lines of a page's chat at once, and a second: nobody talks the log full.
 _TALK = (10.0, 1.0)
@@ -71,18 +72,18 @@ class PeopleLive:
         with contextlib.ExitStack() as then:
             then.callback(self.changed)
             then.callback(self._bench.leases.drop, page.id)
-            then.callback(self._motions.let_go, page, "is gone")
-            then.callback(self._motions.end, page, "is gone")
+            then.callback(self._motions.let_go, page, text("api-live.is-gone"))
+            then.callback(self._motions.end, page, text("api-live.is-gone"))
             self._talk.pop(page.id, None)
             self._support.release_all(page.id, "the connection on site closed")
 
     def _fell_silent(self, page: Page) -> None:
         """A page says nothing any more, though its line may look open for some seconds yet."""
-        self._motions.let_go(page, "fell silent")
+        self._motions.let_go(page, text("api-live.fell-silent"))
         if self._bench.leases.held_by(page.id):
             page.release(None, "the page fell silent")
             self._bench.leases.lose(page.id)
-        self._motions.end(page, "fell silent")
+        self._motions.end(page, text("api-live.fell-silent"))
 
     # --- requests ---------------------------------------------------------------------
 

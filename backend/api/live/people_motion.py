@@ -12,6 +12,7 @@ from backend.people.support import Invitation
 from backend.station.bench import Bench
 from backend.work.jobs import Job
 from drivers.cia402 import State
+from drivers.texts.message import Text, text
 
 
 class PeopleMotions:
@@ -26,7 +27,7 @@ class PeopleMotions:
         bench.on_job.append(self._job)
         self._support.on_disabled.append(self._disabled)
 
-    def end(self, page: Page, what: str) -> None:
+    def end(self, page: Page, what: Text) -> None:
         """What this page moves comes to its end; ``what`` became of it."""
         for job in self._bench.jobs.all():
             own = job.actor is not None and job.actor.connection == page.id
@@ -34,15 +35,12 @@ class PeopleMotions:
             # the cleanup of the first.
             if not own or not _moves(job) or job.kind == "jog" or job.id in self._ending:
                 continue
-            self._bench.journal.add(
-                f"{job.title}: ended, the page that began it {what}",
-                level="warning",
-                drive=job.drive,
-            )
+            line = text("api-live.job-ended-with-page", job_title=job.title_text, what=what)
+            self._bench.journal.add(line, level="warning", drive=job.drive)
             self._ending.add(job.id)
             self._spawn(self._cancel(job))
 
-    def let_go(self, page: Page, what: str) -> None:
+    def let_go(self, page: Page, what: Text) -> None:
         """Nothing stays enabled that nobody looks after: not what this page enabled and left so.
 
         Whoever controls or moves the axis by now looks after it from here on.
@@ -57,8 +55,8 @@ class PeopleMotions:
             heir = next((each for each in others if each not in (None, page.id)), None)
             member.axis.enabled_by = heir
             if heir is None:
-                text = f"{member.drive.name} loses its power: the page that enabled it {what}"
-                self._bench.journal.add(text, level="warning", drive=drive)
+                line = text("api-live.loses-power", drive=member.drive.name, what=what)
+                self._bench.journal.add(line, level="warning", drive=drive)
                 self._spawn(self._bench.motion.let_go(drive))
 
     async def _cancel(self, job: Job) -> None:
@@ -104,7 +102,8 @@ class PeopleMotions:
         known = [drive for drive in drives if drive in self._bench.members]
         if known:
             for drive in known:
-                self._bench.journal.add(f"stopped: {why}", level="warning", drive=drive)
+                line = text("api-live.stopped-why", why=why)
+                self._bench.journal.add(line, level="warning", drive=drive)
             self._spawn(self._bench.motion.stop(known))
 
     def _is_enabled(self, drive: str) -> bool:

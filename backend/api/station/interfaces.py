@@ -7,8 +7,10 @@ from collections.abc import Sequence
 
 from serial.tools import list_ports
 
+from backend.api.errors import message_or_none, words_of
 from backend.api.station.models import Interfaces, NetworkInterface, SerialPort
 from drivers.computer.interfaces import Interface, network_interfaces
+from drivers.texts.message import text
 
 
 def list_interfaces(virtual: Sequence[str]) -> Interfaces:
@@ -29,18 +31,24 @@ def list_interfaces(virtual: Sequence[str]) -> Interfaces:
 
 def _serial(path: str, description: str) -> SerialPort:
     usable = os.access(path, os.R_OK | os.W_OK)
-    problem = "" if usable else "no permission: add yourself to the group dialout and log in again"
+    problem = None if usable else text("api-station.no-permission-for-port")
     return SerialPort(
         path=path,
         description=description,
         url=f"mlink://{path}",
         usable=usable,
-        problem=problem,
+        problem=words_of(problem),
+        problem_message=message_or_none(problem),
     )
 
 
 def _network(one: Interface) -> NetworkInterface:
-    problem = "" if one.up else "no cable, or the interface is down"
+    problem = None if one.up else text("api-station.interface-down")
     return NetworkInterface(
-        name=one.name, up=one.up, url=f"ethercat://{one.name}", usable=one.up, problem=problem
+        name=one.name,
+        up=one.up,
+        url=f"ethercat://{one.name}",
+        usable=one.up,
+        problem=words_of(problem),
+        problem_message=message_or_none(problem),
     )

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from backend.api.models import Message
+from backend.api.models import Message, MessageInfo
 from backend.api.station.printed import PrintedLines, PrintedName
 
 
@@ -27,6 +27,7 @@ class SerialPort(Message):
     url: str = Field(description="bus URL to start from")
     usable: bool
     problem: str = ""
+    problem_message: MessageInfo | None = Field(default=None, description="of problem")
 
 
 class NetworkInterface(Message):
@@ -37,6 +38,7 @@ class NetworkInterface(Message):
     url: str
     usable: bool
     problem: str = ""
+    problem_message: MessageInfo | None = Field(default=None, description="of problem")
 
 
 class Interfaces(Message):

@@ -251,7 +251,7 @@ async def stop(bench: TheBench, request: StopRequest | None = None) -> StopResul
     wanted = [request.drive] if request.drive is not None else list(bench.members)
     known = [drive_id for drive_id in wanted if drive_id in bench.members]
     await bench.motion.stop(known)
-    bench.journal.add("STOP", level="warning", drive=request.drive)
+    bench.journal.add(text("station.stop-pressed"), level="warning", drive=request.drive)
     return stop_result(bench, wanted, await bench.motion.standstill(known))
 
 

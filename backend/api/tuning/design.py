@@ -17,6 +17,7 @@ from backend.analysis.loop.measured_plant import MeasuredPlant, measured_plant
 from backend.analysis.loop.notch import Notch, RealisedNotch
 from backend.analysis.signals.arrays import magnitude_db, phase_deg
 from backend.api.context import Controlled, TheBench, TheMember
+from backend.api.errors import message_or_none, words_of
 from backend.api.tuning.measurements import change_log, measurement_head
 from backend.api.tuning.models import (
     CandidatesInfo,
@@ -46,6 +47,7 @@ from backend.tools.notch import filters as notch
 from backend.tools.notch.meaning import meaning_of
 from backend.tools.sweep import evaluation as sweep_evaluation
 from drivers.errors import NotAllowed, OutOfRange
+from drivers.texts.message import joined, text
 
 router = APIRouter()
 
@@ -85,7 +87,7 @@ async def read_notches(member: TheMember) -> list[NotchSlotInfo]:
     return [
         NotchSlotInfo(
             slot=s.slot, enabled=s.enabled, notch=_shape(s.notch), realised=_realised(s.realised),
-            raw=dict(s.raw), note=s.note,
+            raw=dict(s.raw), note=words_of(s.note), note_message=message_or_none(s.note),
         )
         for s in await notch.read_notches(member.drive, meaning_of(member.drive))
     ]  # fmt: skip
@@ -103,7 +105,8 @@ async def preview_notches(member: TheMember, request: NotchPreviewRequest) -> No
         slots=[
             NotchSlotInfo(
                 slot=p.slot, enabled=p.asked is not None, notch=_shape(p.asked),
-                realised=_realised(p.realised), raw=dict(p.raw), note=p.note,
+                realised=_realised(p.realised), raw=dict(p.raw),
+                note=words_of(p.note), note_message=message_or_none(p.note),
             )
             for p in slots
         ],
@@ -233,11 +236,8 @@ async def _plant(bench: Bench, name: str) -> tuple[MeasuredPlant, sweep_evaluati
     file = bench.measurements.path(name)
     found = await _evaluated_once(file, file.stat().st_mtime_ns)
     if found.model is None:
-        raise NotAllowed(
-            f"{name}: nothing can be designed on it: "
-            + ("; ".join(found.warnings) or "it is not of the mechanics"),
-            value=name, remedy="measure the mechanics, with enough excitation",
-        )  # fmt: skip
+        why = joined(found.warnings or [text("api-tuning.not-of-mechanics")])
+        raise NotAllowed("api-tuning.nothing-designed", value=name, name=name, why=why)
     return measured_plant(found.frf, found.model), found
 
 

@@ -16,7 +16,9 @@ from backend.library.measurements import SUFFIX, BadMeasurement, Head, Measureme
 from backend.report.changes import ChangeLog
 from backend.station.bench import Bench
 from backend.station.evaluation import evaluate
+from backend.tools.spoken import result_in_language
 from drivers.errors import NotAllowed, OutOfRange
+from drivers.texts.message import language
 
 router = APIRouter()
 _MAX_BYTES = 64 * 1024 * 1024
@@ -80,7 +82,7 @@ def _listed(bench: Bench) -> list[MeasurementInfo]:
             rows.append(
                 MeasurementInfo(
                     file=name, kind="", drive="", profile="", serial=None, saved=None,
-                    problem=error.message,
+                    problem=error.text.words(language()),
                 )
             )  # fmt: skip
     return rows
@@ -95,7 +97,7 @@ async def read_measurement(bench: TheBench, name: str) -> MeasurementContent:
     return MeasurementContent(
         info=info_of(name, found.head),
         settings=settings if isinstance(settings, dict) else {},
-        result=made.result,
+        result=result_in_language(made.result, language()),
         agrees=made.agrees,
         differences=list(made.differences),
         program=str(found.meta.get("program", "")),

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from backend.api.models import Message
+from backend.api.models import Message, MessageInfo
 from backend.tools.tool import ToolSettings
 
 
@@ -104,7 +104,8 @@ class NotchSlotInfo(Message):
     notch: NotchShape | None
     realised: RealisedInfo | None
     raw: dict[str, int]
-    note: str
+    note: str = Field(description="what is known of it, or empty")
+    note_message: MessageInfo | None = Field(default=None, description="of note")
 
 
 class NotchPreviewRequest(Message):

@@ -29,7 +29,7 @@ from backend.tools.autotune.present import Trials, judged
 from backend.tools.autotune.verdict import fixed_of
 from backend.tools.autotune.verify import LOOKS, MOST_PAIRS, Verified, sharp_margins
 from backend.tools.measuring.temporary import write_settings
-from drivers.texts.message import text
+from drivers.texts.message import Text, joined, text
 
 #: A prediction stands within these: share of the -3 dB point, dB and degrees. The aims are 10 %,
 #: 3 dB and 6° (tuning.md, section 5).
@@ -43,23 +43,12 @@ _SAME = 0.02
 #: lines of the loop are known.
 Outcome = Literal["same", "other", "not kept", "none", "time", "unclear"]
 
-#: Said where a prediction did not stand.
-_OTHERWISE = (
-    "the tuned loop answered otherwise than the axis as it was measured before lets expect, as "
-    "with play (gear, coupling, key) or a resonance too narrow for the lines"
-)
-_OUTCOMES: dict[Outcome, str] = {
-    "same": "the design keeps all goals for the axis as its loop shows it, too",
-    "not kept": (
-        "a design for the axis as its loop shows it did not keep its promise, so the first one, "
-        "which did, is in force again"
-    ),
-    "none": (
-        "no design keeps all goals for the axis both as it was measured and as its loop shows it "
-        "and is faster than what it had, so this one stays, which kept its promise"
-    ),
-    "time": "there was no time to design for the axis as its loop shows it",
-    "unclear": "too few lines of the loop are known to design for the axis as it shows it",
+_OUTCOMES: dict[Outcome, Text] = {
+    "same": text("autotune.again-same"),
+    "not kept": text("autotune.again-not-kept"),
+    "none": text("autotune.again-none"),
+    "time": text("autotune.again-no-time"),
+    "unclear": text("autotune.again-unclear"),
 }
 
 
@@ -98,23 +87,17 @@ class Again:
         """Whether a second verification counts."""
         return self.outcome in ("same", "other")
 
-    def told(self, verified: Verified) -> str:
-        """Everything in words; ``verified`` is the last verification that counts."""
+    def told(self, verified: Verified) -> Text:
+        """Everything; ``verified`` is the last verification that counts."""
         parts = [*contradictions(self.predicted, self.measured), self._outcome()]
         have, want = verified.measured_bandwidth_hz, verified.predicted_bandwidth_hz
         if self.verified_anew and have is not None and want is not None:
-            parts.append(
-                f"verified with other realisations at {have:.0f} Hz, predicted from the loop at "
-                f"{want:.0f} Hz"
-            )
-        return f"{_OTHERWISE}: {'; '.join(parts)}"
+            parts.append(text("autotune.again-verified", have_hz=have, wanted_hz=want))
+        return text("autotune.answers-otherwise", what=joined(parts))
 
-    def _outcome(self) -> str:
+    def _outcome(self) -> Text:
         if self.outcome == "other":
-            return (
-                "designed again for the axis both as it was measured and as its loop shows it, "
-                f"with {self.gain_ratio:.0%} of the speed gain"
-            )
+            return text("autotune.again-other", gain_ratio=self.gain_ratio)
         return _OUTCOMES[self.outcome]
 
 
@@ -191,7 +174,7 @@ async def again(
         # Where the second one fails, a more careful design must still be possible.
         if trials.time_left.verifications() < LOOKS:
             return first, replace(told, outcome="time")
-        trials.progress(0.6, text("autotune.designing-axis-loop-shows"))
+        trials.progress(0.6, text("autotune.designing-axis-loop-shows", step=4, steps=6))
         lines = loop_lines(first.verified.seen)
         controller = _controller(trials, candidate, lines.frequency_hz)
         try:
@@ -254,19 +237,19 @@ def _figures(found: Mapping[str, float | bool | None]) -> Figures:
     return Figures(number("bandwidth_hz"), number("phase_margin_deg"), number("gain_margin_db"))
 
 
-def contradictions(predicted: Figures, measured: Figures) -> list[str]:
-    """What a prediction is too far off by, in words; what is not shown contradicts nothing."""
-    words = []
+def contradictions(predicted: Figures, measured: Figures) -> list[Text]:
+    """What a prediction is too far off by; what is not shown contradicts nothing."""
+    said = []
     want, have = predicted.bandwidth_hz, measured.bandwidth_hz
     if want and have and abs(have / want - 1.0) > _WIDTH:
-        words.append(f"-3 dB point at {have:.0f} Hz where {want:.0f} Hz was predicted")
+        said.append(text("autotune.other-width", have_hz=have, wanted_hz=want))
     want, have = predicted.phase_margin_deg, measured.phase_margin_deg
     if want is not None and have is not None and abs(have - want) > _DEG:
-        words.append(f"phase margin of {have:.0f}° where {want:.0f}° was predicted")
+        said.append(text("autotune.other-phase-margin", have_deg=have, wanted_deg=want))
     want, have = predicted.gain_margin_db, measured.gain_margin_db
     if want is not None and have is not None and abs(have - want) > _DB:
-        words.append(f"gain margin of {have:.1f} dB where {want:.1f} dB was predicted")
-    return words
+        said.append(text("autotune.other-gain-margin", have_db=have, wanted_db=want))
+    return said
 
 
 def _controller(trials: Trials, candidate: Candidate, frequency_hz: FloatArray) -> ComplexArray:

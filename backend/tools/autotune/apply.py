@@ -13,7 +13,7 @@ from backend.axis.axis import Axis
 from backend.axis.cyclic import CyclicSession
 from backend.tools.autotune.candidates import plan
 from backend.tools.autotune.time_budget import TimeLeft
-from backend.tools.autotune.verify import HUM_PERCENT, Check, Keep, Verified, verify
+from backend.tools.autotune.verify import HUM_PERCENT, Check, Keep, Verified, of_candidate, verify
 from backend.tools.measuring.interrupted import ends_all
 from backend.tools.measuring.temporary import put_back_in_time, write_settings
 from backend.work.jobs import Progress
@@ -39,7 +39,7 @@ class Applied:
 
 async def first_kept(
     axis: Axis, session: CyclicSession, check: Check, candidates: Sequence[Candidate],
-    promised: Goals, tried: list[str], progress: Progress, keep: Keep | None,
+    promised: Goals, tried: list[Text], progress: Progress, keep: Keep | None,
     softer: Softer | None = None, time_left: TimeLeft | None = None,
 ) -> Applied | None:  # fmt: skip
     """The first candidate that keeps its promise stays written; ``tried`` says why others do not.
@@ -64,7 +64,7 @@ async def first_kept(
             if not waiting:
                 break
         candidate = waiting.pop(0)
-        progress(0.65, text("autotune.applying"))
+        progress(0.65, text("autotune.applying", step=5, steps=6))
         raw = await plan(axis, candidate, check.inertia_kgm2, check.motor_inertia_kgm2)
         earlier = {key: await axis.drive.raw(key) for key in raw}
         # Noted for the next server: killed here, this one would leave what nobody has verified.
@@ -80,14 +80,15 @@ async def first_kept(
                 await take_back(axis, before)
                 if await ends_all(axis, error):
                     raise
-                tried.append(f"{candidate.gains.speed_bandwidth_hz:.0f} Hz: {error.message}")
+                tried.append(of_candidate(candidate, error.text))
                 continue
             except BaseException:
                 await take_back(axis, before)
                 raise
             if verified.kept:
                 return Applied(candidate, verified, before, written)
-            tried.append(verified.why)
+            if verified.why is not None:
+                tried.append(verified.why)
             await take_back(axis, before)
         if softer is not None and verified.hum_percent is not None and softened < _SOFTENED:
             softened += 1
@@ -108,9 +109,9 @@ def _in_turn(waiting: Sequence[Candidate], hummed: Candidate, less: Candidate) -
 def stages(progress: Progress) -> tuple[Progress, Progress, Progress]:
     """The three parts of a verification, as parts of the whole."""
     return (
-        part(progress, 0.7, 0.72, text("autotune.verifying-standstill")),
-        part(progress, 0.72, 0.92, text("autotune.measuring-tuned-loop")),
-        part(progress, 0.92, 0.99, text("autotune.step")),
+        part(progress, 0.7, 0.72, text("autotune.verifying-standstill", step=6, steps=6)),
+        part(progress, 0.72, 0.92, text("autotune.measuring-tuned-loop", step=6, steps=6)),
+        part(progress, 0.92, 0.99, text("autotune.step", step=6, steps=6)),
     )
 
 

@@ -20,6 +20,7 @@ from backend.tools.notch import effect as notch_effect
 from backend.tools.notch import filters as notch_tool
 from backend.tools.notch.meaning import meaning_of
 from backend.tools.sweep.evaluation import SweepResult
+from drivers.texts.message import Text, text
 
 #: A loop can be verified up to this share of the sample rate, so none is designed above it.
 _VERIFIABLE = 0.2
@@ -29,20 +30,20 @@ _SEEN, _NARROWINGS = 0.23, 4
 _COHERENT = 0.8
 
 
-_UNMET: dict[LoadClass, str] = {
-    "stiff": "no design meets the goals for a stiff load",
-    "medium": "no design meets the goals for a medium load",
-    "compliant": "no design meets the goals for a compliant load",
+_UNMET: dict[LoadClass, Text] = {
+    "stiff": text("autotune.no-design-stiff"),
+    "medium": text("autotune.no-design-medium"),
+    "compliant": text("autotune.no-design-compliant"),
 }
 
 
 @dataclass(frozen=True)
 class Design:
-    """All candidates, fastest first; ``caution`` says why they are careful, empty where not."""
+    """All candidates, fastest first; ``caution`` says why they are careful, None where not."""
 
     load: LoadClass
     candidates: tuple[Candidate, ...]
-    caution: str = ""
+    caution: Text | None = None
 
 
 def load_class(mechanics: SweepResult) -> LoadClass:
@@ -108,7 +109,7 @@ def design_for(
 
     Empty where not even those keep their goals.
     """
-    caution = "no mechanical model explains the frequency response"
+    caution = text("autotune.no-mechanical-model")
     if mechanics.model is not None:
         load = load or load_class(mechanics)
         plant = plant_of(mechanics, inertia_kgm2, facts, cautious=False)
@@ -132,7 +133,7 @@ def plant_of(
 
 def cautious_design(
     drive: Drive, facts: AxisFacts, mechanics: SweepResult, inertia_kgm2: float,
-    sample_rate_hz: float, caution: str,
+    sample_rate_hz: float, caution: Text,
 ) -> Design:  # fmt: skip
     """Gains alone, safe for whatever the axis may be, slower than a design on a model.
 

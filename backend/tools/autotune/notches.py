@@ -24,19 +24,14 @@ from backend.tools.notch.meaning import NotchMeaning, meaning_of, remember
 from backend.tools.sweep import evaluation as sweep_evaluation
 from backend.work.jobs import Progress
 from drivers.errors import NotAllowed
+from drivers.texts.message import Text, text
 
 #: A resonance that rises by less bounds no gain.
 _RISES_DB = 6.0
 #: Without a loop learning takes this share of the time: no trial for its size, one period less.
 _FREE = 0.7
-_NO_TIME = (
-    "designed without notches: what they do was not measured, as the time for one tuning was used "
-    "up; tune again, where it was lost samples that took it with a better link"
-)
-_PARTLY = (
-    "what the drive's notches do was measured with fewer of their values, as the time for one "
-    "tuning was used up; the next tuning measures it again"
-)
+_NO_TIME = text("autotune.without-notches-time")
+_PARTLY = text("autotune.notch-values-left-out")
 
 
 @dataclass(frozen=True)
@@ -52,19 +47,19 @@ async def learn_notches(
     axis: Axis, session: CyclicSession, how: Learning, facts: AxisFacts,
     outcome: inertia_evaluation.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
     progress: Progress, time_left: TimeLeft | None = None,
-) -> str:  # fmt: skip
+) -> Text | None:  # fmt: skip
     """Measure what no manual prints, where it is worth it: beside the loop where one is needed.
 
     A load that pulls needs one, and an axis whose mechanics were measured beside one.
 
-    Returns why the design goes without notches; empty where it does not.
+    Returns why the design goes without notches; None where it does not.
     """
     if _known(axis):
-        return ""
+        return None
     if not any(r.kind == "resonance" for r in mechanics.resonances):
         return out_of_sight(mechanics)
     if mechanics.model is None:
-        return ""
+        return None
     found = outcome.result
     clock = time_left or TimeLeft()
     # Where friction rules, a torque that is off by little makes a speed that is off by much.
@@ -76,7 +71,7 @@ async def learn_notches(
         if meaning_of(axis.drive) is None:
             return _NO_TIME
         clock.give_up(_PARTLY)
-        return ""
+        return None
     home = await axis.position_raw()
     try:
         if beside:
@@ -94,11 +89,11 @@ async def learn_notches(
         # It was stopped somewhere; travel counts from where the tuning began.
         await quiet(axis)
         await go_back(axis, session, home, how.envelope, facts)
-        return f"designed without notches: {error.message}"
+        return text("autotune.without-notches", cause=error.text)
     remember(axis.drive, meaning)
     if meaning.left_out:
         clock.give_up(_PARTLY)
-    return ""
+    return None
 
 
 def learning_s(
@@ -123,20 +118,16 @@ def _held(how: Learning, facts: AxisFacts, outcome: inertia_evaluation.InertiaOu
     return pulled or how.loop not in ("auto", "none")
 
 
-def out_of_sight(mechanics: sweep_evaluation.SweepResult) -> str:
-    """That a resonance above the measured lines bounds the gain, in words; else empty."""
+def out_of_sight(mechanics: sweep_evaluation.SweepResult) -> Text | None:
+    """That a resonance above the measured lines bounds the gain; else None."""
     model, frf = mechanics.model, mechanics.frf
     highest_hz = float(np.max(frf.frequency_hz[frf.in_band], initial=0.0))
     above = [m for m in model.modes if m.frequency_hz > highest_hz] if model is not None else []
     rising = [m for m in above if model is not None and model.height_db(m) > _RISES_DB]
     if not rising:
-        return ""
+        return None
     near_hz = min(mode.frequency_hz for mode in rising)
-    return (
-        f"designed without notches: a resonance near {near_hz:.0f} Hz bounds the gain, and what "
-        "this drive's notches do can be measured only where one shows, which with this cycle "
-        f"time is up to {highest_hz:.0f} Hz: a shorter cycle allows more"
-    )
+    return text("autotune.resonance-out-of-sight", near_hz=near_hz, highest_hz=highest_hz)
 
 
 async def _learn_free(

@@ -33,14 +33,11 @@ from backend.tools.notch.effect import unknown
 from backend.tools.notch.meaning import meaning_of
 from backend.work.jobs import Progress
 from drivers.errors import DriveError, NotAllowed
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 
 _TURN = 2.0 * np.pi
 #: Said where nothing was changed.
-KEPT = (
-    "kept as it was: its speed gain is higher than that of every design that is left, and the "
-    "verification kept the promise"
-)
+KEPT = text("autotune.kept-as-it-was")
 #: A design whose speed gain is this much below what the axis has is slower.
 _SLOWER = 0.9
 
@@ -60,17 +57,17 @@ class Present:
             return False
         return self.speed_nms is not None and design.gains.speed_nms < _SLOWER * self.speed_nms
 
-    def told(self, design: Candidate, tried: bool) -> str:
+    def told(self, design: Candidate, tried: bool) -> Text | None:
         """That a design is slower than what the axis had, and why it is taken all the same."""
         if not self.slower(design) or not self.speed_nms:
-            return ""
+            return None
         share = design.gains.speed_nms / self.speed_nms
-        why = "the meaning of its notches or filters is not known"
+        why = text("autotune.notches-without-meaning")
         if self.candidate is not None:
-            why = "it keeps too little margin for what the axis may be"
+            why = text("autotune.too-little-margin")
         if tried:
-            why = "it did not keep the promise when it was verified"
-        return f"slower than it was, with {share:.0%} of the speed gain that it had: {why}"
+            why = text("autotune.promise-not-kept")
+        return text("autotune.slower-than-it-was", share=share, why=why)
 
 
 async def present(
@@ -138,7 +135,7 @@ class Trials:
     promised: Goals
     progress: Progress
     keep: Keep | None
-    tried: list[str] = field(default_factory=list)
+    tried: list[Text] = field(default_factory=list)
     had: Present = field(default_factory=lambda: Present(None))
     had_failed: bool = False
     time_left: TimeLeft = field(default_factory=TimeLeft)
@@ -205,7 +202,7 @@ class Trials:
         """Verified like a design; nothing is written."""
         candidate = self.had.candidate
         assert candidate is not None
-        self.progress(0.65, text("autotune.faster-designs-left"))
+        self.progress(0.65, text("autotune.faster-designs-left", step=5, steps=6))
         try:
             with self.time_left.verifying():
                 verified = await verify(
@@ -215,16 +212,16 @@ class Trials:
         except DriveError as error:
             if await ends_all(self.axis, error):
                 raise
-            self.tried.append(f"as it was: {error.message}")
+            self.tried.append(text("autotune.as-it-was", why=error.text))
         else:
             if verified.kept:
                 return Applied(candidate, verified, {})
-            self.tried.append(f"as it was: {verified.why}")
+            self.tried.append(text("autotune.as-it-was", why=verified.why))
         self.had_failed = True
         return None
 
-    def note(self, applied: Applied) -> str:
-        """What the result says of the axis as it was; empty where it became faster."""
+    def note(self, applied: Applied) -> Text | None:
+        """What the result says of the axis as it was; None where it became faster."""
         if applied.candidate is self.had.candidate:
             return KEPT
         return self.had.told(applied.candidate, self.had_failed)

@@ -36,6 +36,7 @@ from backend.tools.autotune.verify import Check, Keep, Verified, otherwise, unse
 from backend.tools.inertia import evaluation as inertia_evaluation
 from backend.tools.inertia import run as inertia_tool
 from backend.tools.inertia.probe import holding_torque
+from backend.tools.inertia.result import verdict_of
 from backend.tools.measuring.interrupted import ends_all
 from backend.tools.measuring.recording import cycle_s, quiet
 from backend.tools.measuring.temporary import stopping_hard, temporary
@@ -46,23 +47,18 @@ from backend.tools.sweep import run as sweep_tool
 from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import EnvelopeExceeded, NotAllowed
-from drivers.texts.message import text
+from drivers.texts.answers import sentences
+from drivers.texts.message import Text, joined, text
 
 #: A response with more of its samples at a torque limit is none.
 _SATURATED = 0.25
 #: Said where no margins could be verified.
-_BY_STEP = (
-    "too few lines of the tuned loop stand out of the noise for its margins to be read: it was "
-    "verified by its standstill, its step, and steps with a raised gain"
-)
+_BY_STEP = text("autotune.verified-by-step")
 #: Gains that hardly any axis oscillates with, for measuring one that does with its own.
 #: With the inertia that the drive holds, and with that of the motor alone.
 _SOFT_HZ, _SOFT_ALONE_HZ = 5.0, 20.0
 #: Said where a load that swings was not moved a second time.
-_ONE_MOVE = (
-    "the load swings, and the axis was not moved a second time, gently, as the time for one tuning "
-    "was used up"
-)
+_ONE_MOVE = text("autotune.not-moved-again")
 #: Deviations to either side that hold 95 of 100 cases.
 _CI95 = 1.96
 
@@ -106,8 +102,8 @@ class AutotuneResult:
     verified: Verified | None
     step: step_tool.StepResult | None
     before: dict[str, int]
-    tried: tuple[str, ...]
-    notes: tuple[str, ...]
+    tried: tuple[Text, ...]
+    notes: tuple[Text, ...]
     cautious: bool
     again: Again | None = None
     expected: Figures | None = None
@@ -129,7 +125,7 @@ async def autotune(
         DriveError: as the single tools.
     """
     time_left = TimeLeft.of(settings.budget_s, cycle_s(session))
-    progress(0.0, text("autotune.pre-checks"))
+    progress(0.0, text("autotune.pre-checks", step=1, steps=6))
     facts = await _pre_checks(axis, settings)
     async with stopping_hard(axis, settings.envelope.speed_rpm):
         found = await _tuned(axis, session, settings, facts, progress, keep, time_left)
@@ -154,7 +150,7 @@ async def _tuned(
             axis, session, settings, facts, gains, progress, keep, time_left, home
         )
     facts = sweep_evaluation.completed(facts, found.mechanics)
-    progress(0.6, text("autotune.notches-gains"))
+    progress(0.6, text("autotune.notches-gains", step=4, steps=6))
     found = _with(found, await _design(axis, session, settings, facts, found))
     if not settings.apply:
         return found
@@ -182,7 +178,8 @@ async def _measured(
                 rated_torque_nm=settings.rated_torque_nm,
                 motor_inertia_kgm2=settings.motor_inertia_kgm2,
             ),
-            part(progress, 0.05, 0.3, text("autotune.inertia-and-friction")), keep, moving,
+            part(progress, 0.05, 0.3, text("autotune.inertia-and-friction", step=2, steps=6)),
+            keep, moving,
         )  # fmt: skip
         if moving.left_out:
             time_left.give_up(_ONE_MOVE)
@@ -191,7 +188,8 @@ async def _measured(
         playing = time_left.measuring(learning_s(axis, how, facts, outcome))
         mechanics = await sweep_tool.sweep(
             axis, session, _sweep_settings(settings, outcome),
-            part(progress, 0.3, 0.5, text("autotune.frequency-response")), keep, playing,
+            part(progress, 0.3, 0.5, text("autotune.frequency-response", step=3, steps=6)),
+            keep, playing,
         )  # fmt: skip
         time_left.lossy = playing.lossy
         if playing.left_out:
@@ -200,10 +198,20 @@ async def _measured(
         plain = await learn_notches(
             axis, session, how,
             sweep_evaluation.completed(facts, mechanics), outcome, mechanics,
-            part(progress, 0.5, 0.6, text("autotune.what-notches-do")), time_left,
+            part(progress, 0.5, 0.6, text("autotune.what-notches-do", step=3, steps=6)), time_left,
         )  # fmt: skip
     return AutotuneResult(
-        outcome, mechanics, "medium", (), None, None, None, {}, (), (plain,) if plain else (), False
+        outcome,
+        mechanics,
+        "medium",
+        (),
+        None,
+        None,
+        None,
+        {},
+        (),
+        () if plain is None else (plain,),
+        False,
     )
 
 
@@ -213,8 +221,7 @@ async def _pre_checks(axis: Axis, settings: AutotuneSettings) -> AxisFacts:
     await axis.require_certain_scales()
     if await axis.state() in (State.FAULT, State.FAULT_REACTION):
         causes = "; ".join(await axis.blocked_by())
-        raise NotAllowed(f"{drive.name}: {causes}", drive=drive.name,
-                         remedy="remove the cause and reset the fault")  # fmt: skip
+        raise NotAllowed("autotune.axis-has-fault", drive=drive.name, causes=causes)
     if drive.pending:
         raise NotAllowed(
             "autotune.parameters-wait-take-effect",
@@ -259,7 +266,7 @@ def _require_inertia(axis: Axis, outcome: inertia_evaluation.InertiaOutcome) -> 
         raise NotAllowed(
             "autotune.inertia-cannot-identified",
             drive=axis.drive.name,
-            verdict=outcome.result.verdict,
+            verdict=verdict_of(outcome.result.reasons),
         )
 
 
@@ -298,17 +305,11 @@ async def _design(
         settings.load, 1.0 / cycle_s(session),
     )  # fmt: skip
     if not made.candidates:
+        look = joined([*found.mechanics.warnings, text("autotune.look-at-mechanics")])
         raise NotAllowed(
             "autotune.no-careful-safe-either",
-            drive=drive.name,
-            remedy="; ".join(
-                [*found.mechanics.warnings, "look at the mechanics first: coupling, belt, play"]
-            ),
-            caution=made.caution,
-            detail="; ".join(
-                [*found.mechanics.warnings, "look at the mechanics first: coupling, belt, play"]
-            ),
-        )
+            drive=drive.name, remedy=look, caution=made.caution, detail=look,
+        )  # fmt: skip
     return made
 
 
@@ -345,7 +346,7 @@ async def apply_and_verify(
     if applied is None and not found.cautious and clock.verifications() >= 1:
         made = await asyncio.to_thread(
             cautious_design, axis.drive, facts, found.mechanics, inertia,
-            1.0 / cycle_s(session), "no design on the model keeps its promise",
+            1.0 / cycle_s(session), text("autotune.no-design-on-model"),
         )  # fmt: skip
         found = _with(found, made)
         how = designing("robust")
@@ -355,16 +356,16 @@ async def apply_and_verify(
         raise NotAllowed(
             "autotune.no-candidate-kept-promise",
             drive=axis.drive.name,
-            detail="; ".join(each for each in (*trials.tried, clock.told()) if each),
+            detail=joined([each for each in (*trials.tried, clock.told()) if each is not None]),
         )
     verified = applied.verified
-    twice = again.told(verified) if again else ""
+    twice = again.told(verified) if again else None
     said = (
-        "" if verified.sweep.margins else _BY_STEP, trials.note(applied), clock.told(), twice,
-        "" if again and not again.verified_anew else otherwise(verified),
+        None if verified.sweep.margins else _BY_STEP, trials.note(applied), clock.told(), twice,
+        None if again and not again.verified_anew else otherwise(verified),
         unseen(applied.candidate.nominal.crossover_hz, verified),
     )  # fmt: skip
-    if twice:
+    if twice is not None:
         # With the measurement, for whoever reads it without the tuning.
         warnings = (*verified.sweep.warnings, twice)
         verified = replace(verified, sweep=replace(verified.sweep, warnings=warnings))
@@ -372,7 +373,7 @@ async def apply_and_verify(
     return replace(
         found, applied=applied.candidate, verified=verified, step=verified.step,
         before=applied.before, tried=tuple(trials.tried), again=again,
-        notes=(*found.notes, *(each for each in said if each)),
+        notes=(*found.notes, *(each for each in said if each is not None)),
         expected=expected(trials, applied, plant), written=applied.written,
     )  # fmt: skip
 
@@ -380,10 +381,14 @@ async def apply_and_verify(
 def _with(found: AutotuneResult, made: Design) -> AutotuneResult:
     """With the candidates of a design, and the reason why they are careful."""
     notes = found.notes
-    if made.caution:
-        notes += (f"tuned with caution, without notches and slower: {made.caution}",)
+    if made.caution is not None:
+        notes += (text("autotune.tuned-with-caution", caution=made.caution),)
     return replace(
-        found, load=made.load, candidates=made.candidates, cautious=bool(made.caution), notes=notes
+        found,
+        load=made.load,
+        candidates=made.candidates,
+        cautious=made.caution is not None,
+        notes=notes,
     )
 
 
@@ -418,7 +423,7 @@ def as_json(result: AutotuneResult) -> dict[str, object]:
         "again": again_json(result.again) if result.again else None,
         "step": step_tool.as_json(result.step) if result.step else None,
         "before": result.before,
-        "tried": list(result.tried),
-        "notes": list(result.notes),
+        **sentences("tried", result.tried),
+        **sentences("notes", result.notes, "note"),
         "cautious": result.cautious,
     }

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from backend.analysis.response.sampling import DIRECT_SHARE
 from backend.tools.measuring.repeats import Repeats
+from drivers.texts.message import Text, text
 
 #: Writing a design, standing still and a step, beside the measurement of the loop.
 _AROUND_S = 4.0
@@ -23,10 +24,7 @@ _LOST_S = 6.0
 #: A frequency response, as far as it must be.
 _SWEEP_S = 16.0
 #: Said where realisations that lost samples count as they are.
-NOT_AGAIN = (
-    "what lost samples was not all measured again, as the time for one tuning was used up: look at "
-    "the link quality"
-)
+NOT_AGAIN = text("autotune.not-measured-again")
 
 
 @dataclass
@@ -41,8 +39,8 @@ class TimeLeft:
     """Spent on what only time that is left is spent on."""
     lossy: float = 0.0
     """How much of the frequency response was measured again for lost samples, 0 to 1."""
-    given_up: list[str] = field(default_factory=list)
-    """What was not measured as well as it could be, in words."""
+    given_up: list[Text] = field(default_factory=list)
+    """What was not measured as well as it could be."""
     raising_s: float = 0.0
     """What raising the gain in steps takes, where a loop may cross above the measured band."""
 
@@ -96,10 +94,10 @@ class TimeLeft:
         """When designing and verifying must begin at the latest."""
         return self.until_s - _DESIGNED_AND_VERIFIED_S - self.raising_s
 
-    def give_up(self, words: str) -> None:
+    def give_up(self, what: Text) -> None:
         """Note once what was not done for its time."""
-        if words not in self.given_up:
-            self.given_up.append(words)
+        if what not in self.given_up:
+            self.given_up.append(what)
 
     @contextmanager
     def extra(self) -> Iterator[None]:
@@ -122,12 +120,8 @@ class TimeLeft:
             took_s = max(took_s, _AROUND_S)
             self.longest_s = max(self.longest_s, took_s)
 
-    def told(self) -> str:
-        """That designs were left out for their time, in words; else empty."""
+    def told(self) -> Text | None:
+        """That designs were left out for their time; else None."""
         if not self.left_out:
-            return ""
-        designs = "one design was" if self.left_out == 1 else f"{self.left_out} designs were"
-        return (
-            f"{designs} not verified, so none of them was applied: the time for one tuning was "
-            "used up"
-        )
+            return None
+        return text("autotune.designs-not-verified", count=self.left_out)

@@ -21,6 +21,7 @@ from backend.tools.autotune import gains as gain_tool
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.notch import filters as notch_tool
 from backend.tools.notch.meaning import meaning_of
+from drivers.texts.message import Text, text
 
 #: What a measured margin is known to; the designs keep more than this in reserve.
 MARGIN_DB, MARGIN_DEG, MS_RATIO = 1.0, 1.0, 1.03
@@ -30,10 +31,20 @@ COHERENT, BLURRED_DEG, LINES = 0.9, 4.0, 12
 _GAP = 1.5
 #: A loop is seen where its lines begin within its bandwidth: its crossover may else be missed.
 WITHIN = 10 ** (-3.0103 / 20.0)
-_UNITS: dict[str, tuple[str, int]] = {
-    "phase_margin": ("°", 0),
-    "gain_margin": (" dB", 1),
-    "peak_sensitivity": ("", 2),
+#: By what is missed and where: the message, and the unit at the end of its facts.
+_MARGINS: dict[tuple[str, str], tuple[str, str]] = {
+    ("phase_margin", "measured"): ("autotune.phase-margin-measured", "_deg"),
+    ("phase_margin", "predicted"): ("autotune.phase-margin-predicted", "_deg"),
+    ("gain_margin", "measured"): ("autotune.gain-margin-measured", "_db"),
+    ("gain_margin", "predicted"): ("autotune.gain-margin-predicted", "_db"),
+    ("peak_sensitivity", "measured"): ("autotune.sensitivity-measured", ""),
+    ("peak_sensitivity", "predicted"): ("autotune.sensitivity-predicted", ""),
+}
+#: The same where the whole loop misses it.
+_STATED = {
+    "phase_margin": ("autotune.phase-margin", "_deg"),
+    "gain_margin": ("autotune.gain-margin", "_db"),
+    "peak_sensitivity": ("autotune.sensitivity", ""),
 }
 
 
@@ -101,57 +112,25 @@ def verdict_of(
     return min(found, key=lambda v: v.stated.phase_margin_deg)
 
 
-def in_words(missed: tuple[Missed, ...]) -> list[str]:
+def in_words(missed: tuple[Missed, ...]) -> list[Text]:
     """What a verdict misses, for people."""
-    words = []
+    said = []
     for each in missed:
         if each.what == "contradiction":
-            words.append(
-                f"stable with {each.value:.1f} dB more gain, with which no loop is that the "
-                "measurements allow: nothing is known above the measured band"
-            )
+            said.append(text("autotune.contradiction", gain_db=each.value))
         elif each.what == "stability":
-            words.append("not stable for everything that the axis may be")
+            said.append(text("autotune.not-stable"))
         elif each.what == "coverage":
-            words.append(
-                f"the last crossover at {each.value:.0f} Hz lies above the {each.limit:.0f} Hz "
-                "that were measured"
-            )
+            said.append(
+                text(
+                    "autotune.crossover-above-measured",
+                    crossover_hz=each.value, measured_hz=each.limit,
+                )
+            )  # fmt: skip
         else:
-            words.append(_figure(each))
-    return words
-
-
-def _figure(each: Missed) -> str:
-    """One margin that is missed, spelled out as the page's list of translations has it."""
-    unit, digits = _UNITS[each.what]
-    have, wanted = f"{each.value:.{digits}f}", f"{each.limit:.{digits}f}"
-    words = {
-        ("phase_margin", "measured"): (
-            f"phase margin {have}° at worst (measured) instead of {wanted}°"
-        ),
-        ("phase_margin", "predicted"): (
-            f"phase margin {have}° at worst (predicted) instead of {wanted}°"
-        ),
-        ("gain_margin", "measured"): (
-            f"gain margin {have} dB at worst (measured) instead of {wanted} dB"
-        ),
-        ("gain_margin", "predicted"): (
-            f"gain margin {have} dB at worst (predicted) instead of {wanted} dB"
-        ),
-        ("peak_sensitivity", "measured"): (
-            f"sensitivity {have} at worst (measured) instead of {wanted}"
-        ),
-        ("peak_sensitivity", "predicted"): (
-            f"sensitivity {have} at worst (predicted) instead of {wanted}"
-        ),
-    }
-    names = {
-        "phase_margin": "phase margin", "gain_margin": "gain margin",
-        "peak_sensitivity": "sensitivity",
-    }  # fmt: skip
-    stated = f"{names[each.what]} {have}{unit} instead of {wanted}{unit}"
-    return words.get((each.what, each.end), stated)
+            code, unit = _MARGINS.get((each.what, each.end)) or _STATED[each.what]
+            said.append(Text(code, {f"have{unit}": each.value, f"wanted{unit}": each.limit}))
+    return said
 
 
 def misses(verdict: LoopVerdict, promised: Goals) -> tuple[Missed, ...]:

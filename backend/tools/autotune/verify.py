@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,7 +41,7 @@ from backend.tools.step import run as step_tool
 from backend.tools.sweep import evaluation as sweep_evaluation
 from backend.tools.sweep import run as sweep_tool
 from backend.work.jobs import Progress
-from drivers.texts.message import prose
+from drivers.texts.message import Text, joined, prose, text
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 
@@ -81,7 +81,7 @@ class Verified:
     predicted_bandwidth_hz: float | None
     measured_bandwidth_hz: float | None
     kept: bool
-    why: str
+    why: Text | None
     hum_percent: float | None = None
     every: Frf | None = None
     """The response of all realisations together, where the loop was measured again."""
@@ -170,29 +170,28 @@ async def verify(
     beyond = _misses(verdict, promised)
     open_above = tuple(each for each in beyond if _by_raised_gain(each))
     missed = missed or in_words(tuple(each for each in beyond if each not in open_above))
-    why = _named(candidate, "; ".join(missed))
+    why = _named(candidate, missed)
     shown: GainSteps | None = None
     step: step_tool.StepResult | None = None
     only_hums = False
-    if not why:
+    if why is None:
         settings_of_step = _step_settings(check, candidate)
         step = await step_tool.step_response(axis, session, settings_of_step, stepping, keep)
         larger = min(step_tool.significant_size(step), _largest_step(check, candidate))
         if step.widened and larger > _WORTH_A_STEP * settings_of_step.size:
             settings_of_step = replace(settings_of_step, size=larger)
             step = await step_tool.step_response(axis, session, settings_of_step, stepping, keep)
-        restless_why = "" if read else restless(step)
-        words = [hum(step), restless_why]
-        why = _named(candidate, "; ".join(word for word in words if word))
-        only_hums = bool(words[0]) and not restless_why
-        if not why and open_above:
+        hums, restless_why = hum(step), None if read else restless(step)
+        why = _named(candidate, [each for each in (hums, restless_why) if each is not None])
+        only_hums = hums is not None and restless_why is None
+        if why is None and open_above:
             wanted_db = _wanted_db(open_above, promised)
             shown = await gain_steps(axis, session, settings_of_step, step, wanted_db, stepping)
             verdict = _verdict(axis, check, candidate, swept, shown.shown_db)
-            why = _named(candidate, "; ".join(_not_shown(verdict, promised, shown, wanted_db)))
+            why = _named(candidate, _not_shown(verdict, promised, shown, wanted_db))
     swept = replace(swept, margins=read)
     return Verified(
-        swept, step, promised, candidate.bandwidth_hz, measured, not why, why,
+        swept, step, promised, candidate.bandwidth_hz, measured, why is None, why,
         hum_percent_of(step) if step is not None and only_hums else None, every, verdict, shown,
     )  # fmt: skip
 
@@ -227,19 +226,20 @@ def _wanted_db(missed: tuple[Missed, ...], promised: Goals) -> float:
 
 def _not_shown(
     verdict: LoopVerdict | None, promised: Goals, shown: GainSteps, wanted_db: float
-) -> list[str]:
-    """What raising the gain leaves open above the measured band, in words; empty where nothing."""
+) -> list[Text]:
+    """What raising the gain leaves open above the measured band; empty where nothing."""
     if verdict is None:
         return []
-    words = in_words(misses(verdict, promised))
+    said = in_words(misses(verdict, promised))
     if shown.shown_db < wanted_db - MARGIN_DB:
         top = 0.0 if verdict.measured is None else verdict.measured.high_hz
-        words.append(
-            f"the loop crosses 0 dB at {verdict.last_crossover_hz:.0f} Hz, above the {top:.0f} Hz "
-            f"that were measured, and was stable with {shown.shown_db:.1f} dB more gain only, "
-            f"instead of {wanted_db:.1f} dB"
-        )
-    return words
+        said.append(
+            text(
+                "autotune.crossover-not-shown", crossover_hz=verdict.last_crossover_hz,
+                measured_hz=top, shown_db=shown.shown_db, wanted_db=wanted_db,
+            )
+        )  # fmt: skip
+    return said
 
 
 def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool | None]:
@@ -270,12 +270,12 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
     }
 
 
-def restless(step: step_tool.StepResult) -> str:
-    """What a step shows of a loop that answers too few lines, such as a slow one; else empty."""
+def restless(step: step_tool.StepResult) -> Text | None:
+    """What a step shows of a loop that answers too few lines, such as a slow one; else None."""
     found = step.step
     if found is not None and found.overshoot_percent <= _OVERSHOOT_PERCENT:
-        return ""
-    return "too few lines of the tuned loop could be measured, and its step overshoots"
+        return None
+    return text("autotune.few-lines")
 
 
 def _joined(
@@ -310,36 +310,34 @@ def _as_predicted(
     return abs(measured_hz / predicted_hz - 1.0) <= within
 
 
-def worse_than(promised: Goals, found: dict[str, float | bool | None]) -> list[str]:
-    """What of a measured loop is worse than promised, in words."""
-    words = []
+def worse_than(promised: Goals, found: dict[str, float | bool | None]) -> list[Text]:
+    """What of a measured loop is worse than promised."""
+    said = []
     ms, pm, gm = found.get("ms"), found.get("phase_margin_deg"), found.get("gain_margin_db")
     if isinstance(ms, float) and ms > promised.ms * MS_RATIO:
-        words.append(f"sensitivity {ms:.2f} instead of {promised.ms:.2f}")
+        said.append(text("autotune.sensitivity", have=ms, wanted=promised.ms))
     if isinstance(pm, float) and pm < promised.phase_margin_deg - MARGIN_DEG:
-        words.append(f"phase margin {pm:.0f}° instead of {promised.phase_margin_deg:.0f}°")
+        wanted = promised.phase_margin_deg
+        said.append(text("autotune.phase-margin", have_deg=pm, wanted_deg=wanted))
     if isinstance(gm, float) and gm < promised.gain_margin_db - MARGIN_DB:
-        words.append(f"gain margin {gm:.1f} dB instead of {promised.gain_margin_db:.1f} dB")
-    return words
+        wanted = promised.gain_margin_db
+        said.append(text("autotune.gain-margin", have_db=gm, wanted_db=wanted))
+    return said
 
 
-def otherwise(verified: Verified) -> str:
-    """That a tuned loop answers otherwise than predicted, though it keeps its margins; else empty.
+def otherwise(verified: Verified) -> Text | None:
+    """That a tuned loop answers otherwise than predicted, though it keeps its margins; else None.
 
     An axis with play does: how much of the time its gap is open depends on how it is driven.
     """
     predicted, measured = verified.predicted_bandwidth_hz, verified.measured_bandwidth_hz
     if _as_predicted(predicted, measured):
-        return ""
-    return (
-        f"the bandwidth was verified at {measured:.0f} Hz instead of the {predicted:.0f} Hz that "
-        "were predicted, with the margins kept: the axis answers otherwise than as it was "
-        "measured, as with play (gear, coupling, key) or a resonance too narrow for the lines"
-    )
+        return None
+    return text("autotune.other-bandwidth", measured_hz=measured, predicted_hz=predicted)
 
 
-def unseen(last_hz: float | None, verified: Verified) -> str:
-    """That the last crossover possible lies above what was verified, in words; else empty.
+def unseen(last_hz: float | None, verified: Verified) -> Text | None:
+    """That the last crossover possible lies above what was verified; else None.
 
     The motor of a soft axis is alone above its resonances, and lighter: its loop may cross 0 dB
     for the last time where the samples of this exchange tell nothing.
@@ -347,34 +345,29 @@ def unseen(last_hz: float | None, verified: Verified) -> str:
     verdict = verified.verdict
     if verdict is not None:
         if verdict.coverage != "gain_steps" or verdict.shown_gain_db is None:
-            return ""
+            return None
         top = 0.0 if verdict.measured is None else verdict.measured.high_hz
-        return (
-            f"the loop may cross 0 dB up to {verdict.last_crossover_hz:.0f} Hz, above the "
-            f"{top:.0f} Hz that this cycle time shows: its margins there are predicted, and "
-            f"bounded by the loop being stable with {verdict.shown_gain_db:.1f} dB more gain; a "
-            "shorter cycle measures them"
-        )
+        return text(
+            "autotune.margins-bounded", crossover_hz=verdict.last_crossover_hz, measured_hz=top,
+            gain_db=verdict.shown_gain_db,
+        )  # fmt: skip
     frf = verified.sweep.frf
     lines = frf.frequency_hz[frf.in_band & (frf.coherence > COHERENT)]
     if not verified.sweep.margins or last_hz is None or last_hz <= np.max(lines, initial=0.0):
-        return ""
-    return (
-        f"the loop crosses 0 dB for the last time at {last_hz:.0f} Hz, above the "
-        f"{np.max(lines):.0f} Hz that were verified with this cycle time: its margins there are "
-        "predicted, and seen by the standstill and the step alone; a shorter cycle shows them"
-    )
+        return None
+    top = float(np.max(lines))
+    return text("autotune.margins-unseen", crossover_hz=last_hz, measured_hz=top)
 
 
-def hum(step: step_tool.StepResult) -> str:
-    """Empty where the torque is quiet before the step, else in words.
+def hum(step: step_tool.StepResult) -> Text | None:
+    """That the torque is not quiet before the step; None where it is.
 
     A sensor's noise comes back as torque, the more the higher the gain and the wider the filters.
     """
     rms = hum_percent_of(step)
     if rms <= HUM_PERCENT:
-        return ""
-    return f"the torque hums with {rms:.1f} % of the rated while it stands"
+        return None
+    return text("autotune.hums", rms_percent=rms)
 
 
 def hum_percent_of(step: step_tool.StepResult) -> float:
@@ -383,8 +376,14 @@ def hum_percent_of(step: step_tool.StepResult) -> float:
     return float(np.std(before))
 
 
-def _named(candidate: Candidate, words: str) -> str:
-    return f"{candidate.gains.speed_bandwidth_hz:.0f} Hz: {words}" if words else ""
+def _named(candidate: Candidate, missed: Sequence[Text]) -> Text | None:
+    return of_candidate(candidate, joined(missed)) if missed else None
+
+
+def of_candidate(candidate: Candidate, why: Text) -> Text:
+    """A reason with the design that it is about."""
+    width = candidate.gains.speed_bandwidth_hz
+    return text("autotune.candidate", bandwidth_hz=width, why=why)
 
 
 def _largest_step(check: Check, candidate: Candidate) -> float:

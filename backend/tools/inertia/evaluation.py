@@ -12,11 +12,12 @@ from backend.analysis.mechanics.inertia import InertiaResult, Interval, estimate
 from backend.analysis.signals.spectrum import power_density
 from backend.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
-from backend.tools.inertia.result import InertiaAnswer, InertiaIntervals
+from backend.tools.inertia.result import InertiaAnswer, InertiaIntervals, RatioReference
 from backend.tools.measuring.recording import Recording
 from backend.tools.sweep.quiet_velocity import quiet_velocity
 from backend.tools.tool import Arrays, Meta
 from drivers.errors import NotAllowed
+from drivers.texts.message import cause_of
 
 Scheme = Literal["free", "limited", "taught"]
 
@@ -53,7 +54,7 @@ class InertiaOutcome:
     torque_known: bool
     ends_rev: tuple[float, float] | None
     motion_s: float
-    ratio_against: str
+    ratio_against: RatioReference | None
     """What the load ratio compares with, in words; empty where there is no ratio."""
 
 
@@ -74,7 +75,7 @@ def evaluate(recording: Recording, settings: InertiaSettings, facts: AxisFacts) 
         raise NotAllowed(
             "inertia.moves-too-short-evaluated",
             limit=f"{settings.envelope.travel_rev:g} rev",
-            cause=str(error),
+            cause=cause_of(error),
         ) from error
     reference = _reference_inertia(facts)
     if found.load_ratio is None and reference and np.isfinite(found.inertia_kgm2.value):
@@ -118,15 +119,15 @@ def _reference_inertia(facts: AxisFacts) -> float | None:
     return facts.motor_inertia_kgm2 or facts.drive_inertia_kgm2
 
 
-def ratio_against(facts: AxisFacts, settings: InertiaSettings) -> str:
-    """What the load ratio compares with, in words; empty where there is no ratio."""
+def ratio_against(facts: AxisFacts, settings: InertiaSettings) -> RatioReference | None:
+    """What the load ratio compares with; None where there is no ratio."""
     if settings.motor_inertia_kgm2:
-        return "the motor inertia given"
+        return "given"
     if facts.motor_inertia_kgm2:
-        return "the motor inertia that the drive tells"
+        return "drive"
     if facts.drive_inertia_kgm2:
-        return "the inertia stored in the drive, which is the motor's until it is changed"
-    return ""
+        return "stored"
+    return None
 
 
 def raw_of(
@@ -185,16 +186,17 @@ def answer_of(outcome: InertiaOutcome) -> InertiaAnswer:
         spread = (r.inertia_kgm2.low / rotor - 1.0, r.inertia_kgm2.high / rotor - 1.0)
     values = {name: _number(part.value) for name, part in parts.items()}
     ends = {name: (_number(part.low), _number(part.high)) for name, part in parts.items()}
-    return InertiaAnswer(
+    answer = InertiaAnswer(
         method=outcome.method, **values, load_ratio=ratio,
-        load_ratio_against=outcome.ratio_against,
+        load_ratio_reference=outcome.ratio_against,
         ci95=InertiaIntervals(**ends, load_ratio=spread),
         place_nm=r.beside.place_nm or None,
         place_periods_rev=tuple(period / (2 * np.pi) for period in r.beside.periods_rad),
-        fan_nm=r.beside.fan_nm or None, r2=r.r2, verdict=r.verdict, identifiable=r.identifiable,
+        fan_nm=r.beside.fan_nm or None, r2=r.r2, reasons=r.reasons, identifiable=r.identifiable,
         unit="SI" if outcome.torque_known else "torque as a share of rated torque",
         ends_rev=outcome.ends_rev, motion_s=outcome.motion_s,
     )  # fmt: skip
+    return answer.in_language("en")
 
 
 def _number(value: float) -> float | None:

@@ -30,6 +30,7 @@ from backend.tools.sweep import profile_speed
 from drivers.cia402 import Mode
 from drivers.errors import EnvelopeExceeded, NotAllowed, OutOfRange, exceeded
 from drivers.halt import HaltCause
+from drivers.texts.message import cause_of
 
 _TURN = 2 * np.pi
 #: A ramp shorter than this excites the machine's resonances more than its inertia.
@@ -146,14 +147,9 @@ async def first_look(
         )  # fmt: skip
         if cramped or 2.0 * peak > 0.8 * envelope.torque_percent / 100.0:
             raise NotAllowed(
-                f"{axis.drive.name} moves only {moved:.3g} of {aim:.3g} rev, with up to {peak:.0%} "
-                "of its rated torque"
-                + (", and no larger move is permitted" if cramped else ""),
+                "inertia.moves-too-little-cramped" if cramped else "inertia.moves-too-little",
                 drive=axis.drive.name, value=round(moved, 4), limit=f"{aim:.3g} rev",
-                remedy=("permit more travel and speed if the machine allows it, or " if cramped
-                        else "")
-                + "look for a closed brake, a blocked axis, a torque limit that is too low or "
-                "a speed loop that is far too soft",
+                moved_rev=moved, aim_rev=aim, peak_share=peak,
             )  # fmt: skip
         speed = 2.0 * speed
     require_right_sign(axis.drive.name, recording)
@@ -333,7 +329,7 @@ def _moves(
         )  # fmt: skip
     except ValueError as error:
         raise OutOfRange(
-            "inertia.envelope-not-allow-moves", axis_drive=axis.drive.name, cause=str(error)
+            "inertia.envelope-not-allow-moves", axis_drive=axis.drive.name, cause=cause_of(error)
         ) from error
     duration_s = trajectory.velocity_rad_s.size / rate
     if duration_s > envelope.time_s:

@@ -117,10 +117,10 @@ async def _follow(axis: Axis, settings: JogSettings, hold: Hold, start: int) -> 
         guard.look(position, velocity, asked_s)
         if state is not State.OPERATION_ENABLED:
             raise NotAllowed(
-                f"{drive.name} left “{State.OPERATION_ENABLED.value}” while jogging: "
-                + ("; ".join(await axis.blocked_by()) or state.value),
+                "jog.left-enabled",
                 drive=drive.name,
-                remedy="see the Alarms page",
+                enabled=State.OPERATION_ENABLED.value,
+                why="; ".join(await axis.blocked_by()) or state.value,
             )
         _inside(axis, settings, units.position(position - start))
         ahead = start + settings.direction * travel

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from backend.analysis.signals.excitation import BaseMotion, Excitation, scaled
 from backend.tools.measuring.waveform import Band, Waveform, grid, periodic, stepped, tones_hz
+from drivers.texts.message import Unsuitable, text
 
 FloatArray = npt.NDArray[np.float64]
 TURN = 2.0 * np.pi
@@ -101,7 +102,7 @@ def torque_mode(
         ValueError: the room does not suffice; the message says what is too small.
     """
     if waveform == "stepped":
-        raise ValueError("a stepped sine lasts too long for an axis that no loop holds")
+        raise Unsuitable(text("measuring.stepped-sine-needs-loop"))
     of = grid(waveform, rate, band)
     slow = TURN * of.slow_hz
 
@@ -123,9 +124,7 @@ def torque_mode(
         min(gladly, _BASE_SHARE * room.speed_rad_s, room.travel_rad / travelled) if base else 0.0
     )
     if base and base_speed < 1.0:
-        raise ValueError(
-            f"a travel of {room.travel_rad / TURN:.3g} rev is too little for the base motion"
-        )
+        raise Unsuitable(text("measuring.travel-too-little", travel_rev=room.travel_rad / TURN))
     # What the base motion cannot cover, the excitation must not ask for.
     if base and base_speed < 2.0 * own_rms * peak_nm:
         peak_nm = base_speed / (2.0 * own_rms)
@@ -136,9 +135,7 @@ def torque_mode(
         base_nm = min(base_nm, 0.6 * room.torque_nm)
         peak_nm = min(peak_nm, room.torque_nm - base_nm)
     if base and base_nm < 4 / np.pi * 1.02 * rigid.coulomb_nm:
-        raise ValueError(
-            f"{room.torque_nm:.3g} Nm are too little to keep the axis moving against friction"
-        )
+        raise Unsuitable(text("measuring.torque-too-little", torque_nm=room.torque_nm))
     motion = BaseMotion(base_nm / peak_nm, of.slow_hz) if base_nm > 0 else None
     shapes = [one(i, motion) for i in range(2 * realisations)]
     # The ramps carry the axis into its steady motion and may ask for more than a period does.
@@ -204,9 +201,7 @@ def _slow_reference(rate: float, period: int, room: Room, position: bool) -> Flo
     slow = TURN * rate / period
     speed = min(20.0, 0.35 * room.speed_rad_s, room.travel_rad * slow / 2.2)
     if speed < 0.5:
-        raise ValueError(
-            f"a travel of {room.travel_rad / TURN:.3g} rev is too little for the base motion"
-        )
+        raise Unsuitable(text("measuring.travel-too-little", travel_rev=room.travel_rad / TURN))
     turn = slow * np.arange(period) / rate
     if position:
         return np.asarray(speed / slow * (1.0 - np.cos(turn)))

@@ -89,8 +89,7 @@ def raise_if_ended(axis: Axis, session: CyclicSession) -> None:
         if halt.cause in _OF_THE_MOTION:
             raise motion_halted(
                 name, halt, words=halt_words(halt, axis.known_units), drive=name,
-                remedy="check load, limits and gains, then widen the envelope only if the machine "
-                "allows it",
+                remedy="measuring.check-then-widen",
             )  # fmt: skip
         raise interrupted_by(axis, halt)
     if not session.running:

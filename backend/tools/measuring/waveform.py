@@ -23,6 +23,7 @@ from backend.analysis.signals.excitation import (
 )
 from backend.analysis.signals.prbs import prbs_period
 from backend.analysis.signals.stepped_sine import stepped_sine
+from drivers.texts.message import Unsuitable, text
 
 Waveform = Literal["multisine", "chirp", "prbs", "stepped"]
 FloatArray = npt.NDArray[np.float64]
@@ -121,9 +122,7 @@ def tones_hz(band: Band) -> FloatArray:
         measure = np.maximum(_CYCLES / tones, _MEASURE_S)
         if float(np.sum(settle + measure + np.maximum(_TONE_RAMP_S, 1.0 / tones))) <= _STEPPED_S:
             return np.asarray(tones)
-    raise ValueError(
-        f"a stepped sine from {band.f_min_hz:g} Hz takes too long; begin at a higher frequency"
-    )
+    raise Unsuitable(text("measuring.stepped-sine-too-long", f_min_hz=band.f_min_hz))
 
 
 def stepped(

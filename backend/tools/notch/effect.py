@@ -47,7 +47,7 @@ from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, exceeded
 from drivers.halt import HaltCause
-from drivers.texts.message import text
+from drivers.texts.message import cause_of, text
 
 _TURN = 2 * np.pi
 #: Where the notch is tried: share of the sample rate, and limits in Hz.
@@ -219,7 +219,7 @@ def _sequence(
             base=not still,
         )
     except ValueError as error:
-        raise NotAllowed("notch.envelope-not-allow-measure", cause=str(error)) from error
+        raise NotAllowed("notch.envelope-not-allow-measure", cause=cause_of(error)) from error
     # Another period tells no more: tried on axes that turn and on such that tremble.
     return _one_period(made[0])
 
@@ -337,14 +337,9 @@ class SamplesLost(NotAllowed):
 
 def samples_lost(axis: Axis, tries: int) -> SamplesLost:
     """That so many tries of one value all lost samples."""
-    words = f"samples were lost in {tries} tries of a notch in a row"
     if tries < ATTEMPTS:
-        words = "there was no time to try its notches again where samples were lost"
-    return SamplesLost(
-        f"{axis.drive.name}: {words}",
-        drive=axis.drive.name,
-        remedy="look at the link quality; the computer or the bus is overloaded",
-    )
+        return SamplesLost("notch.samples-lost-no-time", drive=axis.drive.name)
+    return SamplesLost("notch.samples-lost", drive=axis.drive.name, tries=tries)
 
 
 def _meaning(

@@ -29,6 +29,7 @@ from backend.drive.drive import Drive
 from backend.tools.measuring.temporary import write_settings
 from backend.tools.notch.meaning import NotchMeaning
 from drivers.errors import NotAllowed, OutOfRange
+from drivers.texts.message import Text, Unsuitable, cause_of, text
 from profiles.schema import NotchSlot, NotchSpec, Parameter, Profile
 
 #: Depth shown for families whose manual prints none; the effect has to be measured.
@@ -44,7 +45,7 @@ class SlotState:
     notch: Notch | None
     realised: RealisedNotch | None
     raw: Mapping[str, int]
-    note: str = ""
+    note: Text | None = None
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class Preview:
     asked: Notch | None
     raw: Mapping[str, int]
     realised: RealisedNotch | None
-    note: str = ""
+    note: Text | None = None
 
 
 def spec_of(profile: Profile, drive: str) -> NotchSpec:
@@ -110,7 +111,7 @@ def encode(
     slot = _slot(spec, number, drive)
     raw: dict[str, int] = {}
     made: RealisedNotch | None = None
-    note = ""
+    note: Text | None = None
     if notch is not None:
         try:
             raw, made, note = _encoded(profile, spec, slot, notch, meaning)
@@ -120,7 +121,7 @@ def encode(
                 drive=drive,
                 value=f"{notch.center_hz:g} Hz",
                 number=number + 1,
-                cause=str(error),
+                cause=cause_of(error),
             ) from error
     raw |= _enable(profile, slot, notch is not None, enable_now)
     return Preview(number, notch, raw, made, note)
@@ -154,18 +155,18 @@ def off_raw(profile: Profile, frequency_key: str) -> int:
 
 def _encoded(
     profile: Profile, spec: NotchSpec, slot: NotchSlot, notch: Notch, meaning: NotchMeaning | None
-) -> tuple[dict[str, int], RealisedNotch | None, str]:
+) -> tuple[dict[str, int], RealisedNotch | None, Text | None]:
     keys = profile.by_key
     if spec.encoding == "coefficients":
         if spec.sample_time_s is None:
-            raise ValueError("the loop period of this family is not known")
+            raise Unsuitable(text("notch.loop-period-unknown"))
         stored = encode_coefficients(notch, spec.sample_time_s)
         names = (slot.a1_key, slot.a2_key, slot.b1_key, slot.b2_key)
         values = (stored.a1, stored.a2, stored.b1, stored.b2)
         raw = {k: v for k, v in zip(names, values, strict=True) if k is not None}
-        return raw, realised(stored, spec.sample_time_s), ""
+        return raw, realised(stored, spec.sample_time_s), None
     if slot.frequency_key is None or slot.width_key is None:
-        raise ValueError("the profile does not name its parameters")
+        raise Unsuitable(text("notch.parameters-not-named"))
     frequency, width = keys[slot.frequency_key], keys[slot.width_key]
     if spec.encoding in ("hz_width", "hz_levels"):
         return _by_measure(profile, slot, notch, meaning)
@@ -174,32 +175,29 @@ def _encoded(
         hz, wide, db = encode_hz_width_db(notch, _range(frequency), _range(width), _range(depth))
         shown = decode_hz_width_db(hz, wide, db)
         made = RealisedNotch(shown.center_hz, shown.width_hz, shown.depth_db, 0.0, True)
-        return {slot.frequency_key: hz, slot.width_key: wide, slot.depth_key: db}, made, ""
-    raise ValueError("the profile does not name its parameters")
+        return {slot.frequency_key: hz, slot.width_key: wide, slot.depth_key: db}, made, None
+    raise Unsuitable(text("notch.parameters-not-named"))
 
 
 def _by_measure(
     profile: Profile, slot: NotchSlot, notch: Notch, meaning: NotchMeaning | None
-) -> tuple[dict[str, int], RealisedNotch | None, str]:
+) -> tuple[dict[str, int], RealisedNotch | None, Text | None]:
     """Values that no manual explains, by what was measured of them."""
     keys = profile.by_key
     frequency, width = keys[slot.frequency_key or ""], keys[slot.width_key or ""]
     depth = None if slot.depth_key is None else _range(keys[slot.depth_key])
     if meaning is None and depth is not None:
-        raise ValueError(
-            "no manual prints what its levels mean: let them be measured first, or set levels on "
-            "the Parameters page and measure"
-        )
+        raise Unsuitable(text("notch.levels-not-explained"))
     made = meaning or NotchMeaning(notch.center_hz)
     hz, wide, deep = made.encoded(notch, _range(frequency), _range(width), depth)
     raw = {frequency.key: hz, width.key: wide}
     if slot.depth_key is not None and deep is not None:
         raw[slot.depth_key] = deep
     if meaning is None:
-        return raw, None, "the manual prints no depth: measure the effect"
+        return raw, None, text("notch.no-depth-measure")
     got = meaning.decoded(hz, wide, deep)
     shown = RealisedNotch(got.center_hz, got.width_hz, got.depth_db, 0.0, True)
-    return raw, shown, "as measured on this drive"
+    return raw, shown, text("notch.as-measured")
 
 
 def response(
@@ -212,7 +210,7 @@ def response(
     """
     spec = profile.notch
     if spec is None:
-        raise ValueError("the family documents no notch")
+        raise Unsuitable(text("notch.family-documents-none"))
     if spec.encoding == "coefficients" and spec.sample_time_s is not None:
         stored = encode_coefficients(notch, spec.sample_time_s)
         return coefficients_response(stored, frequency_hz, spec.sample_time_s)
@@ -235,7 +233,7 @@ def _possible(profile: Profile, notch: Notch, meaning: NotchMeaning | None) -> P
     try:
         return encode(profile, profile.drive, 0, notch, None, meaning)
     except OutOfRange as error:
-        raise ValueError(error.message) from error
+        raise Unsuitable(error.text) from error
 
 
 async def read_notches(drive: Drive, meaning: NotchMeaning | None = None) -> tuple[SlotState, ...]:
@@ -263,7 +261,7 @@ async def _read(
     try:
         return _decoded(spec, slot, number, raw, enabled, meaning)
     except ValueError as error:
-        return SlotState(number, enabled, None, None, raw, str(error) if enabled else "")
+        return SlotState(number, enabled, None, None, raw, cause_of(error) if enabled else None)
 
 
 def _decoded(
@@ -283,11 +281,11 @@ def _decoded(
     if meaning is not None:
         notch = meaning.decoded(frequency, width, depth if slot.depth_key is not None else None)
         made = RealisedNotch(notch.center_hz, notch.width_hz, notch.depth_db, 0.0, True)
-        return SlotState(number, enabled, notch, made, raw, "as measured on this drive")
+        return SlotState(number, enabled, notch, made, raw, text("notch.as-measured"))
     if spec.encoding == "hz_width":
         notch = Notch(float(frequency), float(max(width, 1)), UNKNOWN_DEPTH_DB)
-        return SlotState(number, enabled, notch, None, raw, "depth not printed in the manual")
-    return SlotState(number, enabled, None, None, raw, "levels without a printed meaning")
+        return SlotState(number, enabled, notch, None, raw, text("notch.no-depth"))
+    return SlotState(number, enabled, None, None, raw, text("notch.no-meaning"))
 
 
 async def plan_notches(

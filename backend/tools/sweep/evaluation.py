@@ -39,32 +39,19 @@ from backend.tools.measuring import excite
 from backend.tools.measuring.recording import Recording
 from backend.tools.measuring.waveform import Waveform
 from backend.tools.sweep.speed_injection import speed_gain
+from drivers.texts.answers import sentences
+from drivers.texts.message import Text, Unsuitable, text
 
 Records = tuple[tuple[excite.Sequence, Recording], ...]
 Kind = Literal["mechanics", "speed_loop", "position_loop"]
 Loop = Literal["auto", "none", "speed", "position"]
 
-_COMMANDED = (
-    "the drive reports the torque that it commands: what its current loop takes is not known, and "
-    "is charged to the band"
-)
-_SLOW = (
-    "the torque follows its command more slowly than a current loop: a low-pass of the torque is "
-    "set in the drive (torque filter), which limits every loop. What the response owes to its form "
-    "is charged to the band"
-)
+_COMMANDED = text("sweep.torque-is-commanded")
+_SLOW = text("sweep.torque-follows-slowly")
 #: A current loop is not slower than this, nor than this share of what the drive tells.
 _SLOW_HZ, _SLOWER = 450.0, 0.7
-_SLOW_OR_FILTERED = (
-    "beside a closed loop a torque that follows slowly and a 6077h that is filtered look alike: no "
-    "model is made, and nothing is designed from one; measure without a loop, or look for filters "
-    "of the torque and of its reading in the drive"
-)
-_DROPPED = (
-    "the drive reports another torque (6077h) than the one that moves the axis, such as a filtered "
-    "one or a copy of the demand: it was not used, and the path to the axis was found from the "
-    "motion alone"
-)
+_SLOW_OR_FILTERED = text("sweep.slow-or-filtered")
+_DROPPED = text("sweep.torque-not-used")
 #: What is charged to all lines where a speed loop's reference was the excitation, one deviation:
 #: a set-point that is held until it is sampled tells next to nothing of current loop and delay,
 #: which the loop's own torque has to, and that is small on heavy axes.
@@ -111,7 +98,7 @@ class SweepResult:
     """The answer: ``frf`` is the best estimate, ``direct`` the one without any model.
 
     ``unit`` of the magnitude. ``model`` is None for closed loops and where no model fits
-    (``trusted`` False); ``warnings`` are sentences. ``saturated_share`` of the samples had the
+    (``trusted`` False); ``saturated_share`` of the samples had the
     torque at its limit.
     """
 
@@ -127,7 +114,7 @@ class SweepResult:
     delay_s: float
     motion_s: float
     saturated_share: float
-    warnings: tuple[str, ...] = field(default_factory=tuple)
+    warnings: tuple[Text, ...] = field(default_factory=tuple)
     current_bandwidth_hz: float | None = None
     speed_filter_hz: float | None = None
     hold: Hold | None = None
@@ -168,10 +155,7 @@ def evaluate(
     inertia = _known_inertia(settings) if facts.torque_known else None
     taken = _taken(records)
     if (cycles := mean_cycles(taken)) is not None:
-        raise ValueError(
-            f"the drive reports its speed as the mean of {cycles} cycles, from which mechanics "
-            "cannot be told; switch that averaging off, or take another cycle time"
-        )
+        raise Unsuitable(text("sweep.speed-is-mean", cycles=cycles))
     if by_speed:
         found, taken = _by_reference(records, path, integral_hz, inertia, hold_known=known)
     else:
@@ -311,51 +295,33 @@ def _saturated(
     return max(shares, default=0.0)
 
 
-def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tuple[str, ...]:
-    words = []
+def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tuple[Text, ...]:
+    said = []
     if found.distortion is not None and found.distortion.play:
-        words.append(
-            f"between the excited lines there is {found.distortion.level:.0%} of their motion, "
-            "which friction does not explain: the axis has play (gear, coupling, key), or it is "
-            "excited too weakly against its friction. Its response depends on how hard it is "
-            "driven: no model is made of it, and above a quarter of the sample rate nothing is "
-            "shown"
-        )
+        said.append(text("sweep.play", share=found.distortion.level))
     elif not found.trusted:
-        words.append(
-            "no mechanical model explains the recording: only the part of the plot below a tenth "
-            "of the sample rate is shown, and nothing is designed from it"
-        )
+        said.append(text("sweep.no-model"))
     rate, (_low, highest) = found.corrected.sample_rate_hz, found.corrected.valid_band_hz
     if found.trusted and highest < MODEL_SHARE * rate * (1.0 - 1e-6):
-        words.append(
-            f"above {highest:.0f} Hz the response is not known well enough: what is folded back "
-            "there hides it. Nothing is concluded from what lies above; a shorter cycle shows it"
-        )
+        said.append(text("sweep.folded-back", highest_hz=highest))
     if found.torque_dropped:
-        words.append(_DROPPED)
+        said.append(_DROPPED)
     if found.by_place is not None:
-        words.append(
-            "the inertia or the torque depends on the place (once per revolution of the motor, "
-            f"about ±{found.by_place.amplitude_kgm2:.2g} kg·m²), as with a crank, a cam or a load "
-            "off its axis: the band holds every place"
+        said.append(
+            text("sweep.by-place", amplitude_kgm2=found.by_place.amplitude_kgm2)
             if facts.torque_known
-            else "the inertia or the torque depends on the place (once per revolution of the "
-            "motor), as with a crank, a cam or a load off its axis: the band holds every place"
+            else text("sweep.by-place-of-unknown-size")
         )
     if saturated > 0.02:
-        words.append(
-            f"the torque was at its limit, or not what was commanded, for {saturated:.0%} of the "
-            "time: lower the excitation or raise the limit"
-        )
+        said.append(text("sweep.torque-at-limit", share=saturated))
     coherent = found.direct.coherence[found.direct.in_band]
     if float(np.median(coherent)) < 0.9:
-        words.append("coherence is low: raise the excitation, or look for backlash and friction")
+        said.append(text("sweep.coherence-low"))
     if found.direct.periods_dropped:
-        words.append(f"{found.direct.periods_dropped} periods had lost samples and were left out")
+        said.append(text("sweep.periods-left-out", periods=found.direct.periods_dropped))
     if not facts.torque_known:
-        words.append("the drive does not tell its rated torque: magnitudes are per rated torque")
-    return tuple(words)
+        said.append(text("sweep.rated-torque-unknown"))
+    return tuple(said)
 
 
 def _injection_margins(found: Identification) -> dict[str, float | bool | None]:
@@ -518,7 +484,7 @@ def as_json(result: SweepResult) -> dict[str, object]:
             "std_deg": _numbers(result.direct.std_deg),
         },
         "model": asdict(result.model) if result.model is not None else None,
-        "warnings": list(result.warnings),
+        **sentences("warnings", result.warnings, "warning"),
     }  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from drivers.ethercat.process.segment import Segment
 from drivers.halt import HaltCause, Halted
 from drivers.motion.playback import AxisLoop
 from drivers.motion.setpoint_plan import Phase
+from drivers.texts.message import text
 
 DISTRUST_S = 0.03
 """Without valid process data for this long no setpoint can be trusted: every axis brakes."""
@@ -235,7 +236,7 @@ class CyclicLoop:
             self.counters.wkc_errors += 1
         self._invalid_run += 1
         if self._invalid_run == self._distrust and self.moving():
-            silent = f"no valid process data for {self._invalid_run} cycles: the axis is braked"
+            silent = text("ethercat.no-valid-process-data", cycles=self._invalid_run)
             self.stop_axes(Halted(HaltCause.LOST, note=silent))
 
     def _decide(self, image: Image, slave: object, *, valid: bool) -> None:

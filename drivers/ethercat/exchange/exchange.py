@@ -28,7 +28,7 @@ from drivers.ethercat.wire.steps import Pause, Steps
 from drivers.halt import HaltCause, Halted
 from drivers.motion.playback import AxisLoop
 from drivers.motion.setpoint_plan import Motion, limits_of
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 
 _NOT_YET, _OP_TRIES, _OP_PAUSE_S = (0x001B, 0x002D), 5, 0.2
 """Process data or SYNC0 stayed away (AL status codes of ETG.1020 table 2)."""
@@ -210,7 +210,7 @@ class Exchange:
         self.operational = False
         self._healing.clear()
 
-    def shut_down(self, why: str) -> None:
+    def shut_down(self, why: Text) -> None:
         """Brake and disable within half a second, then leave OP. Blocks; for the end only."""
         loop = self.loop
         if loop is None:

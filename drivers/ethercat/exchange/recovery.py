@@ -13,6 +13,7 @@ import contextlib
 from collections.abc import Awaitable, Callable
 
 from drivers.errors import DriveError
+from drivers.texts.message import Text
 
 PAUSES_S = (0.3, 1.0, 3.0, 10.0)
 
@@ -55,7 +56,7 @@ class Recovery:
                 await task
 
     async def _run(self) -> None:
-        last = ""
+        last: Text | None = None
         attempt = 0
         while True:
             await asyncio.sleep(PAUSES_S[min(attempt, len(PAUSES_S) - 1)])
@@ -66,8 +67,8 @@ class Recovery:
                 await self._set_up()
             except DriveError as error:
                 self.trouble = error.message
-                if error.message != last:
-                    last = error.message
+                if error.text != last:
+                    last = error.text
                     self._tell(
                         f"the cyclic exchange could not be set up again: {last};"
                         " it is tried again by itself",

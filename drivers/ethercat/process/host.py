@@ -65,7 +65,7 @@ class Host:
         while not self._orphaned:
             self._turn()
         self._ring.host_lives_until(time.monotonic_ns() + 10_000_000_000, "ending")
-        self.operations.shut_down("the server is gone: the axis is braked and disabled")
+        self.operations.shut_down(text("ethercat.server-is-gone"))
 
     def _turn(self) -> None:
         operations = self.operations

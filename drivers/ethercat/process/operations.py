@@ -105,7 +105,7 @@ class Operations:
             self._starved = 0
             self.lanes.step()
 
-    def shut_down(self, why: str) -> None:
+    def shut_down(self, why: Text) -> None:
         """Brake, leave OP, close."""
         if self.roster.is_open:
             self.roster.exchange.shut_down(why)

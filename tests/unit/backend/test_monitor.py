@@ -86,7 +86,7 @@ async def test_a_dead_mailbox_is_told_although_process_data_go_on(
     clock.now_s += watching.ASKED_S
     snapshot = await polled(x)
     assert not snapshot.fresh
-    assert "no answer" in snapshot.problem
+    assert "no answer" in str(snapshot.problem)
     clock.now_s += 0.1
     assert not (await polled(x)).fresh, "until the drive itself has answered"
     servo.mute = False

@@ -22,6 +22,7 @@ from backend.station.connected_drive import Member
 from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import Busy, NotAllowed
+from drivers.texts.message import Text, text
 from profiles.loader import load_profile
 from tests.support.firmware_link import STATION, FirmwareLink
 from tests.support.servo import Servo
@@ -124,10 +125,10 @@ async def test_stop_ends_every_grant_but_lets_borrowed_values_go_back(
 
 async def test_a_motion_whose_time_is_over_is_ended(bench: Bench) -> None:
     authority = bench.authority
-    ended: list[str] = []
+    ended: list[Text] = []
     with authority.granted("x", "X", "move", lasts_s=0.02, ended=ended.append) as grant:
         await asyncio.sleep(0.05)
-        assert ended == ["its time is over"]
+        assert ended == [text("motion.time-is-over")]
         assert authority.grant_of("x") is None
         with pytest.raises(NotGranted, match="its time is over"):
             authority.require(grant, "x", "X", TARGET)
@@ -165,7 +166,7 @@ async def test_only_a_live_grant_permits_an_axis_left_enabled_to_turn(
     assert not bench._may_turn("x")
     await x.axis.transition(State.OPERATION_ENABLED, Mode.PV)
     assert bench._may_turn("x")
-    bench.authority.revoke("x", "its time is over")
+    bench.authority.revoke("x", text("motion.time-is-over"))
     assert x.axis.left_enabled
     assert not bench._may_turn("x")
 

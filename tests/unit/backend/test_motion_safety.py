@@ -121,7 +121,7 @@ async def test_stop_that_did_not_reach_the_drive_is_sent_when_it_answers(
 ) -> None:
     servo.enable()
     servo.mute = True
-    assert "no answer" in (await bench.motion.stop(["x"]))["x"]
+    assert "no answer" in str((await bench.motion.stop(["x"]))["x"])
     await x.monitor.refresh()
     assert servo.words() == []
     servo.mute = False

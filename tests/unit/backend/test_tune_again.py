@@ -38,24 +38,24 @@ PLANT = MeasuredPlant(
 
 def test_what_is_off_by_more_than_the_aims_is_named() -> None:
     (width, phase) = contradictions(FIRST, SECOND)
-    assert width == "-3 dB point at 118 Hz where 137 Hz was predicted"
-    assert phase == "phase margin of 61° where 52° was predicted"
+    assert width.words() == "-3 dB point at 118 Hz where 137 Hz was predicted"
+    assert phase.words() == "phase margin of 61° where 52° was predicted"
     assert not contradictions(FIRST, Figures(128.0, 57.0, 13.5))
     # What the lines do not show contradicts nothing.
     assert not contradictions(FIRST, Figures(None, None, None))
     (gain,) = contradictions(FIRST, Figures(137.0, 52.0, 7.5))
-    assert gain == "gain margin of 7.5 dB where 11.0 dB was predicted"
+    assert gain.words() == "gain margin of 7.5 dB where 11.0 dB was predicted"
 
 
 def test_words_say_what_was_predicted_first_and_what_was_verified_then() -> None:
     verified: Any = SimpleNamespace(predicted_bandwidth_hz=119.0, measured_bandwidth_hz=117.0)
-    text = Again(FIRST, SECOND, "same", gain_ratio=1.0).told(verified)
+    text = Again(FIRST, SECOND, "same", gain_ratio=1.0).told(verified).words()
     assert "118 Hz where 137 Hz was predicted" in text
     assert "other realisations at 117 Hz, predicted from the loop at 119 Hz" in text
-    text = Again(FIRST, SECOND, "other", gain_ratio=0.87).told(verified)
+    text = Again(FIRST, SECOND, "other", gain_ratio=0.87).told(verified).words()
     assert "with 87% of the speed gain" in text
     for outcome in ("time", "unclear", "none", "not kept"):
-        text = Again(FIRST, SECOND, outcome).told(verified)
+        text = Again(FIRST, SECOND, outcome).told(verified).words()
         assert "118 Hz where 137 Hz was predicted" in text
         assert "realisations" not in text
 

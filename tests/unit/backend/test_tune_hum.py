@@ -17,8 +17,10 @@ from backend.analysis.loop.margins import Margins
 from backend.tools.autotune import apply as tune_apply
 from backend.tools.autotune.time_budget import TimeLeft
 from backend.work.jobs import Progress
+from drivers.texts.message import Text, text
 
 GOALS = Goals(9.0, 48.0, 1.8)
+HUMS = text("autotune.hums", rms_percent=5.0)
 #: More gain than this makes the torque hum with more than 4 % of the rated.
 QUIET_NMS = 6.0
 
@@ -48,7 +50,7 @@ async def kept_of(
         meanwhile()
         kept = gain <= QUIET_NMS
         hum = None if kept else 4.0 * gain / QUIET_NMS
-        return SimpleNamespace(kept=kept, why="" if kept else "hums", hum_percent=hum)
+        return SimpleNamespace(kept=kept, why=None if kept else HUMS, hum_percent=hum)
 
     async def softer(candidate: Candidate, share: float) -> Candidate | None:
         gains = replace(candidate.gains, speed_nms=share * candidate.gains.speed_nms)
@@ -66,12 +68,12 @@ async def kept_of(
     monkeypatch.setattr(tune_apply, "verify", verify)
     axis: Any = SimpleNamespace(drive=SimpleNamespace(name="X", owed=SimpleNamespace(lent=lent)))
     check: Any = SimpleNamespace(inertia_kgm2=1e-4, motor_inertia_kgm2=None)
-    tried: list[str] = []
+    tried: list[Text] = []
     session: Any = None
     applied = await tune_apply.first_kept(
         axis, session, check, rows, GOALS, tried, Progress(lambda: None), None, softer, time_left
     )
-    assert tried == ["hums"] * (len(seen) - (applied is not None))
+    assert tried == [HUMS] * (len(seen) - (applied is not None))
     return seen, None if applied is None else applied.candidate.gains.speed_nms
 
 

@@ -17,6 +17,7 @@ from backend.tools.autotune.time_budget import TimeLeft
 from backend.tools.notch.meaning import NotchMeaning
 from backend.tools.sweep.evaluation import SweepResult
 from backend.work.jobs import Progress
+from drivers.texts.message import Text
 
 
 def measured(*modes: tuple[float, float, float]) -> SweepResult:
@@ -31,7 +32,7 @@ def measured(*modes: tuple[float, float, float]) -> SweepResult:
 
 
 def test_a_resonance_above_the_lines_is_named_with_what_helps() -> None:
-    words = out_of_sight(measured((590.0, 0.02, 9.0)))
+    words = str(out_of_sight(measured((590.0, 0.02, 9.0))))
     assert "near 590 Hz" in words
     assert "up to 400 Hz" in words
     assert "a shorter cycle" in words
@@ -41,8 +42,8 @@ def test_a_resonance_above_the_lines_is_named_with_what_helps() -> None:
 def test_what_shows_and_what_hardly_rises_bounds_nothing_unseen(
     modes: tuple[tuple[float, float, float], ...],
 ) -> None:
-    assert out_of_sight(measured(*modes)) == ""
-    assert out_of_sight(replace(measured(*modes), model=None)) == ""
+    assert out_of_sight(measured(*modes)) is None
+    assert out_of_sight(replace(measured(*modes), model=None)) is None
 
 
 @pytest.mark.parametrize(
@@ -76,14 +77,14 @@ async def test_notches_are_tried_beside_a_loop_where_the_mechanics_were(
     monkeypatch.setattr("backend.tools.notch.effect.unknown", lambda _drive: True)
     monkeypatch.setattr("backend.tools.notch.trials.least_s", lambda _drive: 11.6)
 
-    assert await said_of(loop, scheme, gravity_nm) == ""
+    assert await said_of(loop, scheme, gravity_nm) is None
     assert ways == [beside]
 
 
 async def said_of(
     loop: str = "none", scheme: str = "free", gravity_nm: float = 0.0,
     time_left: TimeLeft | None = None,
-) -> str:  # fmt: skip
+) -> Text | None:  # fmt: skip
     """What learning says, of an axis with a resonance."""
 
     async def stands() -> int:
@@ -129,6 +130,6 @@ async def test_notches_are_learned_only_where_a_design_can_be_verified_after_it(
     assert [meaning.centre_hz for meaning in known][-1:] == (
         [130.0] if fits else [120.0] if before else []
     )
-    told = " ".join([said, *left.given_up])
+    told = " ".join(str(each) for each in [said, *left.given_up])
     assert ("designed without notches" in told) is (not fits and before is None)
     assert ("fewer of their values" in told) is (fits or before is not None)

@@ -13,6 +13,7 @@ from backend.tools.autotune import apply as tune_apply
 from backend.tools.autotune import present as tune_present
 from backend.tools.autotune.apply import Applied
 from backend.work.jobs import Progress
+from drivers.texts.message import Text
 from tests.unit.backend.test_tune_hum import GOALS, design
 
 #: Raw values: of the axis as it was, and of the design.
@@ -22,7 +23,7 @@ WAS, NEW = {"2005:03": 700}, {"2005:03": 200}
 async def outcome(
     monkeypatch: pytest.MonkeyPatch, *, measured_hz: float, as_it_was_keeps: bool,
     held: dict[str, int] | None = None, cancelled: bool = False,
-) -> tuple[Applied, dict[str, int], list[str], str]:  # fmt: skip
+) -> tuple[Applied, dict[str, int], list[Text], Text | None]:  # fmt: skip
     """What stays, what the drive holds then, what was tried, and what the result says.
 
     ``cancelled``: while the design is read, before it is taken back.
@@ -84,15 +85,15 @@ async def test_without_margins_the_design_comes_back(monkeypatch: pytest.MonkeyP
     applied, held, tried, note = await outcome(monkeypatch, measured_hz=90.0, as_it_was_keeps=False)
     assert (applied.candidate.gains.speed_nms, applied.before) == (2.0, WAS)
     assert held == NEW
-    assert tried == ["as it was: phase margin"]
-    assert "with 29% of the speed gain" in note
-    assert "did not keep the promise" in note
+    assert [each.words() for each in tried] == ["as it was: phase margin"]
+    assert "with 29% of the speed gain" in str(note)
+    assert "did not keep the promise" in str(note)
 
 
 async def test_a_prediction_that_was_right_is_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     applied, held, _tried, note = await outcome(monkeypatch, measured_hz=61.0, as_it_was_keeps=True)
     assert (applied.candidate.gains.speed_nms, held) == (2.0, NEW)
-    assert "too little margin" in note
+    assert "too little margin" in str(note)
 
 
 async def test_cancelled_between_two_verifications_nothing_stays(

@@ -44,9 +44,9 @@ AT = (URL, "--station", "1", "--profile", "mms7", "--server", "http://test")
 FOUND = InertiaOutcome(
     InertiaResult(
         Interval(1.5e-4, 1.4e-4, 1.6e-4), Interval(2e-4, 1e-4, 3e-4), Interval(0.03, 0.02, 0.04),
-        Interval(0.0, -0.01, 0.01), 2.0, 0.9999, True, "ok",
+        Interval(0.0, -0.01, 0.01), 2.0, 0.9999, True, (),
     ),
-    "host, free", True, None, 2.5, "the motor inertia given",
+    "host, free", True, None, 2.5, "given",
 )  # fmt: skip
 
 

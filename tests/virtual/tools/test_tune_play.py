@@ -82,7 +82,7 @@ async def test_what_the_loop_shows_is_predicted_and_verified_by_other_data() -> 
     assert expected.phase_margin_deg is not None
     assert abs(margin - expected.phase_margin_deg) < 6.0
     # It is told, with the result and with the measurement.
-    (note,) = (note for note in result.notes if "the tuned loop answered otherwise" in note)
+    (note,) = (note for note in result.notes if note.code == "autotune.answers-otherwise")
     assert note in verified.sweep.warnings
     told: Any = tuned_json(result)
     assert told["again"]["predicted"]["bandwidth_hz"] == again.predicted.bandwidth_hz

@@ -3481,6 +3481,8 @@ export interface components {
              * @description why the reading failed, or empty
              */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /** State */
             state: string;
             /** Status Word */
@@ -3515,8 +3517,13 @@ export interface components {
         AxisStopInfo: {
             /** Drive */
             drive: string;
-            /** Problem */
+            /**
+             * Problem
+             * @description why it was in vain, or empty
+             */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /**
              * Speed
              * @description measured last, magnitude
@@ -6053,9 +6060,15 @@ export interface components {
             load_ratio: number | null;
             /**
              * Load Ratio Against
-             * @description what it compares with; empty without a ratio
+             * @description what it compares with, in words; empty without a ratio
+             * @default
              */
             load_ratio_against: string;
+            /**
+             * Load Ratio Reference
+             * @description what it compares with
+             */
+            load_ratio_reference?: ("given" | "drive" | "stored") | null;
             /**
              * Measurements
              * @description names of the stored raw data
@@ -6079,6 +6092,12 @@ export interface components {
             /** R2 */
             r2: number;
             /**
+             * Reasons
+             * @description why it is not identifiable
+             * @default []
+             */
+            reasons: ("at-limit" | "one-direction" | "too-little-acceleration" | "torque-opposes-acceleration" | "negative-friction" | "does-not-follow" | "backlash" | "below-motor-inertia" | "too-few-samples")[];
+            /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
@@ -6088,7 +6107,11 @@ export interface components {
              * @enum {string}
              */
             unit: "SI" | "torque as a share of rated torque";
-            /** Verdict */
+            /**
+             * Verdict
+             * @description of reasons, in words; ok where there are none
+             * @default ok
+             */
             verdict: string;
             /** Viscous Nms */
             viscous_nms: number | null;
@@ -6340,6 +6363,7 @@ export interface components {
              * @description in English
              */
             title: string;
+            /** @description of text, as code and facts */
             title_message: components["schemas"]["MessageInfo"];
         };
         /**
@@ -6819,6 +6843,8 @@ export interface components {
              * @enum {string}
              */
             level: "info" | "warning" | "error";
+            /** @description of text, as code and facts */
+            message: components["schemas"]["MessageInfo"];
             /** Person */
             person: string;
             /** Text */
@@ -7164,6 +7190,8 @@ export interface components {
              * @default
              */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /** Up */
             up: boolean;
             /** Url */
@@ -7269,8 +7297,13 @@ export interface components {
             /** Enabled */
             enabled: boolean;
             notch: components["schemas"]["NotchShape"] | null;
-            /** Note */
+            /**
+             * Note
+             * @description what is known of it, or empty
+             */
             note: string;
+            /** @description of note */
+            note_message?: components["schemas"]["MessageInfo"] | null;
             /** Raw */
             raw: {
                 [key: string]: number;
@@ -7385,6 +7418,8 @@ export interface components {
              * @description what to do there, for an object that energises
              */
             motion_how: string;
+            /** @description of motion_how */
+            motion_how_message?: components["schemas"]["MessageInfo"] | null;
             /**
              * Motion Page
              * @description page on which an object that energises is used; empty for all others
@@ -9148,6 +9183,8 @@ export interface components {
              * @default
              */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /**
              * Url
              * @description bus URL to start from
@@ -9498,6 +9535,13 @@ export interface components {
                 [key: string]: string;
             };
             /**
+             * Failed Messages
+             * @description of failed, as code and facts
+             */
+            failed_messages?: {
+                [key: string]: components["schemas"]["MessageInfo"];
+            };
+            /**
              * Stopped
              * @description drives whose axis stands by what it measures
              */
@@ -9526,8 +9570,13 @@ export interface components {
             };
             /** Parameter */
             parameter: string | null;
-            /** Problem */
+            /**
+             * Problem
+             * @description why it was in vain, or empty
+             */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
         };
         /**
          * StopTaken

@@ -1,7 +1,6 @@
 import { useRef } from 'react'
 import type { AxisState } from '../api/schema'
-import { useT } from '../i18n'
-import { said } from '../i18n/said'
+import { useSay, useT } from '../i18n'
 import { useAxisState } from '../live/store'
 import { Icon } from '../widgets/Icon'
 import { href, type Page } from './router'
@@ -10,13 +9,14 @@ import { listsFaults } from './states'
 /** What went wrong with an axis while its page is open: no answer, a fault. */
 export function AxisNotes({ drive, page }: { drive: string; page: Page }) {
   const t = useT()
+  const say = useSay()
   const state = useAxisState(drive)
   const told = useFaultAtOpening(state)
   if (!state) return null
   if (!state.fresh) {
     return (
       <p className="note warn" role="status">
-        <strong>{t('state.noAnswer')}</strong> {said(t, state.problem)}
+        <strong>{t('state.noAnswer')}</strong> {say.message(state.problem_message, state.problem)}
       </p>
     )
   }

@@ -1,8 +1,7 @@
 import { useEffect } from 'react'
 import { createPortal } from 'react-dom'
 import type { AxisStopInfo } from '../api/schema'
-import { useT } from '../i18n'
-import { said } from '../i18n/said'
+import { useSay, useT } from '../i18n'
 import { useDrives, useStore } from '../live/store'
 import { Icon } from '../widgets/Icon'
 import { currentReport, dismissReport, stopEverything } from './stop'
@@ -41,6 +40,7 @@ export function StopButton() {
 
 function StopReportNote() {
   const t = useT()
+  const say = useSay()
   const report = useStore('stop', currentReport)
   const drives = useDrives() ?? []
   const good = report?.answer && Object.keys(report.answer.failed).length === 0
@@ -76,7 +76,7 @@ function StopReportNote() {
         <Failed
           key={id}
           name={name(id)}
-          why={why}
+          why={say.message(report.answer?.failed_messages?.[id], why)}
           axis={report.answer?.axes.find((each) => each.drive === id)}
         />
       ))}
@@ -100,14 +100,15 @@ function Failed({
   axis: AxisStopInfo | undefined
 }) {
   const t = useT()
-  const problem = axis?.problem ?? why
+  const say = useSay()
+  const problem = axis ? say.message(axis.problem_message, axis.problem) : why
   const speed = axis?.speed == null ? '' : `${axis.speed.toPrecision(3)} ${axis.speed_unit}`
   const key = axis?.verdict === 'coasting' || axis?.verdict === 'still_moving' ? axis.verdict : null
   return (
     <>
       <p>
         <strong>{key ? t(`stop.${key}`, { name, speed }) : t('stop.failed', { name })}</strong>{' '}
-        {!key && problem && <>{said(t, problem)}. </>}
+        {!key && problem && <>{problem}. </>}
         {t(key === 'coasting' ? 'stop.keepAway' : 'stop.useHardware')}
       </p>
       {axis && axis.steps.length > 0 && (
@@ -121,7 +122,7 @@ function Failed({
               {step.parameter && <> ({step.parameter})</>}
               {!step.done && (
                 <>
-                  : {t('stop.inVain')} {said(t, step.problem)}
+                  : {t('stop.inVain')} {say.message(step.problem_message, step.problem)}
                 </>
               )}
             </li>

@@ -16,7 +16,8 @@ export function StopElsewhere() {
     () =>
       subscribe('log', () => {
         const last = contents.log.at(-1)
-        if (last?.text !== 'STOP' || Date.now() - pressedAt() < OWN_MS) return
+        if (last?.message.code !== 'station.stop-pressed' || Date.now() - pressedAt() < OWN_MS)
+          return
         setBy({ person: last.person })
       }),
     [],

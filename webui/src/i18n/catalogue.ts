@@ -12,10 +12,7 @@ import { parameters } from './texts/parameters'
 import { people } from './texts/people'
 import { preflight } from './texts/preflight'
 import { recordings } from './texts/recordings'
-import { saidTexts } from './texts/said'
 import { imported } from './texts/imported'
-import { saidOfImports } from './texts/said-import'
-import { saidOfTuning } from './texts/said-tuning'
 import { scales } from './texts/scales'
 import { scene } from './texts/scene'
 import { scope } from './texts/scope'
@@ -39,15 +36,12 @@ export const catalogue = {
   ...recordings,
   ...library,
   ...notListed,
-  ...saidTexts,
-  ...saidOfTuning,
   ...scales,
   ...scene,
   ...scope,
   ...segment,
   ...tuning,
   ...imported,
-  ...saidOfImports,
   ...unwatched,
 }
 export type Key = keyof typeof catalogue

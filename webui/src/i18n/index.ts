@@ -2,7 +2,6 @@ import { useSyncExternalStore } from 'react'
 import type { JobInfo, Problem } from '../api/schema'
 import { catalogue, type Key } from './catalogue'
 import { load, words, type Message } from './message'
-import { said } from './said'
 
 export type Language = 'en' | 'zh'
 export type { Key }
@@ -104,7 +103,10 @@ function useTexts(): Language {
 
 /** What the server says by code and facts, in the language of the page. */
 export interface Say {
-  message: (message: Message, otherwise?: string) => string
+  /** The words of a message; `otherwise` where there is none, as in files of older versions. */
+  message: (message: Message | null | undefined, otherwise?: string) => string
+  /** The words of several; of files of older versions, which have no messages, the sentences. */
+  messages: (messages: Message[] | null | undefined, otherwise?: string[]) => string[]
   detail: (problem: Problem) => string
   remedy: (problem: Problem) => string
   title: (job: JobInfo) => string
@@ -118,17 +120,18 @@ export function useSay(): Say {
 }
 
 export function sayIn(to: Language): Say {
-  const t: T = (key, variables) => translate(to, key, variables)
   return {
-    message: (message, otherwise) => words(to, message, otherwise),
+    message: (message, otherwise) => (message ? words(to, message, otherwise) : (otherwise ?? '')),
+    messages: (messages, otherwise) =>
+      messages ? messages.map((each) => words(to, each)) : (otherwise ?? []),
     detail: (problem) =>
       problem.code
         ? words(to, { code: problem.code, params: problem.params ?? {} }, problem.detail)
-        : said(t, problem.detail),
+        : problem.detail,
     remedy: (problem) =>
       problem.advice?.code
         ? words(to, problem.advice, problem.remedy ?? '')
-        : said(t, problem.remedy ?? ''),
+        : (problem.remedy ?? ''),
     title: (job) => words(to, job.title_message, job.title),
     step: (job) => words(to, job.step_message, job.step),
   }

@@ -1,6 +1,5 @@
 import type { AxisState } from '../api/schema'
-import { type T, useSay, useT } from '../i18n'
-import { said } from '../i18n/said'
+import { type Say, type T, useSay, useT } from '../i18n'
 import { useAxisState, useJob, useLink } from '../live/store'
 
 /** What keeps every motion of an axis from being started now, in words; null: nothing. */
@@ -10,17 +9,21 @@ export function useObstacle(drive: string): string | null {
   const { open } = useLink()
   const state = useAxisState(drive)
   const job = useJob(state?.moving_job ?? null)
-  return obstacleOf(t, open, state, job ? say.title(job) : '…')
+  return obstacleOf(t, say, open, state, job ? say.title(job) : '…')
 }
 
 export function obstacleOf(
   t: T,
+  say: Say,
   open: boolean,
   state: AxisState | null,
   title: string,
 ): string | null {
   if (!open) return t('start.noConnection')
-  if (!state?.fresh) return [t('start.noAnswer'), said(t, state?.problem ?? '')].join(' ').trim()
+  if (!state?.fresh) {
+    const why = say.message(state?.problem_message, state?.problem)
+    return [t('start.noAnswer'), why].join(' ').trim()
+  }
   if (state.moving_job !== null) return t('jog.taken', { title })
   return null
 }

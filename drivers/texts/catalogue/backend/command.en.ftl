@@ -1,5 +1,6 @@
 command_bytes = { $file } has { $value } bytes
     .remedy = export a shorter part
+command_cannot-be-known = cannot be known
 command_cannot-name-profile = { QUOTED($value) } cannot be the name of a profile
     .remedy = choose a name such as my_drive
 command_cannot-read = { $file } cannot be read: { $strerror }
@@ -91,6 +92,7 @@ command_set-drive = the set is of a { $profile } drive, { $drive } is a { $profi
     .remedy = choose a set of the same drive family
 command_tuned-not-default-exclude = --only, --tuned and --not-default exclude each other
     .remedy = give one of them
+command_value-between = { $value } ({ $low } to { $high })
 command_values-motion-cut-off = { $drive }: values of a motion that was cut off would be stored: { $values }
     .remedy = restore them first with `servodeck params restore`, or keep them with --keep
 command_virtual-drive-not-go = a virtual drive does not go on { $value } by itself: it would answer on your network

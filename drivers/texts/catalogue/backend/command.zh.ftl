@@ -1,5 +1,6 @@
 command_bytes = { $file } 有 { $value } 字节
     .remedy = 请导出较短的部分
+command_cannot-be-known = 无法得知
 command_cannot-name-profile = { QUOTED($value) } 不能作为配置文件名
     .remedy = 请选择如 my_drive 的名称
 command_cannot-read = 无法读取 { $file }：{ $strerror }
@@ -91,6 +92,7 @@ command_set-drive = 参数集属于 { $profile } 驱动器，而 { $drive } 为 
     .remedy = 请选择同系列驱动器的参数集
 command_tuned-not-default-exclude = --only、--tuned 和 --not-default 互斥
     .remedy = 请只给出其中之一
+command_value-between = { $value }（{ $low } 至 { $high }）
 command_values-motion-cut-off = { $drive }：将保存被中断运动的数值：{ $values }
     .remedy = 请先用 `servodeck params restore` 恢复，或用 --keep 保留
 command_virtual-drive-not-go = 虚拟驱动器不会自行接入 { $value }：否则会在您的网络上应答

@@ -1,5 +1,6 @@
 station_another-servodeck-uses-state = another servodeck uses the state folder { $folder }: two would write over one another's list of drives and move the same axes
     .remedy = end the other one, or choose another folder with --config
+station_answers = { $drive } answers
 station_being-taken-off-bench = { $drive } is being removed from the axis list
     .remedy = wait until it is gone, then add it again if it is still needed
 station_cyclic-exchange-just-being = { $url }: the cyclic exchange is just being changed
@@ -10,10 +11,16 @@ station_drive-station-cannot-list = the drive at station { $station } cannot lis
 station_drive-station-carries-eds = the drive at station { $station } carries its EDS in the maker's own format (1022h = { $packed })
 station_drive-station-not-hold = the drive at station { $station } of { $url } does not hold the settings of { $drive }: { $parameter } { $key } is { $value } there and { $here } here ({ $different_count } of { $shared_count } differ)
     .remedy = check which drive each cable goes to; if it is the same drive, accept the difference
+station_fault = { $kind ->
+        [fault] fault
+       *[other] warning
+    } { $fault_code } { $fault_name }
 station_import-ended-after = the import was ended after { NUM($limit_s, format: "g") } s
     .remedy = use another file of this drive; a plain EDS is the simplest
 station_import-failed-exit-code = the import failed (exit code { $returncode }): { $last }
     .remedy = this is a defect of servodeck; report it with the file
+station_loses-power-unattended = { $drive } loses its power, nobody looks after it: { $why }
+station_may-still-be-enabled = { $drive } may still be enabled: { $cause }
 station_measurement-kind-nothing-evaluate = a measurement of kind { $value } has nothing to evaluate
     .remedy = update servodeck to open it
 station_measurement-not-complete = the measurement is not complete: { $cause }
@@ -32,6 +39,7 @@ station_no-port-must-drive = a { $profile_title } has no { $kind } port: this mu
     .remedy = choose a profile of drives with { $kind }
 station_not-open = { $value } is not open
     .remedy = open the bus on the page Connect
+station_not-read-yet = not read yet
 station_nothing-read-station = { $drive }: nothing can be read at station { $station } of { $url }: { $error }
     .remedy = check cable, station number, baud rate and parity
 station_put-back-motion-left = Put back what a motion left in { $drive_name }
@@ -42,6 +50,8 @@ station_shares-cyclic-exchange-moves = { $drive } shares its cyclic exchange wit
     .remedy = stop { $other_drive } first
 station_station-already-connected = { $url } station { $station } is already connected as { $drive }
     .remedy = use that drive, or remove it first
+station_stop-pressed = STOP
+station_stop-sent-again = { $drive }: the stop that had not reached it was sent again
 station_used = { $url } is used by { $users }
     .remedy = remove these drives first
 station_used-take-drives = { $place } is used by { $users }

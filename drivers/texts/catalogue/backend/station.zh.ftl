@@ -1,5 +1,6 @@
 station_another-servodeck-uses-state = 另一个 servodeck 正在使用状态文件夹 { $folder }：两者会互相覆盖驱动器列表并使相同的轴运动
     .remedy = 请结束另一个，或用 --config 选择其他文件夹
+station_answers = { $drive } 已应答
 station_being-taken-off-bench = { $drive } 正从轴列表移除
     .remedy = 请等待移除完成，如仍需要再添加
 station_cyclic-exchange-just-being = { $url }：正在更改循环交换
@@ -10,10 +11,16 @@ station_drive-station-cannot-list = 站 { $station } 的驱动器不能列出自
 station_drive-station-carries-eds = 站 { $station } 的驱动器以厂家自有格式存储 EDS（1022h = { $packed }）
 station_drive-station-not-hold = { $url } 站 { $station } 的驱动器与 { $drive } 的设置不符：{ $parameter } { $key } 在驱动器中为 { $value }，此处为 { $here }（{ $shared_count } 项中有 { $different_count } 项不同）
     .remedy = 请检查各电缆所接的驱动器；若是同一驱动器，请接受差异
+station_fault = { $kind ->
+        [fault] 故障
+       *[other] 警告
+    } { $fault_code } { $fault_name }
 station_import-ended-after = 导入在 { NUM($limit_s, format: "g") } s 后被终止
     .remedy = 请使用此驱动器的其他文件；普通 EDS 最简单
 station_import-failed-exit-code = 导入失败（退出代码 { $returncode }）：{ $last }
     .remedy = 这是 servodeck 的缺陷；请附上文件报告
+station_loses-power-unattended = { $drive } 已断使能，无人看管：{ $why }
+station_may-still-be-enabled = { $drive } 可能仍处于使能状态：{ $cause }
 station_measurement-kind-nothing-evaluate = { $value } 类测量没有可分析的内容
     .remedy = 请更新 servodeck 后再打开
 station_measurement-not-complete = 测量不完整：{ $cause }
@@ -32,6 +39,7 @@ station_no-port-must-drive = { $profile_title } 没有 { $kind } 端口：这一
     .remedy = 请选择带 { $kind } 的驱动器配置文件
 station_not-open = { $value } 未打开
     .remedy = 请在“连接”页面打开总线
+station_not-read-yet = 尚未读取
 station_nothing-read-station = { $drive }：无法读取 { $url } 的站 { $station }：{ $error }
     .remedy = 请检查电缆、站号、波特率和校验
 station_put-back-motion-left = 恢复运动在 { $drive_name } 中留下的数值
@@ -42,6 +50,8 @@ station_shares-cyclic-exchange-moves = { $drive } 与正在运动的 { $other_dr
     .remedy = 请先停止 { $other_drive }
 station_station-already-connected = { $url } 站 { $station } 已作为 { $drive } 连接
     .remedy = 请使用该驱动器，或先将其移除
+station_stop-pressed = STOP
+station_stop-sent-again = { $drive }：此前未到达的 STOP 已重新发送
 station_used = { $url } 正被 { $users } 使用
     .remedy = 请先移除这些驱动器
 station_used-take-drives = { $place } 正被 { $users } 使用

@@ -1,2 +1,19 @@
+stopping_coasts = { $drive } has no power and coasts{ $speed ->
+        [none] {""}
+       *[other] {" "}at { $speed } { $unit }
+    } after STOP: keep away until it stands
+stopping_ended-unwatched = it was taken off the bench before it was seen to stand
+stopping_mode-not-changed = the drive does not change its mode
+stopping_no-answer = no answer
+stopping_not-on-bench = not on this bench
+stopping_not-reached = STOP did not reach { $drive }: use the machine's emergency stop
+stopping_not-reached-why = STOP did not reach { $drive } ({ $why }): use the machine's emergency stop
 stopping_not-tell-how-moves = { $drive } does not tell how it moves
     .remedy = use the machine's emergency stop
+stopping_option-not-changed = the drive keeps its value
+stopping_still-moves = { $drive } still moves{ $speed ->
+        [none] {""}
+       *[other] {" "}at { $speed } { $unit }
+    } after STOP: use the machine's emergency stop
+stopping_turns-with-power = { $drive } is enabled and turns at { $speed } { $unit } although nobody moves it here: press STOP
+stopping_turns-without-power = { $drive } turns at { $speed } { $unit } without power: by hand, by gravity or by the drive itself

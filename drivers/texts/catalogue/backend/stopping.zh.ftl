@@ -1,2 +1,19 @@
+stopping_coasts = STOP 后 { $drive } 无电且{ $speed ->
+        [none] {""}
+       *[other] 以 { $speed } { $unit }{" "}
+    }惯性滑行：停稳前请勿靠近
+stopping_ended-unwatched = 在确认停稳之前已从台架移除
+stopping_mode-not-changed = 驱动器未切换模式
+stopping_no-answer = 无应答
+stopping_not-on-bench = 不在此台架上
+stopping_not-reached = STOP 未到达 { $drive }：请使用机器的急停
+stopping_not-reached-why = STOP 未到达 { $drive }（{ $why }）：请使用机器的急停
 stopping_not-tell-how-moves = { $drive } 未上报其运动状态
     .remedy = 请使用机器的急停
+stopping_option-not-changed = 驱动器保持原值
+stopping_still-moves = STOP 后 { $drive } 仍{ $speed ->
+        [none] {""}
+       *[other] 以 { $speed } { $unit }{" "}
+    }运动：请使用机器的急停
+stopping_turns-with-power = { $drive } 已使能并以 { $speed } { $unit } 转动，但此处无人操作：请按 STOP
+stopping_turns-without-power = { $drive } 在无电状态下以 { $speed } { $unit } 转动：由人手、重力或驱动器自身引起

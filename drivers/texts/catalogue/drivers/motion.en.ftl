@@ -1,3 +1,4 @@
+motion_account-has-another-role = the account of whoever began it has another role
 motion_beyond-limit = { $quantity ->
     [position] position
     [speed] speed
@@ -10,8 +11,15 @@ motion_beyond-limit-in = { $quantity ->
     [torque] torque
    *[following-error] following error
  } { $value } { $unit } is beyond the limit of { $limit } { $unit }: the axis is braked and disabled
+motion_by-door = { $how } ({ $route })
 motion_commanded = it was halted
 motion_contradiction = 606Ch says { NUM($speed, format: ".6g") }, the position says { NUM($from_position, format: ".6g") } (raw units of 606Ch; { $note }): the axis is braked and disabled
+motion_door-assign = choose what a terminal does on the I/O page, with the axis disabled
+motion_door-force = overrule terminals on the I/O page
+motion_door-move = move the axis on the Motion page, which sets limits and a dead-man
+motion_door-power = enable the axis and choose its mode on the Motion page
+motion_door-procedure = run the procedure “{ $title }”
+motion_door-set = somebody with the right to move sets it, with the axis disabled
 motion_expired = the setpoints were not renewed in time: the axis is braked and disabled
 motion_following = the following error is beyond its limit
 motion_halted = { $where }: { $cause }
@@ -28,6 +36,9 @@ motion_permission-move-ended = { $drive }: { $purpose }: the permission to move 
     .remedy = begin the motion anew when it is safe
 motion_position = the position is beyond its limit
 motion_put-energy-motor-not = { $drive }: { $parameter } { $key } can put energy into the motor, so it is not written as a parameter
+motion_session-is-over = the session of whoever began it is over
 motion_speed = the speed is beyond its limit
+motion_stop-was-pressed = STOP was pressed
+motion_time-is-over = its time is over
 motion_torque = the torque is beyond its limit
 motion_unfit = a setpoint does not fit its object: the axis is braked

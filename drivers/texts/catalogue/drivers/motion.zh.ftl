@@ -1,3 +1,4 @@
+motion_account-has-another-role = 启动者的账户角色已更改
 motion_beyond-limit = { $quantity ->
     [position] 位置
     [speed] 速度
@@ -10,8 +11,15 @@ motion_beyond-limit-in = { $quantity ->
     [torque] 转矩
    *[following-error] 跟随误差
  } { $value } { $unit } 超出限值 { $limit } { $unit }：轴已制动并断使能
+motion_by-door = { $how }（{ $route }）
 motion_commanded = 已停止
 motion_contradiction = 606Ch 为 { NUM($speed, format: ".6g") }，位置推得 { NUM($from_position, format: ".6g") }（606Ch 的原始单位；{ $note }）：轴已制动并断使能
+motion_door-assign = 请在轴断使能时于“I/O”页面选择端子功能
+motion_door-force = 请在“I/O”页面强制端子
+motion_door-move = 请在“运动”页面移动轴，该页面设有限值和使能键
+motion_door-power = 请在“运动”页面使能轴并选择其模式
+motion_door-procedure = 运行过程“{ $title }”
+motion_door-set = 由具有运动权限的人员在轴断使能时设置
 motion_expired = 设定值未及时更新：轴已制动并断使能
 motion_following = 跟随误差超出限值
 motion_halted = { $where }：{ $cause }
@@ -28,6 +36,9 @@ motion_permission-move-ended = { $drive }：{ $purpose }：运动许可已结束
     .remedy = 请在安全时重新开始运动
 motion_position = 位置超出限值
 motion_put-energy-motor-not = { $drive }：{ $parameter } { $key } 可向电机输入能量，因此不作为参数写入
+motion_session-is-over = 启动者的会话已结束
 motion_speed = 速度超出限值
+motion_stop-was-pressed = 已按下 STOP
+motion_time-is-over = 其时间已到
 motion_torque = 转矩超出限值
 motion_unfit = 设定值不适合其对象：轴已制动

@@ -1,3 +1,4 @@
+measuring_check-then-widen = check load, limits and gains, then widen the envelope only if the machine allows it
 measuring_cyclic-exchange-ended-during = { $drive }: the cyclic exchange ended during the measurement
     .remedy = look at the cable and at the drive's supply
 measuring_cyclic-exchange-not-run = { $url }: the cyclic exchange does not run
@@ -16,5 +17,9 @@ measuring_set-points-not-come = { $drive }: the setpoints do not come back from 
     .remedy = look at the link quality; the computer or the bus is overloaded
 measuring_settings-changed-motor-not = { $drive }: settings are changed only while the motor is not enabled
     .remedy = disable the axis first
+measuring_stepped-sine-needs-loop = a stepped sine lasts too long for an axis that no loop holds
+measuring_stepped-sine-too-long = a stepped sine from { NUM($f_min_hz, format: "g") } Hz takes too long; begin at a higher frequency
+measuring_torque-too-little = { NUM($torque_nm, format: ".3g") } Nm are too little to keep the axis moving against friction
+measuring_travel-too-little = a travel of { NUM($travel_rev, format: ".3g") } rev is too little for the base motion
 measuring_values-put-back-axis = { $drive }: values are put back only while the axis stands and is not enabled
     .remedy = stop and disable the axis first

@@ -1,3 +1,4 @@
+measuring_check-then-widen = 请检查负载、限值和增益；仅在机器允许时放宽限值
 measuring_cyclic-exchange-ended-during = { $drive }：测量期间周期通信中断
     .remedy = 请检查电缆和驱动器供电
 measuring_cyclic-exchange-not-run = { $url }：循环交换未运行
@@ -16,5 +17,9 @@ measuring_set-points-not-come = { $drive }：从总线返回的设定值与发�
     .remedy = 请查看链路质量；计算机或总线过载
 measuring_settings-changed-motor-not = { $drive }：只能在电机未使能时更改设置
     .remedy = 请先断开轴的使能
+measuring_stepped-sine-needs-loop = 对于没有闭环保持的轴，步进正弦持续时间过长
+measuring_stepped-sine-too-long = 从 { NUM($f_min_hz, format: "g") } Hz 开始的步进正弦耗时过长；请从更高频率开始
+measuring_torque-too-little = { NUM($torque_nm, format: ".3g") } Nm 不足以克服摩擦使轴保持运动
+measuring_travel-too-little = { NUM($travel_rev, format: ".3g") } rev 的行程不足以进行基础运动
 measuring_values-put-back-axis = { $drive }：只能在轴静止且未使能时恢复数值
     .remedy = 请先停止并断使能

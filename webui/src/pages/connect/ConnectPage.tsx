@@ -1,9 +1,8 @@
 import { Button, TextInput } from '@mantine/core'
 import { useCallback, useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
-import type { Interfaces } from '../../api/schema'
-import { useT } from '../../i18n'
-import { said } from '../../i18n/said'
+import type { Interfaces, MessageInfo } from '../../api/schema'
+import { useSay, useT } from '../../i18n'
 import { useDrives, useLink } from '../../live/store'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
@@ -24,6 +23,7 @@ interface Way {
   kind: 'virtual' | 'serial' | 'network' | 'can'
   usable: boolean
   problem: string
+  problem_message?: MessageInfo | null
 }
 
 function ways(found: Interfaces): Way[] {
@@ -33,11 +33,13 @@ function ways(found: Interfaces): Way[] {
       ...way('serial', port.url, `${port.path} ${port.description}`.trim()),
       usable: port.usable,
       problem: port.problem,
+      problem_message: port.problem_message ?? null,
     })),
     ...found.network.map((card) => ({
       ...way('network', card.url, card.name),
       usable: card.usable,
       problem: card.problem,
+      problem_message: card.problem_message ?? null,
     })),
     ...found.can.map((url) => way('can', url, url)),
   ]
@@ -49,6 +51,7 @@ function way(kind: Way['kind'], url: string, label: string): Way {
 
 export function ConnectPage() {
   const t = useT()
+  const say = useSay()
   const drives = useDrives()
   const link = useLink()
   const [interfaces, setInterfaces] = useState<Interfaces | null>(null)
@@ -90,7 +93,8 @@ export function ConnectPage() {
                     {each.label}
                     <small>
                       {t(`connect.kind.${each.kind}`)}
-                      {!each.usable && ` · ${said(t, each.problem) || t('connect.unusable')}`}
+                      {!each.usable &&
+                        ` · ${say.message(each.problem_message, each.problem) || t('connect.unusable')}`}
                     </small>
                   </span>
                 </button>

@@ -2,13 +2,13 @@ import { Button } from '@mantine/core'
 import { useState } from 'react'
 import type { ParameterRow } from '../../api/schema'
 import { hasRight, useSession } from '../../app/session'
-import { useT } from '../../i18n'
-import { said } from '../../i18n/said'
+import { useSay, useT } from '../../i18n'
 import { MotionSetting } from './MotionSetting'
 
 /** Where an object is set that can move the axis, and so has no field in the table. */
 export function OtherDoor({ drive, row }: { drive: string; row: ParameterRow }) {
   const t = useT()
+  const say = useSay()
   const page = row.motion_page
   return (
     <div className="note warn">
@@ -18,7 +18,7 @@ export function OtherDoor({ drive, row }: { drive: string; row: ParameterRow }) 
           {t(page === 'io' ? 'motion.goIo' : 'motion.goMotion')}
         </a>
       ) : page === 'parameters' ? (
-        <p>{t('motion.procedure', { how: said(t, row.motion_how) })}</p>
+        <p>{t('motion.procedure', { how: say.message(row.motion_how_message, row.motion_how) })}</p>
       ) : (
         row.reachable && <SetIt key={row.key} drive={drive} row={row} />
       )}

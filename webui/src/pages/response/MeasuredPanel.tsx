@@ -1,8 +1,7 @@
 import { SegmentedControl } from '@mantine/core'
 import { useEffect, useMemo, useState } from 'react'
 import type { MeasurementContent, NotchPreviewInfo } from '../../api/schema'
-import { useT } from '../../i18n'
-import { said } from '../../i18n/said'
+import { useSay, useT } from '../../i18n'
 import { Panel } from '../../widgets/Panel'
 import { TRACE_COLORS } from '../scope/channels'
 import { type Curve, filtered, measuredCurve, notchFor } from './bode'
@@ -38,6 +37,7 @@ export function MeasuredPanel({
   dark: boolean
 }) {
   const t = useT()
+  const say = useSay()
   const [range, setRange] = useState<'band' | 'all'>('band')
   const [view, setView] = useState<LoopView>('closed')
   const [cursors, setCursors] = useState<[number, number]>(() => startCursors(sweep))
@@ -77,9 +77,9 @@ export function MeasuredPanel({
         />
       }
     >
-      {sweep.warnings.map((each) => (
+      {say.messages(sweep.warning_messages, sweep.warnings).map((each) => (
         <p key={each} className="note warn">
-          {said(t, each)}
+          {each}
         </p>
       ))}
       {!mechanics && (

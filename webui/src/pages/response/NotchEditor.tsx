@@ -1,8 +1,8 @@
 import { Button, Checkbox, Modal } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
+import type { NotchSlotInfo } from '../../api/schema'
 import { useSay, useT } from '../../i18n'
-import { said } from '../../i18n/said'
 import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
@@ -110,9 +110,7 @@ export function NotchEditor({ drive, notches }: { drive: string; notches: Notche
                   {!made.realised.stable && ` ${t('notch.unstable')}`}
                 </p>
               )}
-              {(made?.note || slot.note) && (
-                <p className="dim">{said(t, made?.note || slot.note)}</p>
-              )}
+              <SlotNote of={made?.note ? made : slot} />
             </li>
           )
         })}
@@ -166,3 +164,10 @@ export function NotchEditor({ drive, notches }: { drive: string; notches: Notche
 }
 
 const same = (a: NotchShape | null, b: NotchShape | null) => JSON.stringify(a) === JSON.stringify(b)
+
+/** What is known of one notch beside its values. */
+function SlotNote({ of }: { of: NotchSlotInfo }) {
+  const say = useSay()
+  const note = say.message(of.note_message, of.note)
+  return note ? <p className="dim">{note}</p> : null
+}

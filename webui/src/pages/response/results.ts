@@ -1,6 +1,6 @@
 /** Results of tuning jobs, as the server's tools write them (backend/tools). */
 
-import type { InertiaAnswer } from '../../api/schema'
+import type { InertiaAnswer, MessageInfo } from '../../api/schema'
 
 export interface Resonance {
   kind: 'resonance' | 'antiresonance'
@@ -32,6 +32,8 @@ export interface Sweep {
   motion_s: number
   saturated_share: number
   warnings: string[]
+  /** Of warnings, as code and facts; files of older versions have the sentences alone. */
+  warning_messages?: MessageInfo[]
   periods_used?: number
   /** Of recordings of other programs only. */
   imported?: ImportedFacts
@@ -179,8 +181,10 @@ export interface Autotune {
   /** Raw values of what was applied; absent in jobs of an older server. */
   after?: Record<string, number>
   tried: string[]
+  tried_messages?: MessageInfo[]
   /** Absent in jobs of an older server. */
   notes?: string[]
+  note_messages?: MessageInfo[]
   measurements?: string[]
 }
 

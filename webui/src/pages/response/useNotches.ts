@@ -54,7 +54,7 @@ export function useNotches(drive: string, frequency: number[]) {
   }
   const edited = now !== null && asked !== JSON.stringify(now.map(inForce))
   /** Levels without a printed meaning cannot be edited as a shape. */
-  const shaped = now !== null && now.some((slot) => !slot.note.startsWith('levels'))
+  const shaped = now !== null && now.some((slot) => slot.note_message?.code !== 'notch.no-meaning')
   return { now, wanted, set, add, read, problem, preview, refused, edited, shaped }
 }
 export type Notches = ReturnType<typeof useNotches>

@@ -49,7 +49,7 @@ export function AutotunePanel({
   const scheme = useScheme()
   const start = useAction()
   const { job, note, dismiss } = useToolJob(drive, 'autotune')
-  const running = job?.state === 'running' ? stepOf(job.step) : null
+  const running = job?.state === 'running' ? stepOf(job.step_message) : null
   const result = asAutotune(job?.result)
   const go = () =>
     start.run(async () => {

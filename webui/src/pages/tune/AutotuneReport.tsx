@@ -1,8 +1,7 @@
 import { Button, useComputedColorScheme } from '@mantine/core'
 import { useMemo, useState } from 'react'
 import { api, ask } from '../../api/client'
-import { known, useT } from '../../i18n'
-import { said } from '../../i18n/said'
+import { known, useSay, useT } from '../../i18n'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { changedSince } from '../response/undo'
@@ -37,6 +36,8 @@ export function AutotuneReport({
   onChanged: () => void
 }) {
   const t = useT()
+  const say = useSay()
+  const notes = say.messages(result.note_messages, result.notes)
   const [pressed, setPressed] = useState(undone.has(job))
   const undo = useAction()
   const applied = result.applied
@@ -75,11 +76,11 @@ export function AutotuneReport({
         </div>
       )}
       <ProblemNote problem={undo.problem} onClose={undo.clear} />
-      {(result.notes?.length ?? 0) > 0 && (
+      {notes.length > 0 && (
         <div className="note warn">
           <ul>
-            {result.notes?.map((each) => (
-              <li key={each}>{said(t, each)}</li>
+            {notes.map((each) => (
+              <li key={each}>{each}</li>
             ))}
           </ul>
         </div>
@@ -88,8 +89,8 @@ export function AutotuneReport({
         <div className="note warn">
           {t('autotune.tried')}
           <ul>
-            {result.tried.map((each) => (
-              <li key={each}>{said(t, each)}</li>
+            {say.messages(result.tried_messages, result.tried).map((each) => (
+              <li key={each}>{each}</li>
             ))}
           </ul>
         </div>

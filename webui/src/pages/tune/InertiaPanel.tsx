@@ -1,8 +1,7 @@
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { AxisState } from '../../api/schema'
-import { useT } from '../../i18n'
-import { said } from '../../i18n/said'
+import { useSay, useT } from '../../i18n'
 import { setJob } from '../../live/store'
 import { JobNote } from '../../widgets/JobNote'
 import { NumberField } from '../../widgets/NumberField'
@@ -141,6 +140,16 @@ const BESIDE = [
 /** What was found, how sure it is, and whether the data support it at all. */
 export function InertiaResult({ result }: { result: Inertia }) {
   const t = useT()
+  const say = useSay()
+  const reasons = say.messages(
+    result.reasons?.map((code) => ({ code: `inertia.${code}` })),
+    result.identifiable ? [] : [result.verdict ?? ''],
+  )
+  const reference = result.load_ratio_reference
+  const against = say.message(
+    reference && { code: `inertia.ratio-to-${reference}` },
+    result.load_ratio_against,
+  )
   const si = result.unit === 'SI'
   const beside = BESIDE.filter(({ name }) => result[name] != null)
   const rows = [...ROWS, ...beside]
@@ -148,7 +157,7 @@ export function InertiaResult({ result }: { result: Inertia }) {
     <>
       <p className={`note ${result.identifiable ? 'good' : 'warn'}`}>
         <strong>{t(result.identifiable ? 'inertia.sure' : 'inertia.unsure')}</strong>{' '}
-        {result.verdict !== 'ok' && said(t, result.verdict)}
+        {reasons.join('\n')}
       </p>
       <div className="scroll-table">
         <table className="told-values" aria-label={t('inertia.title')}>
@@ -178,8 +187,7 @@ export function InertiaResult({ result }: { result: Inertia }) {
       <p className="dim">
         {!si && `${t('inertia.perRated')} `}
         {t('inertia.fit', { r2: fixed(result.r2, 4) })}
-        {result.load_ratio_against &&
-          ` ${t('inertia.against', { what: said(t, result.load_ratio_against) })}`}
+        {against && ` ${t('inertia.against', { what: against })}`}
         {beside.map(({ help }) => ` ${t(help)}`)}
       </p>
     </>

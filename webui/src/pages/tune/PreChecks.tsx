@@ -1,7 +1,6 @@
 import { Button } from '@mantine/core'
 import type { Bus, DriveSummary } from '../../api/schema'
-import { useT } from '../../i18n'
-import { said } from '../../i18n/said'
+import { useSay, useT } from '../../i18n'
 import * as live from '../../live/live'
 import { Icon } from '../../widgets/Icon'
 import { Panel } from '../../widgets/Panel'
@@ -27,6 +26,7 @@ export function PreChecks({
   onChange: () => Promise<void>
 }) {
   const t = useT()
+  const say = useSay()
   return (
     <Panel title={t('tune.checks')}>
       <ul className="checks">
@@ -41,7 +41,9 @@ export function PreChecks({
             </span>
             <span className="grow">
               {t(check.ok ? `tune.ok.${check.name}` : `tune.no.${check.name}`, { ms: cycleMs })}
-              {!check.ok && check.detail && <strong> {said(t, check.detail)}</strong>}
+              {!check.ok && check.detail && (
+                <strong> {say.message(check.message, check.detail)}</strong>
+              )}
             </span>
             {!check.ok && check.name === 'faults' && (
               <a href={`#/axis/${encodeURIComponent(drive.id)}/alarms`}>{t('page.alarms')}</a>

@@ -1,6 +1,5 @@
 import { href } from '../../app/router'
-import { useT } from '../../i18n'
-import { said } from '../../i18n/said'
+import { useSay, useT } from '../../i18n'
 import { useAxisState, useDrive, useLink } from '../../live/store'
 import { useJobEnd } from '../../widgets/JobNote'
 import { Panel } from '../../widgets/Panel'
@@ -30,6 +29,7 @@ import { preChecks, ready } from './steps'
 /** The guided path; every step can also be done alone. */
 export function TunePage({ drive }: { drive: string }) {
   const t = useT()
+  const say = useSay()
   const summary = useDrive(drive)
   const state = useAxisState(drive)
   const { buses, refresh } = useBuses()
@@ -65,7 +65,9 @@ export function TunePage({ drive }: { drive: string }) {
   const obstacle = !open
     ? t('start.noConnection')
     : missing
-      ? [t(`tune.no.${missing.name}`), said(t, missing.detail)].join(' ').trim()
+      ? [t(`tune.no.${missing.name}`), say.message(missing.message, missing.detail)]
+          .join(' ')
+          .trim()
       : !limits.limits
         ? t('start.limits')
         : limits.agreed

@@ -35,8 +35,11 @@ describe('pre-checks', () => {
 
 describe('texts', () => {
   it('tell the step of a job', () => {
-    expect(stepOf('3 of 6: frequency response: measuring')).toEqual({ now: 3, of: 6 })
-    expect(stepOf('starting')).toBeNull()
+    const third = { code: 'autotune.frequency-response', params: { step: 3, steps: 6 } }
+    const within = { code: '+', params: { joint: ': ', part0: third, part1: { code: 'sweep.x' } } }
+    expect(stepOf(third)).toEqual({ now: 3, of: 6 })
+    expect(stepOf(within)).toEqual({ now: 3, of: 6 })
+    expect(stepOf({ code: '', params: { words: '3 of 6: starting' } })).toBeNull()
   })
   it('write powers of ten as such', () => {
     expect(engineering(5.1234e-5)).toBe('5.12·10⁻⁵')

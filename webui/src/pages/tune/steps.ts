@@ -1,4 +1,4 @@
-import type { AxisState, DriveSummary } from '../../api/schema'
+import type { AxisState, DriveSummary, MessageInfo } from '../../api/schema'
 
 /** One thing that must be right before an axis is tuned. */
 export interface Check {
@@ -6,6 +6,7 @@ export interface Check {
   ok: boolean
   /** What is in the way, as the drive or the server says it. */
   detail: string
+  message?: MessageInfo | null
   /** Nothing is in the way of measuring; it is only good to know. */
   optional?: boolean
 }
@@ -18,7 +19,12 @@ export function preChecks(
 ): Check[] {
   const { holder, mine } = drive.lease
   return [
-    { name: 'answers', ok: state?.fresh === true, detail: state?.problem ?? '' },
+    {
+      name: 'answers',
+      ok: state?.fresh === true,
+      detail: state?.problem ?? '',
+      message: state?.problem_message ?? null,
+    },
     { name: 'control', ok: mine || holder === null, detail: mine ? '' : (holder ?? '') },
     {
       name: 'faults',
@@ -42,10 +48,12 @@ export function preChecks(
 /** Whether a measurement may be asked for. */
 export const ready = (checks: Check[]): boolean => checks.every((each) => each.ok || each.optional)
 
-/** Number and count of the steps of a job that names them `2 of 6: …`; null before the first. */
-export function stepOf(step: string): { now: number; of: number } | null {
-  const match = /^(\d+) of (\d+):/.exec(step)
-  return match ? { now: Number(match[1]), of: Number(match[2]) } : null
+/** Number and count of the steps of a job that counts them; null for others, and before the first. */
+export function stepOf(step: MessageInfo): { now: number; of: number } | null {
+  const first = step.params?.part0
+  if (typeof first === 'object' && first) return stepOf(first)
+  const { step: now, steps: of } = step.params ?? {}
+  return typeof now === 'number' && typeof of === 'number' ? { now, of } : null
 }
 
 /** A value with its unit, `1.23·10⁻⁴ kg·m²`; a dash where there is none. */

@@ -1,9 +1,0 @@
-motion_move-axis-permission-hand = { $drive }: { $parameter } can move the axis, and the permission at hand is not for it
-    .remedy = begin the motion anew on the Motion page
-motion_moved-already = { $drive } is moved already: { $purpose }
-    .remedy = wait for it to end, or stop it
-motion_nobody-asked-motion-not = { $drive }: nobody asked for this motion, so it is not begun
-    .remedy = begin it on the Motion page
-motion_permission-move-ended = { $drive }: { $purpose }: the permission to move has ended: { $why }
-    .remedy = begin the motion anew when it is safe
-motion_put-energy-motor-not = { $drive }: { $parameter } { $key } can put energy into the motor, so it is not written as a parameter

@@ -1,9 +1,0 @@
-motion_move-axis-permission-hand = { $drive }：{ $parameter } 可使轴运动，而现有许可不适用
-    .remedy = 请在“运动”页面重新开始运动
-motion_moved-already = { $drive } 已在运动：{ $purpose }
-    .remedy = 请等待其结束，或将其停止
-motion_nobody-asked-motion-not = { $drive }：无人请求此运动，因此不启动
-    .remedy = 请在“运动”页面启动
-motion_permission-move-ended = { $drive }：{ $purpose }：运动许可已结束：{ $why }
-    .remedy = 请在安全时重新开始运动
-motion_put-energy-motor-not = { $drive }：{ $parameter } { $key } 可向电机输入能量，因此不作为参数写入
