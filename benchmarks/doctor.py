@@ -1,6 +1,7 @@
 """How often the doctor's first cause is the injected one: ``python -m benchmarks.doctor``.
 
-Each cause is injected into a virtual slave in a private network, the slave is taken to
+Each cause is injected into a virtual slave in a private network, or a virtual node on a CAN bus
+(`benchmarks.doctor_canopen`), the slave is taken to
 Operational as `servodeck doctor` does it, and the first diagnosis is compared. ``how`` says
 whether the trouble is a real one of the wire or the configuration ("real"), or the slave was
 only made to refuse with the AL status code that the cause has in ETG.1020 ("code").
@@ -11,10 +12,12 @@ from __future__ import annotations
 import argparse
 import asyncio
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from backend.commands.doctor import examined
+from benchmarks.doctor_canopen import CASES as CAN_CASES
+from benchmarks.doctor_canopen import CanCase, causes_of
 from drivers.errors import DriveError
 from drivers.ethercat.link import EthercatLink
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
@@ -149,24 +152,47 @@ async def first_cause(namespace: Namespace, case: Case) -> str:
 
 async def table(namespace: Namespace, cases: tuple[Case, ...] = CASES) -> list[tuple[Case, str]]:
     """All cases with what the doctor says of each first."""
-    found = []
+    found: list[tuple[Case, str]] = []
     for case in cases:
         try:
             told = await first_cause(namespace, case)
         except DriveError as error:
             told = f"({error.kind})"
         found.append((case, told))
-        mark = "right" if told == case.cause else "WRONG"
-        print(f"{mark:6} {case.how:5} {case.name:40} {case.cause:22} {told}", flush=True)
+        _show(case, told)
     return found
+
+
+async def table_of_can(cases: tuple[CanCase, ...] = CAN_CASES) -> list[tuple[CanCase, str]]:
+    """As `table`, of CANopen."""
+    found: list[tuple[CanCase, str]] = []
+    for case in cases:
+        try:
+            causes = await causes_of(case)
+        except (DriveError, TimeoutError) as error:
+            causes = [f"({type(error).__name__})"]
+        found.append((case, causes[0] if causes else ""))
+        _show(*found[-1])
+    return found
+
+
+def _show(case: Case | CanCase, told: str) -> None:
+    mark = "right" if told == case.cause else "WRONG"
+    print(f"{mark:6} {case.how:5} {case.name:40} {case.cause:24} {told}", flush=True)
 
 
 def main() -> int:
     """Print the table; 1 where too few first diagnoses are right."""
     parser = argparse.ArgumentParser(description="the doctor's first cause against injected ones")
     parser.add_argument("--first", type=int, default=1, help="number of the first case")
-    parser.add_argument("--count", type=int, default=len(CASES), help="how many cases")
+    parser.add_argument("--count", type=int, default=1000, help="how many cases")
+    parser.add_argument("--bus", choices=("ethercat", "canopen"), help="only this one")
     options = parser.parse_args()
+    right = [run(options) for bus, run in _BUSES.items() if options.bus in (None, bus)]
+    return max(right)
+
+
+def _ethercat(options: argparse.Namespace) -> int:
     cases = CASES[options.first - 1 :][: options.count]
     reason = unavailable()
     if reason is not None:
@@ -174,12 +200,23 @@ def main() -> int:
         return 2
     with Namespace.create() as namespace:
         found = asyncio.run(table(namespace, cases))
+    return _verdict("EtherCAT", found)
+
+
+def _canopen(options: argparse.Namespace) -> int:
+    cases = CAN_CASES[options.first - 1 :][: options.count]
+    return _verdict("CANopen", asyncio.run(table_of_can(cases)))
+
+
+def _verdict(bus: str, found: Sequence[tuple[Case | CanCase, str]]) -> int:
     right = sum(told == case.cause for case, told in found)
     real = [(case, told) for case, told in found if case.how == "real"]
-    print(f"{right} of {len(found)} first diagnoses are right "
+    print(f"{bus}: {right} of {len(found)} first diagnoses are right "
           f"({sum(t == c.cause for c, t in real)} of {len(real)} real ones)")  # fmt: skip
     return 0 if right >= _NEEDED * len(found) else 1
 
+
+_BUSES = {"ethercat": _ethercat, "canopen": _canopen}
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -12,14 +12,14 @@ from backend.commands.options import Json, Profile, Server, Url, server_for
 from backend.commands.session import opened, run, show_progress
 from backend.station.matching import match_profiles
 from drivers.doctor.diagnosis import Cause
+from drivers.doctor.examined import Examines
 from drivers.errors import DriveError, NotAllowed
-from drivers.ethercat.link import EthercatLink, segment_of
-from drivers.link import Address, CyclicSignal
+from drivers.link import Address, CyclicSignal, Link
 from profiles import load_profile
 
 _INPUTS = ((0x6041, "UINT16"), (0x6064, "INT32"))
 _OUTPUTS = ((0x6040, "UINT16"),)
-_CYCLE_S = 0.001
+_CYCLE_S = {"ethercat": 0.001, "canopen": 0.01}
 
 
 def doctor(
@@ -31,8 +31,8 @@ def doctor(
 ) -> None:
     """Why a drive does not reach Operational. Nothing moves.
 
-    Takes every drive of an EtherCAT bus there, without enabling it. A running server says what it
-    sees as it is. Ends with 1 where a drive is not in Operational.
+    Takes every drive of an EtherCAT or CANopen bus there, without enabling it. A running server
+    says what it sees as it is. Ends with 1 where a drive is not in Operational.
     """
 
     async def work() -> bool:
@@ -40,10 +40,9 @@ def doctor(
             results = await _by_server(at, url, station)
         else:
             async with opened(url) as link:
-                segment = segment_of(link)
-                if segment is None:
-                    raise NotAllowed("command.doctor-knows-ethercat", value=url)
-                results = await _here(segment, station, profile)
+                if not isinstance(link, Examines):
+                    raise NotAllowed("command.doctor-knows-not", value=url)
+                results = await _here(link, station, profile)
         _show(results, as_json=as_json)
         return all(each["reached"] for each in results)
 
@@ -56,46 +55,51 @@ async def _by_server(at: str, url: str, station: int | None) -> list[dict[str, A
 
     query = {"url": url} | ({} if station is None else {"station": str(station)})
     async with remote(at) as asked:
-        answer = await asked.raw("GET", "/ethercat/doctor", query=query)
+        answer = await asked.raw("GET", "/buses/doctor", query=query)
         return list(answer.json())
 
 
-async def _here(
-    link: EthercatLink, station: int | None, profile: str | None
-) -> list[dict[str, Any]]:
-    found = await link.scan(show_progress, None)
+async def _here(link: Link, station: int | None, profile: str | None) -> list[dict[str, Any]]:
+    found = {each.station: each for each in await link.scan(show_progress, None)}
     results = []
-    for each in found:
-        if station not in (None, each.station):
-            continue
-        known = match_profiles(link.kind, each)
+    # A station that was named and not found is examined all the same: that is the question.
+    for number in sorted(found) if station is None else [station]:
+        known = match_profiles(link.kind, found[number]) if number in found else []
         best = known[0].profile if known else None
         chosen = load_profile(profile) if profile else best
         if chosen is not None:
-            link.attach(each.station, chosen)
-        results.append(await examined(link, each.station))
+            link.attach(number, chosen)
+        results.append(await examined(link, number))
     return results
 
 
-async def examined(link: EthercatLink, station: int) -> dict[str, Any]:
-    """Take one station to Operational and back; the causes where it does not get there."""
+async def examined(link: Link, station: int) -> dict[str, Any]:
+    """Take one station to Operational and back; the causes where it does not get there.
+
+    Raises:
+        NotAllowed: the bus has no doctor, or no cyclic exchange.
+    """
+    cyclic = link.cyclic
+    if cyclic is None or not isinstance(link, Examines):
+        raise NotAllowed("command.doctor-knows-not", value=link.url)
     refusal: DriveError | None = None
     inputs = [CyclicSignal(station, Address(i, 0, k), f"{i:04X}") for i, k in _INPUTS]  # type: ignore[arg-type]
     outputs = [CyclicSignal(station, Address(i, 0, k), f"{i:04X}") for i, k in _OUTPUTS]  # type: ignore[arg-type]
-    causes: tuple[Cause, ...] = ()
     try:
-        await link.process_data.configure(inputs, outputs, _CYCLE_S)
-        await link.process_data.start()
+        await cyclic.configure(inputs, outputs, _CYCLE_S[link.kind])
+        await cyclic.start()
     except DriveError as error:
         refusal = error
-        _, causes = await link.diagnose(station, refusal)
-    else:
-        await link.process_data.stop()
+    try:
+        result = await link.examination(station, refusal)
+    finally:
+        if refusal is None:
+            await cyclic.stop()
     return {
         "station": station,
-        "reached": refusal is None,
+        "reached": result.reached,
         "refusal": None if refusal is None else refusal.message,
-        "causes": [shown(cause) for cause in causes],
+        "causes": [shown(cause) for cause in result.causes],
     }
 
 

@@ -301,6 +301,15 @@ class CanopenCyclic:
             figures |= self._loop.statistics()
         return figures
 
+    def forget_arrivals(self) -> None:
+        """See `SyncLoop.forget_arrivals`."""
+        if self._loop is not None:
+            self._loop.forget_arrivals()
+
+    def arrivals(self, station: int) -> tuple[int, tuple[int, ...]]:
+        """See `SyncLoop.arrivals`; nothing while the exchange does not run."""
+        return (0, ()) if self._loop is None else self._loop.arrivals(station)
+
     def take(self, frame: Frame) -> bool:
         """Take a received frame if it is one of our input PDOs (receiving thread)."""
         loop = self._loop

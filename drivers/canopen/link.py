@@ -20,6 +20,7 @@ from drivers.canopen.adapter import open_bus
 from drivers.canopen.bus import BUS
 from drivers.canopen.channel import SdoChannel
 from drivers.canopen.cyclic import CanopenCyclic
+from drivers.canopen.doctor import Examiner
 from drivers.canopen.frames import HEARTBEAT, SDO_ANSWER, SDO_REQUEST, Frame
 from drivers.canopen.nodes import NodeWatch
 from drivers.canopen.port import CanPort
@@ -30,6 +31,8 @@ from drivers.cia402 import is_stop
 from drivers.codec import size_of
 from drivers.dialect import dialect_of
 from drivers.dictionary import Described
+from drivers.doctor.can_diagnosis import diagnose
+from drivers.doctor.examined import Examination
 from drivers.errors import DriveError, LinkLost, NotAllowed, NotAsked
 from drivers.link import (
     Address,
@@ -87,6 +90,10 @@ class CanopenLink:
         self._cyclic = CanopenCyclic(
             self._port, self._settings, self._sdo_read, self._sdo_write, self._in_worker, clock
         )
+        self._profiles: dict[int, Profile] = {}
+        self._examiner = Examiner(
+            self._port, self._watch, self._watch_lock, self._channels, self._cyclic
+        )
         self._cyclic.tell_events_to(self._announce)
         self._cyclic.know_nodes_by(self._watch.is_there)
         self.cyclic: Cyclic | None = self._cyclic
@@ -119,6 +126,7 @@ class CanopenLink:
 
     def attach(self, station: int, profile: Profile) -> None:
         """See `drivers.link.Link.attach`: its modes, and how its firmware reads CiA 301."""
+        self._profiles[station] = profile
         self._cyclic.set_modes(station, profile.supported_modes)
         self._cyclic.speak(station, dialect_of(profile))
 
@@ -362,6 +370,21 @@ class CanopenLink:
                 self._port.send(Frame(HEARTBEAT + node, remote=True))
             except LinkLost:
                 return  # the receiving thread is about to notice and tell of it
+
+    async def stations_known(self) -> Sequence[int]:
+        """See `drivers.doctor.examined.Examines`."""
+        return self._examiner.known()
+
+    async def examination(self, station: int, refusal: DriveError | None = None) -> Examination:
+        """See `drivers.doctor.examined.Examines`; station 0 is the bus alone.
+
+        Raises:
+            LinkLost: the link is not open.
+        """
+        profile = self._profiles.get(station)
+        found = await self._in_worker(partial(self._examiner.examine, station, profile, refusal))
+        causes = diagnose(found)
+        return Examination(station, not causes, causes)
 
     async def flight(self, station: int | None = None) -> bytes:
         """See `drivers.link.RecordsFrames`."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from drivers.canopen.frames import EMERGENCY, HEARTBEAT, NMT_STATES, SDO_REQUEST, Frame
+from drivers.canopen.frames import EMERGENCY, HEARTBEAT, NMT_STATES, SDO_REQUEST, SYNC, Frame
 from drivers.link import LinkEvent
 
 _EMERGENCY_TEXT = {
@@ -40,6 +40,7 @@ _LATE_PERIODS = 2.5
 _LATE_EXTRA_S = 0.1
 #: The longest of so many intervals is the period: one that came late makes the next one short.
 _INTERVALS_KEPT = 3
+_BOOTS_KEPT = 8
 _DUPLICATE_WINDOW_S = 10.0
 _FORGIVEN_S = 60.0
 """Two nodes with one number go on answering twice; what a busy computer mixed up does not."""
@@ -65,12 +66,17 @@ class NodeRecord:
     intervals_s: list[float] = field(default_factory=list)
     alive: bool = True
     boots: int = 0
+    boots_s: list[float] = field(default_factory=list)
+    """When it booted, the last few times."""
     emergencies: int = 0
     last_emergency: int | None = None
+    open_emergency: int | None = None
+    """The last emergency, until it is taken back (code 0) or the node restarts."""
     emergency_window_s: float | None = None
     emergencies_told: int = 0
     emergencies_untold: int = 0
     guard_toggle: int | None = None
+    toggle_repeated_s: float | None = None
     guarded: bool = False
     """Its toggle bit was seen set, which heartbeats never have: it does answer guarding."""
     guard_asked_s: float | None = None
@@ -95,6 +101,8 @@ class NodeWatch:
 
     def __init__(self) -> None:
         self.nodes: dict[int, NodeRecord] = {}
+        self.sync_heard_s: float | None = None
+        """When somebody else sent SYNC."""
 
     def record(self, node: int) -> NodeRecord:
         """The record of ``node``, made on first use."""
@@ -108,6 +116,8 @@ class NodeWatch:
     def observe(self, frame: Frame, now_s: float) -> list[LinkEvent]:
         """Take in one received frame (not our own) and return what is worth telling."""
         function, node = frame.cob_id & 0x780, frame.cob_id & 0x7F
+        if frame.cob_id == SYNC and not frame.remote:
+            self.sync_heard_s = now_s
         if frame.remote or node == 0:
             return []
         if function == HEARTBEAT and len(frame.data) == 1:
@@ -127,9 +137,9 @@ class NodeWatch:
             record.alive = True
             events.append(LinkEvent("back", record.node, f"node {record.node} answers again"))
         if state == 0 and not toggle:
-            events.append(self._boot(record))
+            events.append(self._boot(record, now_s))
         elif record.guard_asked_s is not None and not self._is_heartbeat(record, toggle):
-            events += self._guard_answer(record, toggle)
+            events += self._guard_answer(record, toggle, now_s)
         elif in_its_turn and not record.guarded and record.last_heartbeat_s is not None:
             record.guard_asked_s = None
             record.intervals_s.append(now_s - record.last_heartbeat_s)
@@ -148,8 +158,10 @@ class NodeWatch:
         """Whether this is no guarding answer: heartbeats of a node that is asked all the same."""
         return not record.guarded and record.guard_toggle == 0 == toggle
 
-    def _boot(self, record: NodeRecord) -> LinkEvent:
+    def _boot(self, record: NodeRecord, now_s: float) -> LinkEvent:
         record.boots += 1
+        record.boots_s = [*record.boots_s, now_s][-_BOOTS_KEPT:]
+        record.open_emergency = None
         record.intervals_s.clear()
         record.guard_toggle = record.guard_asked_s = None
         record.guarded = False
@@ -161,13 +173,14 @@ class NodeWatch:
             )
         return LinkEvent("boot", record.node, f"node {record.node} started")
 
-    def _guard_answer(self, record: NodeRecord, toggle: int) -> list[LinkEvent]:
+    def _guard_answer(self, record: NodeRecord, toggle: int, now_s: float) -> list[LinkEvent]:
         record.guard_asked_s = None
         record.guarded = record.guarded or toggle == 1
         repeated = record.guard_toggle == toggle
         record.guard_toggle = toggle
         if not repeated:
             return []
+        record.toggle_repeated_s = now_s
         return [
             LinkEvent(
                 "fault",
@@ -182,6 +195,7 @@ class NodeWatch:
         code = int.from_bytes(data[:2], "little")
         record.emergencies += 1
         record.last_emergency = code
+        record.open_emergency = code or None
         text = emergency_text(code)
         if code == 0x8150:
             record.conflict = text

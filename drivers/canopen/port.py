@@ -10,7 +10,12 @@ import can
 
 from drivers.canopen.adapter import ADAPTER_ERRORS, open_bus, translate
 from drivers.canopen.frames import Frame
-from drivers.canopen.slcan import ERROR_BUS_OFF
+from drivers.canopen.slcan import (
+    ERROR_ACKNOWLEDGE,
+    ERROR_BUS_OFF,
+    ERROR_CONTROLLER,
+    ERROR_PROTOCOL,
+)
 from drivers.canopen.url import CanUrl
 from drivers.errors import DriveError, LinkLost
 from drivers.flight.kinds import can_data, can_ring
@@ -47,7 +52,12 @@ class CanPort:
         self.received = 0
         self.sent = 0
         self.lost_frames = 0
+        self.acknowledge_errors = 0
+        self.protocol_errors = 0
+        self.error_passive = 0
         self.bus_offs = 0
+        self.bus_off_s: float | None = None
+        """When the adapter last was bus-off, in monotonic seconds."""
         self.reopened = 0
         self._on_frame = on_frame
         self._on_event = on_event
@@ -148,16 +158,28 @@ class CanPort:
 
     def _error_frame(self, message: can.Message) -> None:
         self.error_frames += 1
+        self._count(message)
         bus = self._bus
         if not message.arbitration_id & ERROR_BUS_OFF and (
             bus is None or bus.state is not can.BusState.ERROR
         ):
             return
         self.bus_offs += 1
+        self.bus_off_s = time.monotonic()
         why = LinkLost(
             "canopen.adapter-bus-off-switched", drive=self.url.url, channel=self.url.channel
         )
         self._recover(why, "fault", _FIRST_RETRY_S)
+
+    def _count(self, message: can.Message) -> None:
+        """What kind of error it is: an acknowledge that is missing, damage, or a counter."""
+        kind = message.arbitration_id
+        if kind & ERROR_ACKNOWLEDGE:
+            self.acknowledge_errors += 1
+        elif kind & ERROR_PROTOCOL:
+            self.protocol_errors += 1
+        elif kind & ERROR_CONTROLLER:
+            self.error_passive += 1
 
     def _recover(self, why: LinkLost, kind: str, retry_s: float) -> None:
         """Tell of the loss, then try until the adapter is open again or the port closes."""

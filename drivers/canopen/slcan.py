@@ -35,6 +35,8 @@ _ERROR_PASSIVE = 0x20
 
 ERROR_BUS_OFF = 0x40
 ERROR_CONTROLLER = 0x04
+ERROR_PROTOCOL = 0x08
+ERROR_ACKNOWLEDGE = 0x20
 """Error classes as Linux SocketCAN numbers them (linux/can/error.h)."""
 
 

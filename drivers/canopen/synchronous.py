@@ -100,6 +100,7 @@ class SyncLoop:
         self._sent_cycle = -1
         self._block_cycle = 0
         self._arrived: dict[int, bytes] = {}
+        self._came: set[int] = set()
         self._silent_s = dict.fromkeys(images.stations, 0.0)
         self._sampled_s: float | None = None
         self._complete: set[int] = set()
@@ -141,7 +142,21 @@ class SyncLoop:
         if len(frame.data) >= length:
             with self._lock:
                 self._arrived[frame.cob_id] = frame.data
+                self._came.add(frame.cob_id)
         return True
+
+    def forget_arrivals(self) -> None:
+        """Count anew which input PDOs came."""
+        with self._lock:
+            self._came.clear()
+
+    def arrivals(self, station: int) -> tuple[int, tuple[int, ...]]:
+        """How many input PDOs a station has, and which did not come since `forget_arrivals`."""
+        with self._lock:
+            wanted = {
+                slot.cob_id for (node, _, _), slot in self.images.inputs.items() if node == station
+            }
+            return len(wanted), tuple(sorted(wanted - self._came))
 
     def put(self, key: Key, data: bytes) -> None:
         """Change an output; returns when the frame and the SYNC that makes it valid are sent.

@@ -6,10 +6,11 @@ difference between what is and what should be, 1 for what makes it likelier.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Literal
 
 import yaml
 
@@ -29,6 +30,7 @@ class CauseText:
     remedy: str
     zh_remedy: str
     shows: str
+    bus: Literal["ethercat", "canopen"] = "ethercat"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,19 +65,28 @@ def catalogue() -> dict[str, CauseText]:
 
 def diagnose(evidence: Evidence) -> tuple[Cause, ...]:
     """The causes that fit, the likeliest first; never empty."""
-    weights: dict[str, int] = {}
-    facts: dict[str, list[Fact]] = {}
-    for code, weight, fact in _signs(evidence):
-        weights[code] = weights.get(code, 0) + weight
-        facts.setdefault(code, []).append(fact)
-    if not weights:
-        code = "too_slow" if evidence.timed_out else "unknown"
-        return (Cause(code, 0, (Fact("al_status", evidence.al_code),)),)
-    ranked = sorted(weights, key=lambda code: -weights[code])
-    return tuple(Cause(code, weights[code], tuple(facts[code])) for code in ranked)
+    found = ranked(_signs(evidence))
+    if found:
+        return found
+    code = "too_slow" if evidence.timed_out else "unknown"
+    return (Cause(code, 0, (Fact("al_status", evidence.al_code),)),)
 
 
 Sign = tuple[str, int, Fact]
+"""A cause, what the fact weighs for it, and the fact."""
+
+
+def ranked(signs: Iterable[Sign]) -> tuple[Cause, ...]:
+    """Causes by the sum of the weights of their facts, the heaviest first."""
+    weights: dict[str, int] = {}
+    facts: dict[str, list[Fact]] = {}
+    for code, weight, fact in signs:
+        weights[code] = weights.get(code, 0) + weight
+        facts.setdefault(code, []).append(fact)
+    order = sorted(weights, key=lambda code: -weights[code])
+    return tuple(Cause(code, weights[code], tuple(facts[code])) for code in order)
+
+
 _Rule = Callable[[Evidence], Iterator[Sign]]
 
 AL_CAUSES: dict[int, str] = {

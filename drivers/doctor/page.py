@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from drivers.doctor.can_diagnosis import EMERGENCY_CAUSES
 from drivers.doctor.diagnosis import AL_CAUSES, catalogue
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "not-operational.md"
@@ -14,29 +15,46 @@ _HEAD = """# My drive does not reach OP
 
 *This page is written by `python -m drivers.doctor.page` from the causes that the doctor knows.*
 
-`servodeck doctor ethercat://eth0` takes every drive of the segment to Operational (nothing is
-enabled, nothing moves) and says why one refuses: the likeliest cause first, each with the facts
-that speak for it. On the page *Connect*, *Why not in Operational?* reads the same of a segment
-that is open, without changing a state. Both read AL status, sync managers, watchdog, distributed
-clock, EEPROM state, port counters, the assigned process data, 1C32h, 603Fh and 1018h.
+`servodeck doctor ethercat://eth0` or `servodeck doctor canopen://socketcan/can0` takes every drive
+of the bus to Operational (nothing is enabled, nothing moves) and says why one refuses: the
+likeliest cause first, each with the facts that speak for it. On the page *Connect*, *Why not in
+Operational?* reads the same of a bus that is open, without changing a state.
+
+Both read of an EtherCAT station AL status, sync managers, watchdog, distributed clock, EEPROM
+state, port counters, the assigned process data, 1C32h, 603Fh and 1018h; of a CANopen node error
+frames of the bus, boot-up, heartbeat, emergencies, its PDO identifiers and those of the other
+nodes, 1000h, 1005h, 1018h, 603Fh and 6041h.
 
 The frames of the last minute are behind *Frames of the last minute* on the same page, and by
 `servodeck bus record BUS_URL --out FILE.pcapng`; every support bundle has them.
 
-| cause | what it looks like | what to do |
-| --- | --- | --- |
 """
+_COLUMNS = ["| cause | what it looks like | what to do |", "| --- | --- | --- |"]
 
 
 def text() -> str:
     """The whole page."""
-    rows = [f"| {c.title} | {c.shows} | {c.remedy} |" for c in catalogue().values()]
     codes = [
         f"| `0x{code:04X}` | {catalogue()[cause].title} |"
         for code, cause in sorted(AL_CAUSES.items())
     ]
-    table = ["", "## By AL status code", "", "| code | cause |", "| --- | --- |", *codes, ""]
-    return _HEAD + "\n".join([*rows, *table])
+    emergencies = [
+        f"| `{code:04X}h` | {catalogue()[cause].title} |"
+        for code, cause in sorted(EMERGENCY_CAUSES.items())
+    ]
+    parts = [
+        "## EtherCAT", "", *_COLUMNS, *_rows("ethercat"), "",
+        "## EtherCAT by AL status code", "", "| code | cause |", "| --- | --- |", *codes, "",
+        "## CANopen", "", *_COLUMNS, *_rows("canopen"), "",
+        "## CANopen by emergency code of the network", "",
+        "| code | cause |", "| --- | --- |", *emergencies, "",
+    ]  # fmt: skip
+    return _HEAD + "\n".join(parts)
+
+
+def _rows(bus: str) -> list[str]:
+    found = [cause for cause in catalogue().values() if cause.bus == bus]
+    return [f"| {cause.title} | {cause.shows} | {cause.remedy} |" for cause in found]
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ def evidence_of(
     given["timed_out"] = isinstance(refusal, LinkTimeout)
     if refusal is not None and refusal.parameter is not None:
         given["refused_key"] = refusal.parameter
-        given["refused_code"] = refusal.code if isinstance(refusal, Rejected) else None
+        given["refused_code"] = refusal.abort_code if isinstance(refusal, Rejected) else None
         given["from_file"] = _is_init_command(profile, refusal.parameter)
     if profile is not None:
         given["known_vendor"] = profile.identity.vendor_id

@@ -16,6 +16,7 @@ from drivers.computer.sockets import require_ethercat
 from drivers.dictionary import Described, EntryDescription, ObjectInfo
 from drivers.doctor.diagnosis import Cause, diagnose
 from drivers.doctor.evidence import Evidence
+from drivers.doctor.examined import Examination
 from drivers.errors import DriveError, NotAllowed
 from drivers.ethercat.bus import BUS
 from drivers.ethercat.doctor import evidence_of
@@ -32,6 +33,8 @@ from profiles.schema import LinkKind, Profile
 
 _SCHEME = "ethercat://"
 _ANSWER_S, _SCAN_S, _FOE_S = 15.0, 60.0, 1800.0
+_OPERATIONAL = 8
+"""AL state (ETG.1000.6 table 8)."""
 
 
 class EthercatLink:
@@ -306,6 +309,16 @@ class EthercatLink:
             facts |= {"wkc": figures.last_wkc, "planned_wkc": figures.expected_wkc}
         found = evidence_of(facts, self._profiles.get(station), refusal, aliases)
         return found, diagnose(found)
+
+    async def stations_known(self) -> Sequence[int]:
+        """See `drivers.doctor.examined.Examines`."""
+        return [each.station for each in (await self.survey()).stations]
+
+    async def examination(self, station: int, refusal: DriveError | None = None) -> Examination:
+        """See `drivers.doctor.examined.Examines`."""
+        found, causes = await self.diagnose(station, refusal)
+        reached = refusal is None and found.al == _OPERATIONAL
+        return Examination(station, reached, () if reached else causes)
 
     async def flight(self, station: int | None = None) -> bytes:
         """See `drivers.link.RecordsFrames`."""

@@ -1,4 +1,4 @@
-"""Route to the doctor: why stations of an EtherCAT segment are not in Operational."""
+"""Route to the doctor: why stations of a bus are not in Operational."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from pydantic import BaseModel
 from backend.api.context import TheBench
 from backend.api.errors import NotFound
 from drivers.doctor.diagnosis import Cause
-from drivers.ethercat.link import segment_of
+from drivers.doctor.examined import Examines
+from drivers.errors import NotAllowed
 
 router = APIRouter()
-_OPERATIONAL = 8
 
 
 class DoctorFact(BaseModel):
@@ -45,28 +45,29 @@ class StationDiagnosis(BaseModel):
     causes: list[DoctorCause]
 
 
-@router.get("/ethercat/doctor")
-async def ethercat_doctor(
+@router.get("/buses/doctor")
+async def bus_doctor(
     bench: TheBench,
     url: Annotated[str, Query()],
     station: Annotated[int | None, Query(ge=1)] = None,
 ) -> list[StationDiagnosis]:
-    """What keeps the stations of an opened segment from Operational, the likeliest cause first.
+    """What keeps the stations of an opened EtherCAT or CANopen bus from Operational.
 
-    Reads registers and objects as they are now; changes no state.
+    The likeliest cause first. Reads registers and objects as they are now; changes no state.
     """
-    link = segment_of(bench.buses.opened.get(url))
+    link = bench.buses.opened.get(url)
     if link is None:
-        raise NotFound("api-station.no-opened-ethercat-bus", value=url)
-    seen = [s.station for s in (await link.survey()).stations if station in (None, s.station)]
+        raise NotFound("api-station.no-opened-bus", value=url)
+    if not isinstance(link, Examines):
+        raise NotAllowed("api-station.doctor-knows-not", value=url)
+    seen = [station] if station is not None else sorted(await link.stations_known())
     found = []
     for number in seen:
-        evidence, causes = await link.diagnose(number)
-        reached = evidence.al == _OPERATIONAL
+        examined = await link.examination(number)
         found.append(
             StationDiagnosis(
-                station=number, reached=reached,
-                causes=[] if reached else [_cause(each) for each in causes],
+                station=number, reached=examined.reached,
+                causes=[_cause(each) for each in examined.causes],
             )
         )  # fmt: skip
     return found

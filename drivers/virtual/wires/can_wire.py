@@ -32,6 +32,9 @@ class ClientSide(Protocol):
     def bus_off(self) -> None:
         """Make the client's adapter go bus-off until it is opened anew."""
 
+    def error(self, kind: int) -> None:
+        """A frame of the client failed: ``kind`` is a class of linux/can/error.h."""
+
     def close(self) -> None:
         """Give everything back."""
 
@@ -71,6 +74,14 @@ class PythonCanSide:
             )
         )
 
+    def error(self, kind: int) -> None:
+        """See `ClientSide`."""
+        self._bus.send(
+            can.Message(
+                arbitration_id=kind, is_extended_id=False, is_error_frame=True, data=bytes(8)
+            )
+        )
+
     def close(self) -> None:
         """See `ClientSide`."""
         self._bus.shutdown()
@@ -84,6 +95,9 @@ class CanWire:
     ) -> None:
         self.side = side
         self.nodes = list(nodes)
+        self.broken: int | None = None
+        """No frame gets through, and each of the client's ends with an error of this class:
+        ERROR_ACKNOWLEDGE where nobody else is on the bus, ERROR_PROTOCOL at another bit rate."""
         self._bitrate = bitrate
         self._free_s = 0.0
         self._stopping = threading.Event()
@@ -128,7 +142,9 @@ class CanWire:
                 self._work.get()()
             wait_s = min((n.next_due_s(_LONGEST_WAIT_S) for n in self.nodes), default=0.002)
             frame = self.side.recv(wait_s)
-            if frame is not None:
+            if frame is not None and self.broken is not None:
+                self.side.error(self.broken)
+            elif frame is not None:
                 self._occupy(frame)
                 for node in self.nodes:
                     node.take(frame)
@@ -137,6 +153,8 @@ class CanWire:
     def _send_due(self) -> None:
         # Frames of one node are heard by the others too, as on a real bus.
         ready = [(node, frame) for node in self.nodes for frame in node.due()]
+        if self.broken is not None:
+            return
         # Lower identifiers win the arbitration.
         for sender, frame in sorted(ready, key=lambda pair: pair[1].cob_id):
             self._occupy(frame)

@@ -53,6 +53,13 @@ class CanopenNode:
         """Takes everything in and says nothing."""
         self.guard_repeats = False
         """Answers guarding with the same toggle bit each time."""
+        self.stays_preoperational = False
+        """Does not obey NMT start."""
+        self.deaf_to_sync = False
+        self.silent_sdo = False
+        """Answers no SDO request, and all else goes on."""
+        self.refused: dict[int, int] = {}
+        """Abort codes with which writes of these objects (index) are refused."""
         self._clock = clock
         self._objects = CommunicationObjects(device, node_id)
         self._server = SdoServer(
@@ -91,7 +98,8 @@ class CanopenNode:
             if frame.data[1] in (0, self.node_id):
                 self._command(frame.data[0], now)
         elif frame.cob_id == self._objects.sync_cob & 0x7FF and not frame.remote:
-            self._sync(now)
+            if not self.deaf_to_sync:
+                self._sync(now)
         elif frame.cob_id == frames.SDO_REQUEST + self.node_id and self.state != _STOPPED:
             self._answer(frame.data, now)
         elif frame.cob_id == frames.HEARTBEAT + self.node_id and frame.remote:
@@ -159,6 +167,8 @@ class CanopenNode:
             self.reboot()
         elif command == frames.NMT_RESET_COMMUNICATION:
             self._reset_communication(now)
+        elif command == frames.NMT_START and self.stays_preoperational:
+            return
         elif command == frames.NMT_START:
             self._objects.bind()
             self.state = _OPERATIONAL
@@ -198,7 +208,7 @@ class CanopenNode:
 
     def _answer(self, request: bytes, now: int) -> None:
         answers = self._server.request(request)
-        if not answers:
+        if not answers or self.silent_sdo:
             return
         delay = self._delays.pop(0) if self._delays else 0
         # A drive answers in order: nothing overtakes a late answer.
@@ -249,6 +259,8 @@ class CanopenNode:
         return struct.pack("<I", self._history[subindex - 1])
 
     def _write(self, index: int, subindex: int, data: bytes) -> None:
+        if index in self.refused:
+            raise SdoAbort(self.refused[index])
         if self._objects.owns(index):
             self._objects.write(index, subindex, data)
         elif index == 0x1003 and index not in self.device.indices():

@@ -17,6 +17,7 @@ from drivers.canopen.frames import Frame
 from drivers.virtual.wires.pty import close_pty, open_pty
 
 _BUS_ERROR_FLAGS = b"FA4\r"
+_PASSIVE_FLAGS = b"F21\r"
 _NO_FLAGS = b"F00\r"
 _BEL = b"\a"
 
@@ -33,6 +34,7 @@ class SlcanSide:
         self.refused = 0
         self._opened = False
         self._bus_off = False
+        self._passive = False
         self._buffer = bytearray()
         self._frames: deque[Frame] = deque()
         self._master = self._slave = -1
@@ -65,6 +67,11 @@ class SlcanSide:
     def bus_off(self) -> None:
         """Refuse frames with BEL until the channel is closed and opened again."""
         self._bus_off = True
+
+    def error(self, kind: int) -> None:
+        """Go error passive with a full buffer: of the kind this adapter tells nothing."""
+        del kind
+        self._passive = True
 
     def close(self) -> None:
         """Remove the pty and its link."""
@@ -106,10 +113,11 @@ class SlcanSide:
             self._reply(b"\r")
         elif letter == b"C":
             self._opened = False
-            self._bus_off = False
+            self._bus_off = self._passive = False
             self._reply(b"\r")
         elif letter == b"F":
-            self._reply(_BUS_ERROR_FLAGS if self._bus_off else _NO_FLAGS)
+            passive = _PASSIVE_FLAGS if self._passive else _NO_FLAGS
+            self._reply(_BUS_ERROR_FLAGS if self._bus_off else passive)
         elif letter == b"V":
             self._reply(b"V1013\r")
         elif letter == b"N":
@@ -121,7 +129,7 @@ class SlcanSide:
 
     def _transmit(self, command: bytes) -> None:
         frame = _parse(command)
-        if frame is None or not self._opened or self._bus_off:
+        if frame is None or not self._opened or self._bus_off or self._passive:
             self.refused += 1
             self._reply(_BEL)
             return

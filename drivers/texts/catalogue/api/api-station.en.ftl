@@ -6,6 +6,7 @@ api-station_empty-choose-maker = { $file } is empty
     .remedy = choose the maker's firmware file
 api-station_enabled = { $drive } is enabled
     .remedy = disable it first
+api-station_doctor-knows-not = { $value }: the doctor knows EtherCAT and CANopen only
 api-station_frames-not-recorded = { $value }: its frames are not recorded
     .remedy = only EtherCAT, CANopen, Modbus and MLink record them
 api-station_import = Import { $file }

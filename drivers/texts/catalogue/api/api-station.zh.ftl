@@ -6,6 +6,7 @@ api-station_empty-choose-maker = { $file } 为空
     .remedy = 请选择厂家的固件文件
 api-station_enabled = { $drive } 处于使能状态
     .remedy = 请先断使能
+api-station_doctor-knows-not = { $value }：诊断功能只支持 EtherCAT 和 CANopen
 api-station_frames-not-recorded = { $value }：未记录该总线的报文
     .remedy = 只有 EtherCAT、CANopen、Modbus 和 MLink 记录报文
 api-station_import = 导入 { $file }

@@ -50,7 +50,7 @@ export function Buses() {
           </a>
           <QualityTable quality={bus.quality} />
           {bus.kind === 'ethercat' && <SegmentPanel url={bus.url} />}
-          {bus.kind === 'ethercat' && <DoctorCard url={bus.url} />}
+          {(bus.kind === 'ethercat' || bus.kind === 'canopen') && <DoctorCard url={bus.url} />}
           {bus.cyclic_possible && <CyclicExchange bus={bus} onChange={refresh} />}
         </div>
       ))}

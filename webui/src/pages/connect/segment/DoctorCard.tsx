@@ -6,7 +6,7 @@ import { useLanguage, useT } from '../../../i18n'
 import { ProblemNote } from '../../../widgets/ProblemNote'
 import { useAction } from '../../../widgets/useAction'
 
-/** Why stations of a segment are not in Operational: causes with evidence, the likeliest first. */
+/** Why stations of a bus are not in Operational: causes with evidence, the likeliest first. */
 export function DoctorCard({ url }: { url: string }) {
   const t = useT()
   const chinese = useLanguage() === 'zh'
@@ -18,7 +18,7 @@ export function DoctorCard({ url }: { url: string }) {
         loading={examine.busy}
         onClick={() =>
           void examine.run(async () => {
-            setFound(await ask(api.GET('/api/v1/ethercat/doctor', { params: { query: { url } } })))
+            setFound(await ask(api.GET('/api/v1/buses/doctor', { params: { query: { url } } })))
           })
         }
       >

@@ -1,0 +1,73 @@
+"""The doctor on a CAN bus: real frames, injected trouble, the cause that comes first.
+
+The whole table is ``python -m benchmarks.doctor --bus canopen``.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from backend.commands.doctor import examined
+from benchmarks.doctor_canopen import CASES, NODE, CanCase, causes_of
+from drivers.canopen.link import CanopenLink
+from tests.wire.canopen.conftest import Bench
+from tests.wire.canopen.small_device import small_profile
+
+#: One of each kind of evidence; the others differ in a code only.
+CHOSEN = (
+    "alone on the bus, slcan adapter", "other bit rate", "bus-off, slcan adapter",
+    "adapter pulled", "node-ID 9 in place of 5", "two nodes of one number", "four restarts",
+    "heartbeat ends", "NMT start ignored", "objects not mappable", "COB-ID locked",
+    "another node sends 185h", "SYNC does not reach it", "panel control",
+    "PDO of one byte for two",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("case", [pytest.param(c, id=c.name) for c in CASES if c.name in CHOSEN])
+async def test_the_injected_cause_comes_first(case: CanCase) -> None:
+    assert (await causes_of(case))[:1] == [case.cause]
+
+
+def test_the_chosen_cases_are_in_the_table() -> None:
+    assert set(CHOSEN) <= {case.name for case in CASES}
+
+
+async def test_a_healthy_node_reaches_operational_and_is_put_back(
+    bench: Bench, link: CanopenLink
+) -> None:
+    link.attach(NODE, small_profile())
+    before = link.quality(NODE).details["boots"]
+    result = await examined(link, NODE)
+    assert result["reached"], result
+    assert result["causes"] == []
+    assert bench.node.state == 127, "pre-operational again (CiA 301 clause 7.3.2.2.4)"
+    assert bench.device.value(0x6040) == 0, "nothing was enabled"
+    assert link.quality(NODE).details["boots"] == before
+
+
+async def test_the_examination_starts_no_life_guarding(bench: Bench, link: CanopenLink) -> None:
+    """The first request of guarding would start it (CiA 301 clause 7.2.8.3.2.1)."""
+    read = bench.device.read
+    held = {(0x100C, 0): b"\x64\0", (0x100D, 0): b"\x03"}
+    asked = []
+    guard = bench.node._guard
+    bench.node._guard = lambda now: (asked.append(now), guard(now))  # type: ignore[method-assign]
+    bench.device.read = lambda i, s: held.get((i, s)) or read(i, s)  # type: ignore[method-assign]
+    await link.examination(NODE)
+    assert asked == []
+    held.clear()
+    await link.examination(NODE)
+    assert len(asked) == 1
+
+
+async def test_the_bus_alone_is_examined_where_nobody_answers(bench: Bench) -> None:
+    bench.node.mute = True
+    link = CanopenLink(bench.url)
+    await link.open()
+    try:
+        result = await examined(link, 0)
+    finally:
+        await link.close()
+    assert [cause["code"] for cause in result["causes"]] == ["can_node_silent"]
+    facts = {fact["name"]: fact["actual"] for fact in result["causes"][0]["facts"]}
+    assert facts["other_nodes"] == 0
