@@ -61,10 +61,6 @@ ALLOWED: dict[tuple[str, str], str] = {
         "fitting = [s for s in found if all(word in s.words() for word in words)]",
     ): "a person searches recordings by the words in their descriptions",
     (
-        "backend/api/drive/routes.py",
-        "reason = request.reason.strip()",
-    ): "what a person gives as the reason is stored without blanks around it",
-    (
         "backend/commands/values.py",
         "print(words.rstrip())",
     ): "what is printed has no space at its end",
