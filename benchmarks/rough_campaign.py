@@ -53,7 +53,7 @@ FAMILIES = ("mms7", "m6l", "r6l", "generic402")
 #: One class of behaviour each: how it is drawn.
 CLASSES: dict[str, dict[str, tuple[float, float] | bool | str]] = {
     "as assumed": {},
-    "held set-points": {"holds_torque": True, "holds_speed": True},
+    "held setpoints": {"holds_torque": True, "holds_speed": True},
     "filtered 6077h": {"reported_filter_s": (3e-4, 2e-3)},
     "6077h is the demand": {"reported": "demand"},
     "torque low-pass": {"torque_filter_s": (2e-4, 8e-4)},

@@ -102,7 +102,7 @@ class LinkTraits:
     registers: bool = False
     """Values are reached by their Modbus register, not by index and subindex."""
     synchronous: bool = False
-    """Set-points and samples share one instant of every cycle without clocks in the drives."""
+    """Setpoints and samples share one instant of every cycle without clocks in the drives."""
     description: Literal["none", "dictionary", "stored_eds"] = "none"
     """How a drive tells of its own objects: not, by `Link.enumerate`, or by an EDS in 1021h."""
     silent: str = "power, cable and address"

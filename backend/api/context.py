@@ -15,7 +15,7 @@ from backend.people.errors import NotLoggedIn
 from backend.people.identity import Identity, acting
 from backend.people.station import People
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from drivers.errors import NotAllowed
 
 #: Sent by the page with every change: the id of its live connection, which may hold a lease. The
@@ -59,21 +59,21 @@ ThePeople = Annotated[People, Depends(people_of)]
 Me = Annotated[Identity, Depends(identity_now)]
 
 
-async def member_of(drive_id: str, bench: TheBench) -> Member:
+async def member_of(drive_id: str, bench: TheBench) -> ConnectedDrive:
     """The drive that a path names.
 
     Raises:
         NotFound: there is none.
     """
     try:
-        return bench.member(drive_id)
+        return bench.connected(drive_id)
     except NotAllowed as error:
         raise NotFound(error.text, drive=drive_id, remedy=error.remedy_text) from error
 
 
-TheMember = Annotated[Member, Depends(member_of)]
+TheDrive = Annotated[ConnectedDrive, Depends(member_of)]
 
 
 #: The drive that a path names, for a route that changes it. The gate has made sure that nobody
 #: else has control (backend.api.security.rights).
-Controlled = TheMember
+Controlled = TheDrive

@@ -17,7 +17,7 @@ from backend.motion.doors import door_of
 from backend.parameters.set_file import Difference
 from backend.people.elapsed import moment_of
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.station.matching import match_profiles
 from backend.station.monitor import Snapshot
 from backend.tools.moves.procedures import describe
@@ -93,10 +93,10 @@ def lease(bench: Bench, drive: str, connection: str | None) -> models_bench.Leas
 
 
 def drive_summary(
-    bench: Bench, member: Member, connection: str | None = None
+    bench: Bench, connected: ConnectedDrive, connection: str | None = None
 ) -> models_bench.DriveSummary:
     """A drive of the bench."""
-    drive, found = member.drive, member.drive.found
+    drive, found = connected.drive, connected.drive.found
     return models_bench.DriveSummary(
         id=drive.id,
         name=drive.name,
@@ -115,20 +115,20 @@ def drive_summary(
             )
             for port in drive.ports
         ],
-        connected=member.monitor.snapshot.fresh,
+        connected=connected.monitor.snapshot.fresh,
         serial=found.serial if found else None,
         firmware=found.firmware if found else "",
         identity_warning=drive.identity_warning,
         unsaved=len(drive.unsaved),
         pending=len(drive.pending),
-        owed=[
-            models_bench.OwedValue(
-                key=debt.key,
-                name=drive.parameter(debt.key).name,
-                raw=debt.raw,
-                unapplied=debt.unapplied,
+        pending_restores=[
+            models_bench.PendingRestoreValue(
+                key=entry.key,
+                name=drive.parameter(entry.key).name,
+                raw=entry.raw,
+                unapplied=entry.unapplied,
             )
-            for debt in drive.owed.debts
+            for entry in drive.pending_restores.entries
         ],
         lease=lease(bench, drive.id, connection),
         quality=quality(drive.quality()),
@@ -148,16 +148,16 @@ def fault(known: Fault) -> models_axis.ActiveFault:
     )
 
 
-def axis_state(bench: Bench, member: Member, now: Snapshot) -> models_axis.AxisState:
+def axis_state(bench: Bench, connected: ConnectedDrive, now: Snapshot) -> models_axis.AxisState:
     """State of an axis."""
-    job = bench.jobs.moving(member.drive.id)
+    job = bench.jobs.moving(connected.drive.id)
     try:
         name = cia402.MODE_NAMES[Mode(now.mode or 0)]
     except ValueError:
         name = f"Mode {now.mode}"
     value = now.values.get
     return models_axis.AxisState(
-        drive=member.drive.id,
+        drive=connected.drive.id,
         time=moment(now.time),
         fresh=now.fresh,
         problem=words_of(now.problem),
@@ -166,7 +166,7 @@ def axis_state(bench: Bench, member: Member, now: Snapshot) -> models_axis.AxisS
         status_word=now.status_word,
         mode=now.mode,
         mode_name=name,
-        modes=list(member.drive.modes),
+        modes=list(connected.drive.modes),
         goals=[goal.value for goal in cia402.allowed_goals(now.state)] if now.fresh else [],
         target_reached=now.target_reached,
         internal_limit=now.internal_limit,
@@ -301,9 +301,9 @@ def found_drive(bench: Bench, url: str, kind: str, found: Found) -> models_bench
     """A drive seen by a scan."""
     user = next(
         (
-            member.drive.id
-            for member in bench.members.values()
-            for port in member.drive.ports
+            connected.drive.id
+            for connected in bench.connected_drives.values()
+            for port in connected.drive.ports
             if bench.buses.url_of(port) == url and port.station == found.station
         ),
         None,

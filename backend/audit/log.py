@@ -200,9 +200,9 @@ class AuditLog:
     def _append(self, bodies: list[str]) -> None:
         """Add to the chain, leaving out what a transaction of unknown outcome already added."""
         with self._store.writing() as session:
-            doubtful = [body for body in bodies if body in self._unsure]
-            if doubtful:
-                times = {chain.columns(body)["time"] for body in doubtful}
+            uncertain = [body for body in bodies if body in self._unsure]
+            if uncertain:
+                times = {chain.columns(body)["time"] for body in uncertain}
                 found = select(AuditEntry.body).where(AuditEntry.time.in_(times))
                 present = set(session.scalars(found))
                 bodies = [body for body in bodies if body not in present]

@@ -40,7 +40,7 @@ class _Running:
     sent: dict[str, _Sent] = field(default_factory=dict)
 
 
-class Witness:
+class AuditRecorder:
     """Listens to drives, jobs and leases. ``name_of`` gives an axis's name for its id."""
 
     def __init__(self, audit: AuditLog, name_of: Callable[[str], str]) -> None:
@@ -91,7 +91,7 @@ class Witness:
         )
 
     def commanded(self, record: CommandRecord) -> None:
-        """A control word or set-point was sent, or may have been.
+        """A control word or setpoint was sent, or may have been.
 
         What a motion sends, many a second, is told with its end. Anything else is told at once,
         and again only when it changes: words that STOP repeats are one event.

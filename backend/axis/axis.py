@@ -72,12 +72,12 @@ class Axis(ScaledAxis):
             NotAllowed: the drive stays where it is, or STOP was pressed meanwhile.
         """
         await self.require_stop_delivered()
-        # In a running exchange the loop keeps the set-points where the axis stands.
+        # In a running exchange the loop keeps the setpoints where the axis stands.
         aims = self.cyclic_power() is None
         with self.granted(f"to “{goal.value}”"):
             if mode is not None:
                 if aims:
-                    # One that is enabled already would follow a stale set-point of the new mode.
+                    # One that is enabled already would follow a stale setpoint of the new mode.
                     await self.aim_here(mode)
                 await self.set_mode(mode)
             if goal is State.OPERATION_ENABLED and aims:
@@ -203,7 +203,7 @@ class Axis(ScaledAxis):
             previous = Mode(int(shown)) if shown in set(Mode) else mode
             await self.limit_torque(limits, envelope.torque_percent)
             await raise_quick_stop(drive, earlier)
-            # A stale set-point must not start to move the axis: neither at the change of mode,
+            # A stale setpoint must not start to move the axis: neither at the change of mode,
             # where it is enabled already, nor when it is enabled.
             await self.aim_here(mode)
             await self.set_mode(mode)
@@ -220,7 +220,7 @@ class Axis(ScaledAxis):
                 lambda: self._leave(before, mode, previous), CLEANUP_TIMEOUT_S, self.drive.name
             )
         except (LinkLost, LinkTimeout, ProtocolError):
-            self.owes_stop = True
+            self.stop_pending = True
             raise
 
     @asynccontextmanager
@@ -275,18 +275,18 @@ class Axis(ScaledAxis):
         """Brake and take the power off through the loop; nothing interrupts this.
 
         Raises:
-            DriveError: the loop does not do it. A stop is owed then: who knows what still moves.
+            DriveError: the loop does not do it. A stop is pending then: what moves is not known.
         """
         try:
             await shielded(lambda: self._leave_cyclic(session), timeout_s, self.drive.name)
         except DriveError:
-            self.owes_stop = True
+            self.stop_pending = True
             raise
 
     async def _leave_cyclic(self, session: CyclicSession) -> None:
         if not session.running:
             # Ended in order it has braked everything; broken off it has left that to the drive.
-            self.owes_stop = self.owes_stop or bool(session.trouble)
+            self.stop_pending = self.stop_pending or bool(session.trouble)
             return
         await session.cyclic.halt(session.station(self.drive))
         await self.standstill(2.0)
@@ -323,7 +323,7 @@ class Axis(ScaledAxis):
                 await self.drive.write(key, -raw)
 
     async def aim_here(self, mode: Mode | None = None) -> None:
-        """Set-point to "stay": of ``mode``, or of the mode that the drive shows."""
+        """Setpoint to "stay": of ``mode``, or of the mode that the drive shows."""
         drive = self.drive
         if mode is None:
             display = drive.key("mode_display")
@@ -367,7 +367,7 @@ class Axis(ScaledAxis):
             await self.halt_and_wait(CLEANUP_TIMEOUT_S / 2)
             state = await self.state()
         if before is State.OPERATION_ENABLED and state is State.OPERATION_ENABLED:
-            # Halt is released only onto a set-point that is where the axis stands, in this
+            # Halt is released only onto a setpoint that is where the axis stands, in this
             # mode and in the one that comes back.
             for aimed in dict.fromkeys((mode, previous)):
                 await self.aim_here(aimed)

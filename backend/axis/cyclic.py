@@ -132,7 +132,7 @@ class CyclicSession:
 
     @property
     def synchronous(self) -> bool:
-        """Whether set-points take effect, and samples are taken, at the same instant each cycle."""
+        """Whether setpoints take effect, and samples are taken, at the same instant each cycle."""
         return self.state is not None and (bool(self.state.dc) or self.link.traits.synchronous)
 
     def _port(self, drive: Drive) -> Port:

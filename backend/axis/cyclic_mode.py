@@ -32,16 +32,19 @@ async def keeping_mode(axis: Axis, session: CyclicSession) -> AsyncIterator[None
     drive shows one that cannot be written (none, at power-on).
 
     Raises:
-        RestoreFailed: on leaving; the mode is then owed to the drive.
+        RestoreFailed: on leaving; the mode is then a pending restore.
     """
     drive = axis.drive
     keys = [] if session.power() is None else await axis.restorable_mode()
-    if not keys or drive.owed.lends(keys[0]):
+    if not keys or drive.pending_restores.borrows(keys[0]):
         yield
         return
     (key,) = keys
     before = await drive.raw(key)
-    with axis.granted("motion through the cyclic exchange"), drive.owed.lent({key: before}):
+    with (
+        axis.granted("motion through the cyclic exchange"),
+        drive.pending_restores.borrowed({key: before}),
+    ):
         modes_of_the_loop(drive, session, key)
         try:
             yield
@@ -52,9 +55,9 @@ async def keeping_mode(axis: Axis, session: CyclicSession) -> AsyncIterator[None
 
 
 def modes_of_the_loop(drive: Drive, session: CyclicSession, key: str) -> None:
-    """What the loop may leave in ``key``, which is lent: it writes past the drive's own methods."""
+    """What the loop may leave in the borrowed ``key``: it writes past the drive's own methods."""
     for mode in (Mode.PV,) if drive.id in session.by_speed else _CYCLIC:
-        drive.owed.commanded(key, int(mode))
+        drive.pending_restores.commanded(key, int(mode))
 
 
 async def _give_back(axis: Axis, session: CyclicSession, key: str, before: int) -> None:
@@ -69,7 +72,7 @@ async def _give_back(axis: Axis, session: CyclicSession, key: str, before: int) 
             "axis.not-restored", drive=drive.name, key=key, before=before, cause=error.text
         ) from error
     finally:
-        drive.owed.add(left)
+        drive.pending_restores.add(left)
 
 
 async def _choose(axis: Axis, session: CyclicSession, key: str, mode: int) -> None:

@@ -51,7 +51,7 @@ async def lower(session: CyclicSession, drive: Drive, goal: State) -> None:
 
 
 async def play(session: CyclicSession, drive: Drive, trajectory: Trajectory, grant: Grant) -> int:
-    """Give the loop set-points to play; see `drivers.link.Cyclic.play`.
+    """Give the loop setpoints to play; see `drivers.link.Cyclic.play`.
 
     Raises:
         NotGranted: the grant is not for this axis, or has ended.

@@ -54,7 +54,7 @@ class PowerState:
         #: How many commands of people have permitted motion so far.
         self.permits = 0
         #: A stop did not reach the drive; `repeat_stop` sends it again once the drive answers.
-        self.owes_stop = False
+        self.stop_pending = False
         self._repeating = asyncio.Lock()
         #: What STOP has done since it was pressed, and when that was (monotonic).
         self.stop_steps: list[StopStep] = []
@@ -176,7 +176,7 @@ class PowerState:
                     cut = partial(loop.lower, session, self.drive, off)
                     await shielded(cut, timeout_s, self.drive.name)
                 except DriveError:
-                    self.owes_stop = True
+                    self.stop_pending = True
             raise
 
     async def _until_there(self, goal: State, timeout_s: float) -> None:
@@ -345,7 +345,7 @@ class PowerState:
         """Stop now, by one write; harmless when nothing moves.
 
         Where 605Ah is known to coast, the axis is braked by halt, and by a quick stop that brakes.
-        Where it does not reach the drive, `owes_stop` is set.
+        Where it does not reach the drive, `stop_pending` is set.
         """
         try:
             if self.session is not None and self.cyclic_power() is not None:
@@ -359,9 +359,9 @@ class PowerState:
         except BaseException:
             # Whatever kept it: also an exchange that just ended, a drive that refused the word
             # while it was busy, and a caller that did not wait.
-            self.owes_stop = True
+            self.stop_pending = True
             raise
-        self.owes_stop = False
+        self.stop_pending = False
 
     async def know_stop(self) -> None:
         """Read how the drive brakes on STOP, so that STOP itself need not ask; never raises."""
@@ -393,10 +393,10 @@ class PowerState:
             raise
 
     async def repeat_stop(self) -> bool:
-        """Send the stop that is owed; returns whether one was owed and is delivered now."""
+        """Send the pending stop; returns whether one was pending and is delivered now."""
         # Monitor and the watch over STOP both repeat it; once is enough.
         async with self._repeating:
-            if not self.owes_stop:
+            if not self.stop_pending:
                 return False
             try:
                 await self.quick_stop()
@@ -410,5 +410,5 @@ class PowerState:
         Raises:
             DriveError: it still does not reach it.
         """
-        if self.owes_stop:
+        if self.stop_pending:
             await self.quick_stop()

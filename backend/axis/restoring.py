@@ -42,7 +42,7 @@ async def restoring(drive: Drive, *keys: str) -> AsyncIterator[dict[str, Raw]]:
         reading = await drive.read(key)
         if reading.raw is not None:
             before[key] = reading.raw
-    with drive.owed.lent(before):
+    with drive.pending_restores.borrowed(before):
         try:
             yield before
         except BaseException as error:
@@ -59,7 +59,7 @@ async def _put_back(drive: Drive, before: dict[str, Raw], earlier: BaseException
         await _to_its_end(lambda: _restore(drive, before), CLEANUP_TIMEOUT_S, name)
     except DriveError as error:
         if not isinstance(error, RestoreFailed):
-            was = {key: drive.owed.original(key, raw) for key, raw in before.items()}
+            was = {key: drive.pending_restores.original(key, raw) for key, raw in before.items()}
             values = ", ".join(f"{key} (was {raw})" for key, raw in was.items())
             error = RestoreFailed(
                 "axis.perhaps-not-restored", drive=name, values=values, cause=error.text
@@ -83,9 +83,11 @@ async def _restore(drive: Drive, before: dict[str, Raw]) -> None:
                     await drive.put_back(key, raw)
                 del left[key]
             except DriveError as error:
-                failed.append(f"{key} (was {drive.owed.original(key, raw)}): {error.message}")
+                failed.append(
+                    f"{key} (was {drive.pending_restores.original(key, raw)}): {error.message}"
+                )
     finally:
-        drive.owed.add(left)
+        drive.pending_restores.add(left)
     if failed:
         raise RestoreFailed(
             "axis.not-restored-running-server", drive=drive.name, failed="; ".join(failed)

@@ -81,12 +81,12 @@ async def save(place: Place) -> None:
 async def restore(place: Place, *, keep: bool) -> None:
     """Restore what a motion left that was cut off, or let it stay as it is."""
     async with drive_and_pending(place.url, place.station, place.profile) as (drive, pending):
-        listed = drive.owed.debts
+        listed = drive.pending_restores.entries
         if not listed:
             print(f"{drive.name}: nothing is pending")
             return
         if keep:
-            drive.owed.settle([value.key for value in listed])
+            drive.pending_restores.settle([value.key for value in listed])
             for value in listed:
                 print(f"{drive.name}: {value.key} (was {value.raw}) stays as it is")
             return

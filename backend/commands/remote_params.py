@@ -52,12 +52,12 @@ async def save(place: Place) -> None:
 async def restore(place: Place, *, keep: bool) -> None:
     """Restore what a motion left that was cut off, or let it stay as it is."""
     async with remote_drive(place) as (at, drive):
-        if not drive.owed:
+        if not drive.pending_restores:
             print(f"{drive.name}: nothing is pending")
             return
         if keep:
-            await at.ask("DELETE", f"/drives/{drive.id}/owed", DriveSummary)
-            for value in drive.owed:
+            await at.ask("DELETE", f"/drives/{drive.id}/pending-restores", DriveSummary)
+            for value in drive.pending_restores:
                 print(f"{drive.name}: {value.key} (was {value.raw}) stays as it is")
             return
         found = await at.result(f"/drives/{drive.id}/jobs/put-back", {})

@@ -26,8 +26,8 @@ def recall(drive: Drive, url: str, station: int) -> Pending:
         print(f"note: if this command is killed, nobody knows what to restore: {error}",
               file=sys.stderr)  # fmt: skip
 
-    keep_list(drive, known, in_motion=lambda: drive.owed.in_motion, failed=failed)
-    if drive.owed:
+    keep_list(drive, known, in_motion=lambda: drive.pending_restores.in_motion, failed=failed)
+    if drive.pending_restores:
         print(_notice(drive, known.pending, url, station), file=sys.stderr)
     if known.pending.held_by:
         print(f"note: {drive.name}: {known.pending.held_by} moves it now and has borrowed values",
@@ -46,7 +46,7 @@ async def restore_first(axis: Axis, pending: Pending) -> None:
     drive = axis.drive
     if pending.held_by:
         raise Busy("command.moves-now", drive=drive.name, held_by=pending.held_by)
-    if not drive.owed:
+    if not drive.pending_restores:
         return
     await stop_what_was_moved(axis, pending)
     show_restored(drive.name, await settle(axis, asked=False))
@@ -55,7 +55,7 @@ async def restore_first(axis: Axis, pending: Pending) -> None:
 async def stop_what_was_moved(axis: Axis, pending: Pending) -> None:
     """Quick stop of an axis that a process moved which was killed a moment ago."""
     if pending.moved:
-        axis.owes_stop = True
+        axis.stop_pending = True
         await axis.require_stop_delivered()
 
 
@@ -65,7 +65,7 @@ def require_own_values(drive: Drive) -> None:
     Raises:
         NotAllowed: something is pending.
     """
-    if drive.owed:
+    if drive.pending_restores:
         raise NotAllowed("command.values-motion-cut-off", drive=drive.name, values=_values(drive))
 
 
@@ -87,7 +87,7 @@ def _notice(drive: Drive, pending: Pending, url: str, station: int) -> str:
 
 
 def _values(drive: Drive) -> str:
-    return ", ".join(f"{value.key} (was {value.raw})" for value in drive.owed.debts)
+    return ", ".join(f"{value.key} (was {value.raw})" for value in drive.pending_restores.entries)
 
 
 def _name() -> str:

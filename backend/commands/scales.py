@@ -216,7 +216,8 @@ def _print(scales: tuple[Scale, ...], *, as_json: bool = False) -> None:
             {
                 "quantity": scale.quantity.value, "raw_per_unit": scale.raw_per_unit,
                 "raw_unit": scale.raw_unit, "origin": scale.origin.value,
-                "source": scale.source, "doubt": scale.doubt and scale.doubt.value,
+                "source": scale.source,
+                "uncertainty": scale.uncertainty and scale.uncertainty.value,
             }
             for scale in scales
         ]  # fmt: skip
@@ -236,7 +237,7 @@ def _print(scales: tuple[Scale, ...], *, as_json: bool = False) -> None:
 
 def _print_info(info: ScalesInfo, *, as_json: bool = False) -> None:
     scales = tuple(
-        Scale(s.quantity, s.raw_per_unit, s.raw_unit, s.origin, s.source, s.doubt)
+        Scale(s.quantity, s.raw_per_unit, s.raw_unit, s.origin, s.source, s.uncertainty)
         for s in info.scales
     )
     _print(scales, as_json=as_json)

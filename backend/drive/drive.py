@@ -12,10 +12,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from backend.drive.batches import asked_in_batches
 from backend.drive.change_marks import ChangeMarks
-from backend.drive.exclusive import Rest
+from backend.drive.exclusive import ExclusiveAccess
 from backend.drive.listeners import DriveListeners
 from backend.drive.motion_keys import command_keys, motion_keys
-from backend.drive.pending_restore import Owed
+from backend.drive.pending_restore import PendingRestores
 from backend.drive.ports import Port, address_of, carries
 from backend.drive.readings import CommandRecord, Reading, Refusal, WriteRecord
 from backend.drive.value_check import checked, named
@@ -61,8 +61,8 @@ class Drive:
         #: Who may move it: the bench's, or one of its own outside a server.
         self.authority = MotionAuthority() if authority is None else authority
         self.name = name
-        self.rest = Rest(name)
-        self.owed = Owed()
+        self.exclusive = ExclusiveAccess(name)
+        self.pending_restores = PendingRestores()
         self.notes = ""
         self.profile = profile
         self.ports = tuple(ports)
@@ -222,7 +222,7 @@ class Drive:
             )
         port = self.port_for(parameter)
         try:
-            async with self.rest.asking():
+            async with self.exclusive.asking():
                 data = await port.link.read(port.station, address_of(parameter))
             reading = self._reading(parameter, data)
         except DriveError as error:
@@ -264,7 +264,7 @@ class Drive:
                 groups.setdefault(position, []).append(parameter)
         done = len(result)
         for position, group in groups.items():
-            batches = asked_in_batches(self.ports[position], group, self.rest)
+            batches = asked_in_batches(self.ports[position], group, self.exclusive)
             async for chunk, answers in batches:
                 readings = self._taken(chunk, answers)
                 result.update({reading.key: reading for reading in readings})
@@ -315,7 +315,7 @@ class Drive:
     def _store(self, readings: list[Reading]) -> None:
         for reading in readings:
             self.readings[reading.key] = reading
-        self.owed.seen(readings)
+        self.pending_restores.seen(readings)
         self.listeners.read(readings)
 
     # --- writing ---------------------------------------------------------------------
@@ -351,7 +351,9 @@ class Drive:
             NotGranted: the grant is not for this object, or has ended.
         """
         parameter, raw = self._to_be_written(key, raw, raw=True)
-        self.require_grant(grant, parameter.key, restores=self.owed.restores(parameter.key, raw))
+        self.require_grant(
+            grant, parameter.key, restores=self.pending_restores.restores(parameter.key, raw)
+        )
         return await self._written(parameter, raw)
 
     async def put_back(self, key: str, raw: Raw) -> Reading:
@@ -437,7 +439,7 @@ class Drive:
         return reading
 
     async def _send_and_read(self, port: Port, parameter: Parameter, value: Raw) -> Reading:
-        async with self.rest.asking():
+        async with self.exclusive.asking():
             return await self._sent_and_read(port, parameter, value)
 
     async def _sent_and_read(self, port: Port, parameter: Parameter, value: Raw) -> Reading:
@@ -464,7 +466,7 @@ class Drive:
         after: Raw | None,
         problem: str = "",
     ) -> None:
-        self.owed.sent(parameter.key, wanted, after)
+        self.pending_restores.sent(parameter.key, wanted, after)
         record = WriteRecord(
             self.id, self.name, parameter.key, parameter.name, before, wanted, after, problem
         )
@@ -482,14 +484,14 @@ class Drive:
             )
 
     async def command(self, key: str, raw: int, grant: Grant) -> None:
-        """Write a motion object without reading back (set-points, control word).
+        """Write a motion object without reading back (setpoints, control word).
 
         Raises:
             NotGranted: the grant is not for this object, or has ended.
             DriveError: as `write`.
         """
         parameter = self.parameter(key)
-        restores = self.owed.restores(parameter.key, raw)
+        restores = self.pending_restores.restores(parameter.key, raw)
         self.require_grant(grant, parameter.key, restores=restores)
         await self._sent(parameter, raw)
 
@@ -530,8 +532,8 @@ class Drive:
 
     async def _sent(self, parameter: Parameter, raw: int) -> None:
         port = self.port_for(parameter)
-        self.rest.interrupt()
-        self.owed.commanded(parameter.key, raw)
+        self.exclusive.interrupt()
+        self.pending_restores.commanded(parameter.key, raw)
         try:
             await port.link.write(port.station, address_of(parameter), encode(parameter.type, raw))
         except BaseException as error:

@@ -20,11 +20,11 @@ from drivers.errors import Busy
 _PATIENCE_S = 2.5
 
 
-class Resting(Busy):
+class ExclusiveAccessHeld(Busy):
     """The drive is left alone; nothing was asked."""
 
 
-class Rest:
+class ExclusiveAccess:
     """Who may ask a drive now. For the event loop; a task that asks may ask within that again."""
 
     def __init__(self, drive: str) -> None:
@@ -45,7 +45,7 @@ class Rest:
         """Begins when every request of others has ended; they stay away for ``seconds``.
 
         Raises:
-            Resting: another task has the drive alone already.
+            ExclusiveAccessHeld: another task has the drive alone already.
         """
         task = asyncio.current_task()
         self._refuse()
@@ -66,7 +66,7 @@ class Rest:
         """Around a request to the drive; waits for the end of a short rest.
 
         Raises:
-            Resting: the drive is left alone for longer than that.
+            ExclusiveAccessHeld: the drive is left alone for longer than that.
         """
         task = asyncio.current_task()
         while self._alone not in (None, task) and task not in self._asking:
@@ -95,4 +95,4 @@ class Rest:
         if self._alone is None:
             return
         left_s = max(self._until - time.monotonic(), 0.0)
-        raise Resting("drive.must-not-asked-another", drive=self._drive, left_s=left_s)
+        raise ExclusiveAccessHeld("drive.must-not-asked-another", drive=self._drive, left_s=left_s)

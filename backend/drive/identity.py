@@ -17,7 +17,7 @@ async def read_serial(drive: Drive) -> int | None:
         if port.link.traits.registers:
             continue
         try:
-            async with drive.rest.asking():
+            async with drive.exclusive.asking():
                 data = await port.link.read(port.station, Address(0x1018, 4, "UINT32"))
         except (Rejected, NotAllowed):
             continue

@@ -1,4 +1,4 @@
-"""What was changed for the length of a motion and could not be put back: owed to the drive."""
+"""The restore list of a drive: values changed for a motion that could not be restored yet."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from profiles.schema import Raw
 
 
 @dataclass(frozen=True, slots=True)
-class Debt:
+class PendingRestore:
     """One parameter that may still hold what was meant for a while; raw values.
 
     ``left`` is what it holds if nobody changed it since: empty where that is not known.
@@ -36,18 +36,18 @@ def _no_note(*, durable: bool = False) -> None:
     """Nobody keeps the list."""
 
 
-class Owed:
-    """The debts to one drive, in the order in which they arose. For the event loop."""
+class PendingRestores:
+    """Pending restores of one drive, in the order in which they arose. For the event loop."""
 
     def __init__(self) -> None:
-        self._debts: dict[str, Debt] = {}
-        self._lent: dict[str, list[Raw]] = {}
+        self._entries: dict[str, PendingRestore] = {}
+        self._borrowed: dict[str, list[Raw]] = {}
         self._sent: dict[str, frozenset[Raw]] = {}
         self._listeners: list[Callable[[], None]] = []
         self._note: Note = _no_note
 
     def __bool__(self) -> bool:
-        return bool(self._debts)
+        return bool(self._entries)
 
     def listen(self, listener: Callable[[], None]) -> None:
         """Call ``listener`` after every change of the list."""
@@ -57,106 +57,108 @@ class Owed:
         """Call ``note`` after every change of `outstanding`; durable before a value changes."""
         self._note = note
 
-    def recall(self, debts: Iterable[Debt]) -> None:
+    def recall(self, entries: Iterable[PendingRestore]) -> None:
         """What a process that is no more has left."""
-        for debt in debts:
-            self._debts[debt.key] = debt
-            self._sent[debt.key] = debt.left
+        for entry in entries:
+            self._entries[entry.key] = entry
+            self._sent[entry.key] = entry.left
 
     @contextmanager
-    def lent(self, values: Mapping[str, Raw]) -> Iterator[None]:
+    def borrowed(self, values: Mapping[str, Raw]) -> Iterator[None]:
         """Around a motion that changes these raw values and puts them back when it ends."""
-        lent = dict(values)
-        for key, raw in lent.items():
-            self._lent.setdefault(key, []).append(raw)
-        if lent:
+        borrowed = dict(values)
+        for key, raw in borrowed.items():
+            self._borrowed.setdefault(key, []).append(raw)
+        if borrowed:
             self._note(durable=True)
         try:
             yield
         finally:
-            for key in lent:
-                self._lent[key].pop()
-                if not self._lent[key]:
-                    del self._lent[key]
+            for key in borrowed:
+                self._borrowed[key].pop()
+                if not self._borrowed[key]:
+                    del self._borrowed[key]
             self._note()
 
     @property
-    def outstanding(self) -> tuple[Debt, ...]:
-        """What would be owed if this process ended now, without a chance to put anything back."""
-        lent = {
-            key: Debt(key, raws[0], self._sent.get(key, frozenset()))
-            for key, raws in self._lent.items()
+    def outstanding(self) -> tuple[PendingRestore, ...]:
+        """What would be pending if this process ended now, without restoring anything."""
+        borrowed = {
+            key: PendingRestore(key, raws[0], self._sent.get(key, frozenset()))
+            for key, raws in self._borrowed.items()
         }
-        return tuple((lent | self._debts).values())
+        return tuple((borrowed | self._entries).values())
 
     @property
     def in_motion(self) -> bool:
         """A motion goes on that has changed something for its length."""
-        return bool(self._lent)
+        return bool(self._borrowed)
 
     @property
-    def debts(self) -> tuple[Debt, ...]:
-        """All that is owed."""
-        return tuple(self._debts.values())
+    def entries(self) -> tuple[PendingRestore, ...]:
+        """All pending restores."""
+        return tuple(self._entries.values())
 
     @property
     def unapplied(self) -> bool:
         """Something that is back does not act yet."""
-        return any(debt.unapplied for debt in self._debts.values())
+        return any(entry.unapplied for entry in self._entries.values())
 
     def add(self, values: Mapping[str, Raw], *, unapplied: bool = False) -> None:
         """These raw values could not be put back, or (``unapplied``) not made to act."""
         for key, raw in values.items():
-            known = self._debts.get(key)
+            known = self._entries.get(key)
             left = self._sent.get(key, frozenset())
             raw = self.original(key, raw)  # noqa: PLW2901
-            self._debts[key] = Debt(key, raw, left | (known.left if known else left), unapplied)
+            self._entries[key] = PendingRestore(
+                key, raw, left | (known.left if known else left), unapplied
+            )
         if values:
             self._changed()
 
     def sent(self, key: str, wanted: Raw, after: Raw | None) -> None:
         """A write went out; ``after`` is what was read back, None where that is not known.
 
-        Whoever writes something else to what is owed has other plans: it is offered, not done.
+        After a write of another value by a person, the restore is offered and not done.
         """
         earlier = self._sent.get(key, frozenset())
         self._sent[key] = earlier | {wanted} if after is None else frozenset({after})
-        debt = self._debts.get(key)
-        if debt is not None and wanted != debt.raw:
-            self._debts[key] = replace(debt, left=frozenset())
-        if debt is not None or key in self._lent:
+        entry = self._entries.get(key)
+        if entry is not None and wanted != entry.raw:
+            self._entries[key] = replace(entry, left=frozenset())
+        if entry is not None or key in self._borrowed:
             self._note()
 
     def original(self, key: str, raw: Raw) -> Raw:
         """What it was before all motions that have changed it; ``raw`` where none has."""
-        return self._lent[key][0] if key in self._lent else raw
+        return self._borrowed[key][0] if key in self._borrowed else raw
 
-    def lends(self, key: str) -> bool:
+    def borrows(self, key: str) -> bool:
         """A motion has changed this for its length, and puts it back."""
-        return key in self._lent
+        return key in self._borrowed
 
     def restores(self, key: str, raw: Raw) -> bool:
         """Whether writing this raw value puts back what a motion has changed."""
-        debt = self._debts.get(key)
-        return raw in self._lent.get(key, ()) or (debt is not None and debt.raw == raw)
+        entry = self._entries.get(key)
+        return raw in self._borrowed.get(key, ()) or (entry is not None and entry.raw == raw)
 
     def commanded(self, key: str, raw: Raw) -> None:
         """A motion object is about to be written, which nobody reads back.
 
-        Only the mode is ever lent of these; set-points and control words leave no trace here.
+        Only the mode of these is ever borrowed; setpoints and control words leave no trace here.
         """
-        if key in self._lent or key in self._debts:
+        if key in self._borrowed or key in self._entries:
             self.sent(key, raw, None)
 
     def seen(self, readings: Iterable[Reading]) -> None:
-        """What a drive holds as it should is owed no longer."""
-        debts = self._debts
-        gone = [r.key for r in readings if r.key in debts and r.raw == debts[r.key].raw]
-        self.settle([key for key in gone if not debts[key].unapplied])
+        """A parameter that holds its original value again is no longer pending."""
+        entries = self._entries
+        gone = [r.key for r in readings if r.key in entries and r.raw == entries[r.key].raw]
+        self.settle([key for key in gone if not entries[key].unapplied])
 
     def settle(self, keys: Iterable[str]) -> None:
         """These are back, or shall stay as they are."""
-        gone = [key for key in keys if self._debts.pop(key, None) is not None]
+        gone = [key for key in keys if self._entries.pop(key, None) is not None]
         if gone:
             self._changed()
 

@@ -305,12 +305,12 @@ class ForcingSessions:
         return {"reason": session.reason}
 
     async def _act(self, session: ForcingSession) -> None:
-        """Make what was put back act; where that fails it is owed like the values themselves."""
+        """Make what was put back act; where that fails it is pending like the values themselves."""
         drive = session.axis.drive
         try:
             await apply_settings(session.axis, session.keys)
         except BaseException:
-            drive.owed.add(session.before, unapplied=True)
+            drive.pending_restores.add(session.before, unapplied=True)
             raise
 
     async def _watch(self, session: ForcingSession, progress: Progress) -> None:

@@ -66,7 +66,7 @@ async def write_gear(axis: Axis, values: Sequence[GearValue]) -> GearChange:
         before[value.parameter.key] = await drive.raw(value.parameter.key)
     done: list[str] = []
     # For the next server, should this one be killed with half a gear written.
-    with drive.owed.lent(before):
+    with drive.pending_restores.borrowed(before):
         try:
             await _write_all(axis, values, before, done)
         except BaseException as error:
@@ -110,6 +110,6 @@ async def _put_back(axis: Axis, before: dict[str, int], error: BaseException) ->
             await axis.drive.write(key, raw)
         except DriveError as other:
             left.append(text("functions.value-not-restored", key=key, raw=raw, cause=other.text))
-            axis.drive.owed.add({key: raw})
+            axis.drive.pending_restores.add({key: raw})
     if left and isinstance(error, DriveError):
         error.text = text("functions.not-restored", cause=error.text, left=joined(left))

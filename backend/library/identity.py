@@ -18,7 +18,7 @@ _WORDS: dict[What, str] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Doubt:
+class Difference:
     """Something of the identity that differs. ``other_drive``: it is another one for certain."""
 
     what: What
@@ -34,7 +34,7 @@ class Doubt:
         return f"it was saved from {_WORDS[self.what]} {self.theirs}, this drive has {self.ours}"
 
 
-def doubts(content: ParameterSet, drive: Drive) -> list[Doubt]:
+def differences(content: ParameterSet, drive: Drive) -> list[Difference]:
     """What differs of what both sides know, the gravest first (CiA 301, object 1018h)."""
     found = drive.found
     if found is None:
@@ -47,7 +47,7 @@ def doubts(content: ParameterSet, drive: Drive) -> list[Doubt]:
         ("firmware", content.firmware or None, found.firmware or None),
     ]
     return [
-        Doubt(what, str(theirs), str(ours))
+        Difference(what, str(theirs), str(ours))
         for what, theirs, ours in pairs
         if theirs is not None and ours is not None and theirs != ours
     ]

@@ -45,7 +45,7 @@ _SET = Door(
     f"PUT {_DRIVE}/motion-settings/{{key}}",
     text("motion.door-set"),
 )
-#: Roles that are the power state; every other role that energises is a set-point.
+#: Roles that are the power state; every other role that energises is a setpoint.
 _POWER_ROLES = frozenset({"control_word", "mode"})
 
 

@@ -83,7 +83,7 @@ class Difference:
 def storable(profile: Profile, *, motor_individual: bool) -> list[Parameter]:
     """Parameters that belong into a set: readable and writable settings.
 
-    Left out: commands and set-points, the communication area 1000h–1FFFh (its mapping objects
+    Left out: commands and setpoints, the communication area 1000h–1FFFh (its mapping objects
     depend on the master), and what belongs to one motor unless asked for.
     """
     commands = {

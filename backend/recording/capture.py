@@ -98,7 +98,7 @@ class FaultCapture:
         """Follow the cyclic exchanges as they start and end."""
         for drive in [d for d in self._taps if not self._cyclic_keys(d)]:
             self._untap(drive)
-        for drive in self._bench.members:
+        for drive in self._bench.connected_drives:
             keys = self._cyclic_keys(drive)
             old = self._taps.get(drive)
             if old is not None and [k for _, k in old.channels] != keys:
@@ -110,12 +110,12 @@ class FaultCapture:
                 self._taps[drive] = tap
 
     def _cyclic_keys(self, drive_id: str) -> list[str]:
-        member = self._bench.members.get(drive_id)
-        session = member.axis.session if member is not None else None
-        if member is None or session is None:
+        connected = self._bench.connected_drives.get(drive_id)
+        session = connected.axis.session if connected is not None else None
+        if connected is None or session is None:
             return []
-        keys = [member.drive.key(role) for role in (*INPUT_ROLES, *OUTPUT_ROLES)]
-        return [key for key in keys if key and session.carries(member.drive, key)]
+        keys = [connected.drive.key(role) for role in (*INPUT_ROLES, *OUTPUT_ROLES)]
+        return [key for key in keys if key and session.carries(connected.drive, key)]
 
     def _untap(self, drive: str) -> None:
         tap = self._taps.pop(drive)
@@ -159,15 +159,15 @@ class FaultCapture:
         if not new:
             return
         text = ", ".join(f"{f.code} {f.name}" for f in new)
-        member = self._bench.members.get(drive)
+        connected = self._bench.connected_drives.get(drive)
         self._on_fault(drive, text)
-        if member is None or not self.armed:
+        if connected is None or not self.armed:
             return
         at = time.monotonic()
         if all(at - self._told.get((drive, f.code), -PAUSE_S) < PAUSE_S for f in new):
             return
         self._told |= {(drive, f.code): at for f in new}
-        self._pending.append(f"{member.drive.name}: {text}")
+        self._pending.append(f"{connected.drive.name}: {text}")
         if self._task is None or self._task.done():
             self._task = asyncio.create_task(self._freeze(time.time()), name="fault-capture")
 
@@ -241,15 +241,20 @@ class FaultCapture:
         # The rings go on; what matters is taken before the slow reading of parameters.
         self._forget_old()
         blocks, values = [(tap, b) for _, tap, b in self._blocks], list(self._values)
-        members = list(self._bench.members.values())
-        states = [facts.state(member) for member in members]
+        connected_drives = list(self._bench.connected_drives.values())
+        states = [facts.state(connected) for connected in connected_drives]
         frames = await flights(self._bench.buses.opened)
         clock = {"sample_s": time.monotonic(), "epoch_s": time.time()}
         rows, pasts = await asyncio.gather(
             asyncio.gather(
-                *(facts.parameters(m, fresh=True, timeout_s=READ_TIMEOUT_S) for m in members)
+                *(
+                    facts.parameters(m, fresh=True, timeout_s=READ_TIMEOUT_S)
+                    for m in connected_drives
+                )
             ),
-            asyncio.gather(*(facts.past_faults(m, timeout_s=READ_TIMEOUT_S) for m in members)),
+            asyncio.gather(
+                *(facts.past_faults(m, timeout_s=READ_TIMEOUT_S) for m in connected_drives)
+            ),
         )
         taps = [t for t in dict.fromkeys(tap for tap, _ in blocks) if self._known(t)]
         return Evidence(
@@ -257,13 +262,13 @@ class FaultCapture:
             time=when,
             version=__version__,
             axes=[
-                facts.identity(self._bench, member)
+                facts.identity(self._bench, connected)
                 | {"state": state, "parameters": parameters, "past_faults": past}
-                for member, state, parameters, past in zip(
-                    members, states, rows, pasts, strict=True
+                for connected, state, parameters, past in zip(
+                    connected_drives, states, rows, pasts, strict=True
                 )
             ],
-            links=facts.links(self._bench, members),
+            links=facts.links(self._bench, connected_drives),
             log=self._bench.journal.entries()[:LOG_ENTRIES],
             history=values,
             streams=describe_streams(self._bench, [(True, tap.channels) for tap in taps]),
@@ -277,14 +282,14 @@ class FaultCapture:
         """What the values are, for those who read the page without the station."""
         names = {}
         for drive_id, key in {(v.drive, v.key) for v in values}:
-            if (member := self._bench.members.get(drive_id)) is not None:
-                parameter = member.drive.parameter(key)
+            if (connected := self._bench.connected_drives.get(drive_id)) is not None:
+                parameter = connected.drive.parameter(key)
                 unit = f" [{parameter.unit}]" if parameter.unit else ""
-                names[drive_id, key] = f"{member.drive.name} {parameter.name}{unit}"
+                names[drive_id, key] = f"{connected.drive.name} {parameter.name}{unit}"
         return names
 
     def _known(self, tap: _Tap) -> bool:
-        return all(drive in self._bench.members for drive, _ in tap.channels)
+        return all(drive in self._bench.connected_drives for drive, _ in tap.channels)
 
     def _path_for(self, reason: str, when: float) -> Path:
         stamp = datetime.fromtimestamp(when, UTC).strftime("%Y-%m-%d %H-%M-%S")

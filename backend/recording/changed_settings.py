@@ -22,8 +22,8 @@ class ChangedSettings:
 
     def begin(self) -> None:
         """What is known of the drives by now is what they had before."""
-        for drive_id, member in self._bench.members.items():
-            for key, reading in member.drive.readings.items():
+        for drive_id, connected in self._bench.connected_drives.items():
+            for key, reading in connected.drive.readings.items():
                 if reading.raw is not None:
                     self._known.setdefault((drive_id, key), reading.raw)
 
@@ -33,10 +33,10 @@ class ChangedSettings:
 
     def among(self, drive_id: str, readings: Iterable[Reading]) -> list[tuple[str, str]]:
         """Key and words of each setting that is another one now."""
-        member = self._bench.members.get(drive_id)
-        if member is None:
+        connected = self._bench.connected_drives.get(drive_id)
+        if connected is None:
             return []
-        drive, found = member.drive, []
+        drive, found = connected.drive, []
         commands = {drive.key(role) for role in _COMMANDS}
         for reading in readings:
             if reading.raw is None or reading.key in commands:

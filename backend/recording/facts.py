@@ -13,7 +13,7 @@ from backend.drive.drive import Drive
 from backend.drive.readings import Reading
 from backend.parameters import set_file as parameter_set
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from drivers.errors import DriveError
 from drivers.texts.answers import sentence
 
@@ -21,9 +21,9 @@ from drivers.texts.answers import sentence
 GEARING_TIMEOUT_S = 2.0
 
 
-def identity(bench: Bench, member: Member) -> dict[str, Any]:
+def identity(bench: Bench, connected: ConnectedDrive) -> dict[str, Any]:
     """Who the axis is."""
-    drive = member.drive
+    drive = connected.drive
     found = drive.found
     return {
         "drive": drive.id,
@@ -37,13 +37,15 @@ def identity(bench: Bench, member: Member) -> dict[str, Any]:
     }
 
 
-async def parameters(member: Member, *, fresh: bool, timeout_s: float) -> list[dict[str, Any]]:
+async def parameters(
+    connected: ConnectedDrive, *, fresh: bool, timeout_s: float
+) -> list[dict[str, Any]]:
     """Settings of the drive with the time each was read; what cannot be read says why.
 
     ``fresh`` reads all of them now, else only those that were never read. After ``timeout_s``
     it goes on with what it has.
     """
-    drive = member.drive
+    drive = connected.drive
     wanted = [
         p.key
         for p in parameter_set.storable(drive.profile, motor_individual=True)
@@ -53,11 +55,11 @@ async def parameters(member: Member, *, fresh: bool, timeout_s: float) -> list[d
     with contextlib.suppress(DriveError, TimeoutError):
         async with asyncio.timeout(timeout_s):
             await drive.read_many(missing)
-    return [_row(member, drive.readings.get(key), key) for key in wanted]
+    return [_row(connected, drive.readings.get(key), key) for key in wanted]
 
 
-def _row(member: Member, reading: Reading | None, key: str) -> dict[str, Any]:
-    parameter = member.drive.parameter(key)
+def _row(connected: ConnectedDrive, reading: Reading | None, key: str) -> dict[str, Any]:
+    parameter = connected.drive.parameter(key)
     row: dict[str, Any] = {"key": key, "name": parameter.name, "unit": parameter.unit}
     if reading is None:
         return row | {"raw": None, "value": None, "time": None, "error": "not read"}
@@ -65,22 +67,22 @@ def _row(member: Member, reading: Reading | None, key: str) -> dict[str, Any]:
     return row | {"raw": raw, "value": value, "time": reading.time, "error": reading.error}
 
 
-async def gearing(member: Member) -> None:
+async def gearing(connected: ConnectedDrive) -> None:
     """Have the units of the axis known where its drive answers in time.
 
     Without them the drive's own units are shown.
     """
     with contextlib.suppress(DriveError, TimeoutError):
         async with asyncio.timeout(GEARING_TIMEOUT_S):
-            await member.axis.units()
+            await connected.axis.units()
 
 
-async def past_faults(member: Member, *, timeout_s: float) -> dict[str, Any]:
+async def past_faults(connected: ConnectedDrive, *, timeout_s: float) -> dict[str, Any]:
     """The drive's own fault record as far as reading is enough: ``records``, or ``why`` not.
 
     A record that is chosen by a write is left alone: nobody asked for a write.
     """
-    drive, history = member.drive, history_of(member.drive)
+    drive, history = connected.drive, history_of(connected.drive)
     if history is None or history.kind == "unreadable":
         return {"records": [], "why": "the drive has no record that can be read"}
     if history.kind == "selected":
@@ -88,7 +90,7 @@ async def past_faults(member: Member, *, timeout_s: float) -> dict[str, Any]:
         return {"records": [], "why": why}
     try:
         async with asyncio.timeout(timeout_s):
-            found = await read_history(member.axis)
+            found = await read_history(connected.axis)
     except (DriveError, TimeoutError) as error:
         return {"records": [], "why": str(error) or f"no answer within {timeout_s:g} s"}
     return {"records": [_past(drive, each) for each in found], "why": ""}
@@ -112,9 +114,9 @@ def _plain(value: object) -> object:
     return value.hex() if isinstance(value, bytes) else value
 
 
-def state(member: Member) -> dict[str, Any]:
+def state(connected: ConnectedDrive) -> dict[str, Any]:
     """The monitor's last snapshot."""
-    snapshot = member.monitor.snapshot
+    snapshot = connected.monitor.snapshot
     content = asdict(snapshot)
     content["state"] = str(snapshot.state)
     content |= sentence("problem", snapshot.problem)
@@ -132,15 +134,15 @@ def state(member: Member) -> dict[str, Any]:
     return content
 
 
-def links(bench: Bench, members: Sequence[Member]) -> list[dict[str, Any]]:
+def links(bench: Bench, connected_drives: Sequence[ConnectedDrive]) -> list[dict[str, Any]]:
     """Counters of every port."""
     return [
         {
-            "drive": member.drive.id,
+            "drive": connected.drive.id,
             "url": bench.buses.url_of(port),
             "station": port.station,
             **asdict(port.link.quality(port.station)),
         }
-        for member in members
-        for port in member.drive.ports
+        for connected in connected_drives
+        for port in connected.drive.ports
     ]

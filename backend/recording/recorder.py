@@ -145,7 +145,9 @@ class Recorder:
         """
         columns: dict[str, list[str]] = {}
         for drive, key in self.settings.channels:
-            columns.setdefault(drive, []).append(self._bench.member(drive).drive.parameter(key).key)
+            columns.setdefault(drive, []).append(
+                self._bench.connected(drive).drive.parameter(key).key
+            )
         axes = [await self._axis(drive) for drive in columns]
         try:
             self._subscribe(columns)
@@ -162,10 +164,10 @@ class Recorder:
         self._watch()
 
     async def _axis(self, drive: str) -> dict[str, Any]:
-        member = self._bench.member(drive)
-        rows = await facts.parameters(member, fresh=False, timeout_s=PARAMETERS_TIMEOUT_S)
-        await facts.gearing(member)
-        return facts.identity(self._bench, member) | {"parameters": rows}
+        connected = self._bench.connected(drive)
+        rows = await facts.parameters(connected, fresh=False, timeout_s=PARAMETERS_TIMEOUT_S)
+        await facts.gearing(connected)
+        return facts.identity(self._bench, connected) | {"parameters": rows}
 
     def _subscribe(self, columns: Mapping[str, Sequence[str]]) -> None:
         for drive, keys in columns.items():

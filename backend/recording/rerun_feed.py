@@ -178,14 +178,14 @@ class RerunFeed:
 
     def _wanted(self) -> dict[str, list[str]]:
         return {
-            drive: [key for role in ROLES if (key := member.drive.key(role))]
-            for drive, member in self._bench.members.items()
+            drive: [key for role in ROLES if (key := connected.drive.key(role))]
+            for drive, connected in self._bench.connected_drives.items()
         }
 
     def _signature(self) -> object:
         """What a change of the bench must change for the arrangement to be made anew."""
-        sessions = {d: id(m.axis.session) for d, m in self._bench.members.items()}
-        names = {d: m.drive.name for d, m in self._bench.members.items()}
+        sessions = {d: id(m.axis.session) for d, m in self._bench.connected_drives.items()}
+        names = {d: m.drive.name for d, m in self._bench.connected_drives.items()}
         return self._wanted(), sessions, names
 
     def _subscribe(self) -> list[Channel]:

@@ -84,13 +84,13 @@ class Recordings:
         """The same with the profile's keys, where makers' numbers were given."""
 
         def key(drive: str, given: str) -> str:
-            return self.bench.member(drive).drive.parameter(given).key
+            return self.bench.connected(drive).drive.parameter(given).key
 
         trigger = settings.trigger
         if trigger is not None and trigger.kind != "fault":
             trigger = replace(trigger, key=key(trigger.drive, trigger.key))
         elif trigger is not None and trigger.drive:
-            self.bench.member(trigger.drive)
+            self.bench.connected(trigger.drive)
         channels = tuple((drive, key(drive, given)) for drive, given in settings.channels)
         return replace(settings, channels=channels, trigger=trigger)
 

@@ -20,7 +20,7 @@ def describe_streams(
     names: dict[tuple[str, str], str] = {}
     for _, channels in streams:
         for drive_id, key in channels:
-            drive = bench.member(drive_id).drive
+            drive = bench.connected(drive_id).drive
             name = f"{drive.name} {drive.parameter(key).name}"
             names[drive_id, key] = f"{name} {key}" if name in names.values() else name
     return [
@@ -30,7 +30,7 @@ def describe_streams(
                 _units(bench, drive_id, key)
                 | {
                     "drive": drive_id,
-                    "drive_name": bench.member(drive_id).drive.name,
+                    "drive_name": bench.connected(drive_id).drive.name,
                     "key": key,
                     "name": names[drive_id, key],
                 }
@@ -42,11 +42,11 @@ def describe_streams(
 
 
 def _units(bench: Bench, drive_id: str, key: str) -> dict[str, Any]:
-    member = bench.member(drive_id)
-    parameter = member.drive.parameter(key)
+    connected = bench.connected(drive_id)
+    parameter = connected.drive.parameter(key)
     own: dict[str, Any] = {"unit": parameter.unit}
-    known = member.axis.known_units
-    unit, factor = axis_scale(known, member.drive, parameter) if known else ("", None)
+    known = connected.axis.known_units
+    unit, factor = axis_scale(known, connected.drive, parameter) if known else ("", None)
     if factor is None:
         return own | {"shown_unit": parameter.unit, "shown_factor": 1.0}
     return own | {"shown_unit": unit, "shown_factor": factor}

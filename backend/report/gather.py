@@ -15,7 +15,7 @@ from backend.report.changes import Change, net
 from backend.report.facts import ChangedSetting, Facts, HandedOverFile, Identity, Measured
 from backend.report.views import view_of
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.station.evaluation import evaluate
 from backend.tools.registry import TOOLS
 from drivers.errors import DriveError, NotAllowed
@@ -116,15 +116,15 @@ def _measured(store: MeasurementStore, file: str) -> Measured:
 
 
 async def live_facts(
-    bench: Bench, member: Member, changes: Sequence[Change], about: About
+    bench: Bench, connected: ConnectedDrive, changes: Sequence[Change], about: About
 ) -> Facts:
     """Everything but the measurements; values that were changed are read from the drive now.
 
     A drive that does not answer is told in the report, and fails nothing.
     """
-    drive = member.drive
+    drive = connected.drive
     settings, trouble = await _changes(drive, changes)
-    snapshot = member.monitor.snapshot
+    snapshot = connected.monitor.snapshot
     if not snapshot.fresh:
         trouble.append(f"{drive.name}: {snapshot.problem or 'does not answer'}")
     trouble += [f"{fault.code} {fault.name}" for fault in snapshot.faults]

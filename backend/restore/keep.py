@@ -22,14 +22,15 @@ def keep_list(
     ``in_motion`` says whether the next process has to stop the axis, ``failed`` is called once per
     failure of the disk: a motion goes on without a list, as people are told then.
     """
-    drive.owed.recall(known.pending.values)
+    drive.pending_restores.recall(known.pending.values)
     well = True
 
     def note(*, durable: bool = False) -> None:
         nonlocal well
         try:
             known.write(
-                drive.owed.outstanding, in_motion=in_motion(), identity=identity_of(drive),
+                drive.pending_restores.outstanding, in_motion=in_motion(),
+                identity=identity_of(drive),
                 durable=durable,
             )  # fmt: skip
         except StorageFailed as error:
@@ -39,4 +40,4 @@ def keep_list(
         else:
             well = True
 
-    drive.owed.keep(note)
+    drive.pending_restores.keep(note)

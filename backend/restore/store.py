@@ -18,7 +18,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from backend.drive.pending_restore import Debt
+from backend.drive.pending_restore import PendingRestore
 from backend.restore.identity import DriveIdentity
 from backend.restore.process import lives, this_process
 from backend.store.files import StorageFailed, write_atomically
@@ -76,7 +76,7 @@ class Pending:
     moves this drive with borrowed values now, and ``serial`` that of the drive which was here.
     """
 
-    values: tuple[Debt, ...] = ()
+    values: tuple[PendingRestore, ...] = ()
     since: float = 0.0
     by: str = ""
     moved: bool = False
@@ -96,8 +96,8 @@ class RestoreList:
     _taken_over: list[Path] = field(default_factory=list)
 
     def write(
-        self, values: Sequence[Debt], *, in_motion: bool, identity: DriveIdentity | None = None,
-        durable: bool = False,
+        self, values: Sequence[PendingRestore], *, in_motion: bool,
+        identity: DriveIdentity | None = None, durable: bool = False,
     ) -> None:  # fmt: skip
         """Note what is borrowed or pending now instead of what was; nothing takes the file away.
 
@@ -144,7 +144,7 @@ class RestoreStore:
         ``drive_id`` is the server's name of it, by which servers before this version noted it.
         """
         own = self._folder / f"{_slug(drive)}.json"
-        known, values = Pending(), dict[str, Debt]()
+        known, values = Pending(), dict[str, PendingRestore]()
         taken: list[Path] = []
         for file, note, noted in self._lists():
             if not note.identity.is_of(drive):
@@ -157,7 +157,7 @@ class RestoreStore:
                 continue
             taken.append(file)
             # The older list knows what it was before both.
-            values = {v.key: _debt(v) for v in note.values} | values
+            values = {v.key: _entry(v) for v in note.values} | values
             known = Pending(
                 tuple(values.values()), noted, note.by,
                 known.moved or (note.in_motion and abs(time.time() - noted) < A_MOMENT_S),
@@ -192,7 +192,7 @@ class RestoreStore:
         if None not in (note.serial, drive.serial) and note.serial != drive.serial:
             return known
         taken.append(file)
-        values = {v.key: v for v in known.values} | {v.key: _debt(v) for v in note.debts}
+        values = {v.key: v for v in known.values} | {v.key: _entry(v) for v in note.debts}
         moved = note.in_motion and abs(time.time() - noted) < A_MOMENT_S
         return Pending(
             tuple(values.values()), known.since or noted, known.by, known.moved or moved,
@@ -200,8 +200,8 @@ class RestoreStore:
         )  # fmt: skip
 
 
-def _debt(value: _Value) -> Debt:
-    return Debt(value.key, value.raw, frozenset(value.left), value.unapplied)
+def _entry(value: _Value) -> PendingRestore:
+    return PendingRestore(value.key, value.raw, frozenset(value.left), value.unapplied)
 
 
 def _slug(drive: DriveIdentity) -> str:

@@ -152,7 +152,7 @@ def plan_gear(profile: Profile, mechanics: Mechanics, encoder_counts: int | None
         raws = _by_ratio(profile, Fraction(counts) / wanted)
     values = tuple(GearValue(profile.by_key[key], raw) for key, raw in raws.items())
     reached = _reached(profile, raws, counts)
-    doubt = _check_bounds(profile, Fraction(counts) / reached)
+    uncertainty = _check_bounds(profile, Fraction(counts) / reached)
     travel = mechanics.travel_per_motor_turn()
     return GearPlan(
         unit=mechanics.unit,
@@ -165,7 +165,7 @@ def plan_gear(profile: Profile, mechanics: Mechanics, encoder_counts: int | None
         encoder_travel=float(travel / counts),
         range_travel=float(2**31 * _exact(mechanics.resolution)),
         warnings=tuple(
-            text for text in (doubt, *_warnings(mechanics, wanted, reached, counts)) if text
+            text for text in (uncertainty, *_warnings(mechanics, wanted, reached, counts)) if text
         ),
     )
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from backend.drive.drive import Drive
 from backend.drive.optional import existing
-from backend.scales.scale import Doubt, Origin, Quantity, Scale, Scales
+from backend.scales.scale import Origin, Quantity, Scale, Scales, Uncertainty
 from backend.scales.taught import Taught
 from profiles.schema import UnitSpec
 from profiles.si_unit import SiUnit, decode_si_unit
@@ -109,18 +109,18 @@ def _position(spec: UnitSpec, told: Told, said: Taught | None) -> Scale:
     if said is not None and said.counts_per_rev is not None:
         return Scale(Quantity.POSITION, said.counts_per_rev, name, Origin.USER)
     if code is not None and unit is None and code != 0:
-        return _doubtful(Quantity.POSITION, Doubt.UNREADABLE, source=f"60A8h = {code:08X}h")
+        return _uncertain(Quantity.POSITION, Uncertainty.UNREADABLE, source=f"60A8h = {code:08X}h")
     ratio = _ratio(spec, told)
     feed, resolution = _feed(spec, told), _resolution(told)
     trusted = origin_of(spec, Quantity.POSITION) is not Origin.UNKNOWN
     if not trusted and feed == 1.0 and (resolution or 1.0) > 1.0:
-        return _doubtful(Quantity.POSITION, Doubt.FEED_OF_ONE, name, "6092h, 608Fh")
+        return _uncertain(Quantity.POSITION, Uncertainty.FEED_OF_ONE, name, "6092h, 608Fh")
     if unit is not None and not unit.counts:
         return _by_unit(unit, name, feed, ratio)
     gear = _names(told, spec.gear_numerator, spec.gear_denominator)
     if spec.feed is not None and spec.feed in told.raws:
         if feed is None:
-            return _doubtful(Quantity.POSITION, Doubt.NO_RESOLUTION, name, _shown(spec.feed))
+            return _uncertain(Quantity.POSITION, Uncertainty.NO_RESOLUTION, name, _shown(spec.feed))
         source = _joined(_names(told, spec.feed, spec.feed_revolutions), gear)
         return Scale(Quantity.POSITION, feed / ratio, name, Origin.DRIVE, source)
     counts = told.encoder or resolution
@@ -128,7 +128,7 @@ def _position(spec: UnitSpec, told: Told, said: Taught | None) -> Scale:
         source = _joined([_shown(_RESOLUTION)] if resolution else ["encoder"], gear)
         return Scale(Quantity.POSITION, counts / ratio, name, Origin.DRIVE, source)
     if spec.counts_per_rev is None:
-        return _doubtful(Quantity.POSITION, Doubt.NO_RESOLUTION, name)
+        return _uncertain(Quantity.POSITION, Uncertainty.NO_RESOLUTION, name)
     origin = origin_of(spec, Quantity.POSITION)
     return Scale(Quantity.POSITION, spec.counts_per_rev / ratio, name, origin, spec.source)
 
@@ -138,11 +138,11 @@ def _by_unit(unit: SiUnit, name: str, feed: float | None, ratio: float) -> Scale
     turns = unit.turns
     if turns is None:
         if feed is None:
-            return _doubtful(Quantity.POSITION, Doubt.LINEAR, name, "60A8h")
+            return _uncertain(Quantity.POSITION, Uncertainty.LINEAR, name, "60A8h")
         return Scale(Quantity.POSITION, feed / ratio, name, Origin.DRIVE, "60A8h, 6092h")
     per_turn = 1.0 / (turns * unit.factor)
     if feed is not None and feed != 1.0 and abs(feed - per_turn) > _SAME * per_turn:
-        return _doubtful(Quantity.POSITION, Doubt.UNIT_AND_FEED, name, "60A8h, 6092h")
+        return _uncertain(Quantity.POSITION, Uncertainty.UNIT_AND_FEED, name, "60A8h, 6092h")
     return Scale(Quantity.POSITION, per_turn / ratio, name, Origin.DRIVE, "60A8h")
 
 
@@ -178,15 +178,15 @@ def _rate(
         origin = Origin.MEASURED if fast and said.velocity_origin == "measured" else Origin.USER
         return Scale(quantity, taught, unit.name if unit else "", origin)
     if (other := _other_factor(told, quantity)) is not None:
-        return _doubtful(quantity, Doubt.FACTOR, unit.name if unit else text, other)
+        return _uncertain(quantity, Uncertainty.FACTOR, unit.name if unit else text, other)
     if code is not None:
         source = f"{_shown(key)} = {code:08X}h"
         if unit is None:
-            return _doubtful(quantity, Doubt.UNREADABLE, source=source)
+            return _uncertain(quantity, Uncertainty.UNREADABLE, source=source)
         return _by_rate_unit(quantity, unit, per_rev, _ratio(spec, told), source)
     origin = origin_of(spec, quantity)
     if origin is Origin.UNKNOWN:
-        return _doubtful(quantity, Doubt.NOT_STATED)
+        return _uncertain(quantity, Uncertainty.NOT_STATED)
     return by_text(quantity, text, per_rev, origin, spec)
 
 
@@ -214,14 +214,14 @@ def _by_rate_unit(
 ) -> Scale:
     seconds = _seconds_of(quantity, unit)
     if seconds is None or not (unit.counts or unit.turns):
-        return _doubtful(quantity, Doubt.UNREADABLE, unit.name, source)
+        return _uncertain(quantity, Uncertainty.UNREADABLE, unit.name, source)
     if unit.counts:
         if per_rev is None:
-            return _doubtful(quantity, Doubt.NEEDS_RESOLUTION, unit.name, source)
+            return _uncertain(quantity, Uncertainty.NEEDS_RESOLUTION, unit.name, source)
         steps = per_rev
     else:
         if abs(ratio - 1.0) > _SAME:
-            return _doubtful(quantity, Doubt.BEHIND_GEAR, unit.name, f"{source}, 6091h")
+            return _uncertain(quantity, Uncertainty.BEHIND_GEAR, unit.name, f"{source}, 6091h")
         steps = 1.0 / (unit.turns or 1.0)
     # One rpm is 1/60 rev/s; one rpm/s is 1/60 rev/s².
     return Scale(quantity, steps * seconds / 60.0 / unit.factor, unit.name, Origin.DRIVE, source)
@@ -247,15 +247,15 @@ def by_text(
         known = spec.ramp_reference_rpm is not None
         return Scale(
             quantity, 1.0 if known else None, text, origin, spec.source,
-            None if known else Doubt.NOT_STATED,
+            None if known else Uncertainty.NOT_STATED,
         )  # fmt: skip
     found = _MULTIPLE.fullmatch(text)
     if found is None:
-        return _doubtful(quantity, Doubt.UNREADABLE, text, spec.source)
+        return _uncertain(quantity, Uncertainty.UNREADABLE, text, spec.source)
     step, bare = float(found[1] or 1.0), found[2]
     if bare.startswith(("inc", "pulse")):
         if per_rev is None:
-            return _doubtful(quantity, Doubt.NEEDS_RESOLUTION, text, spec.source)
+            return _uncertain(quantity, Uncertainty.NEEDS_RESOLUTION, text, spec.source)
         return Scale(quantity, per_rev / 60.0 / step, text, origin, spec.source)
     return Scale(quantity, 1.0 / step, text, origin, spec.source)
 
@@ -263,8 +263,10 @@ def by_text(
 # Parts ------------------------------------------------------------------------------------------
 
 
-def _doubtful(quantity: Quantity, doubt: Doubt, name: str = "", source: str = "") -> Scale:
-    return Scale(quantity, None, name, Origin.UNKNOWN, source, doubt)
+def _uncertain(
+    quantity: Quantity, uncertainty: Uncertainty, name: str = "", source: str = ""
+) -> Scale:
+    return Scale(quantity, None, name, Origin.UNKNOWN, source, uncertainty)
 
 
 def _names(told: Told, *keys: str | None) -> list[str]:

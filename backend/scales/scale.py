@@ -33,7 +33,7 @@ class Origin(StrEnum):
     UNKNOWN = "unknown"
 
 
-class Doubt(StrEnum):
+class Uncertainty(StrEnum):
     """Why a scale is not certain."""
 
     NO_RESOLUTION = "no_resolution"
@@ -56,18 +56,18 @@ class Doubt(StrEnum):
     """6090h is another encoder than 608Fh, or 6096h or 6097h holds a factor."""
 
 
-_WHY: Mapping[Doubt, str] = {
-    Doubt.NO_RESOLUTION: "increments per revolution are unknown",
-    Doubt.FEED_OF_ONE: "6092h says one unit per revolution beside the encoder of 608Fh, as a drive "
-    "does whose feed constant was never set",
-    Doubt.UNIT_AND_FEED: "60A8h and 6092h give different numbers of units for a revolution",
-    Doubt.LINEAR: "its unit is a length, and how far a revolution goes is unknown",
-    Doubt.NOT_STATED: "neither the drive nor its description says in which unit it is",
-    Doubt.UNREADABLE: "the unit that the drive or its description states is not known here",
-    Doubt.BEHIND_GEAR: "it counts turns, and 6091h holds a gear: of which shaft is not said",
-    Doubt.NEEDS_RESOLUTION: "it counts increments, and increments per revolution are unknown",
-    Doubt.FACTOR: "6090h is another resolution than 608Fh, or 6096h or 6097h holds a factor: what "
-    "the drive makes of it is not said",
+_WHY: Mapping[Uncertainty, str] = {
+    Uncertainty.NO_RESOLUTION: "increments per revolution are unknown",
+    Uncertainty.FEED_OF_ONE: "6092h says one unit per revolution beside the encoder of 608Fh, "
+    "as a drive does whose feed constant was never set",
+    Uncertainty.UNIT_AND_FEED: "60A8h and 6092h give different numbers of units for a revolution",
+    Uncertainty.LINEAR: "its unit is a length, and how far a revolution goes is unknown",
+    Uncertainty.NOT_STATED: "neither the drive nor its description says in which unit it is",
+    Uncertainty.UNREADABLE: "the unit that the drive or its description states is not known here",
+    Uncertainty.BEHIND_GEAR: "it counts turns, and 6091h holds a gear: of which shaft is not said",
+    Uncertainty.NEEDS_RESOLUTION: "it counts increments, and increments per revolution are unknown",
+    Uncertainty.FACTOR: "6090h is another resolution than 608Fh, or 6096h or 6097h holds a factor: "
+    "what the drive makes of it is not said",
 }
 
 
@@ -84,7 +84,7 @@ class Scale:
     raw_unit: str
     origin: Origin
     source: str = ""
-    doubt: Doubt | None = None
+    uncertainty: Uncertainty | None = None
 
     @property
     def certain(self) -> bool:
@@ -94,7 +94,7 @@ class Scale:
     @property
     def why(self) -> str:
         """Why it is not certain, as a part of a sentence; empty where it is."""
-        return "" if self.doubt is None else _WHY[self.doubt]
+        return "" if self.uncertainty is None else _WHY[self.uncertainty]
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +130,10 @@ class ScaleUnknown(NotAllowed):
 def what_to_do(scale: Scale) -> str:
     """How a scale that is not certain becomes so."""
     teach = "teach it under “Scales” on the Overview page, or by “servodeck scales teach”"
-    if scale.doubt in (Doubt.NO_RESOLUTION, Doubt.FEED_OF_ONE, Doubt.UNIT_AND_FEED):
+    if scale.uncertainty in (
+        Uncertainty.NO_RESOLUTION,
+        Uncertainty.FEED_OF_ONE,
+        Uncertainty.UNIT_AND_FEED,
+    ):
         return f"set feed constant and gear ratio on the Parameters page, or {teach}"
     return f"{teach}, or import the drive's own description"

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from backend.drive.drive import Drive
 from backend.drive.optional import existing
 from backend.scales.resolve import by_text, origin_of, read_told, scales_of
-from backend.scales.scale import Doubt, Origin, Quantity, Scale, Scales, ScaleUnknown
+from backend.scales.scale import Origin, Quantity, Scale, Scales, ScaleUnknown, Uncertainty
 from backend.scales.taught import Taught
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.motion.feedback import FeedbackScale
@@ -48,7 +48,7 @@ class AxisUnits:
         origin = origin_of(spec, Quantity.POSITION)
         position = Scale(
             Quantity.POSITION, per_rev, spec.position, origin, spec.source,
-            Doubt.NO_RESOLUTION if per_rev is None else None,
+            Uncertainty.NO_RESOLUTION if per_rev is None else None,
         )  # fmt: skip
         velocity, acceleration = (
             by_text(quantity, text, per_rev, Origin.MANUAL, spec)
@@ -88,7 +88,7 @@ class AxisUnits:
             if scale.certain:
                 scale = Scale(
                     Quantity.POSITION, None, scale.raw_unit, Origin.UNKNOWN,
-                    doubt=Doubt.NO_RESOLUTION,
+                    uncertainty=Uncertainty.NO_RESOLUTION,
                 )  # fmt: skip
             raise ScaleUnknown(self.drive, scale)
         return self.counts_per_rev

@@ -16,7 +16,7 @@ from backend.scales.units import AxisUnits
 from backend.scene.geometry import Track, Travel, track_of, travel_of
 from backend.scope.hub import Subscription
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.link import ScopeBlock
@@ -37,7 +37,7 @@ _LIMITS_S = 2.0
 class _Axis:
     """What the feed knows of one axis."""
 
-    member: Member
+    connected: ConnectedDrive
     units: AxisUnits
     mechanics: Mechanics | None
     travel: Travel
@@ -48,8 +48,8 @@ class _Axis:
     def take(self, block: ScopeBlock) -> None:
         """The newest position of a block; never blocks."""
         if len(block.samples) and np.isfinite(value := block.samples[-1, 0]):
-            key = self.member.drive.require("position_actual")
-            raw = self.member.drive.parameter(key).to_raw(float(value))
+            key = self.connected.drive.require("position_actual")
+            raw = self.connected.drive.parameter(key).to_raw(float(value))
             self.position_rev = self.units.position(raw)
 
 
@@ -139,25 +139,27 @@ class SceneFeed:
         """What a change of makes the scene be built anew."""
         return {
             drive: (m.drive.name, id(m.axis.session), self._mechanics_of(drive))
-            for drive, m in self._bench.members.items()
+            for drive, m in self._bench.connected_drives.items()
         }
 
     async def _axes(self) -> dict[str, _Axis]:
         axes: dict[str, _Axis] = {}
-        for drive, member in self._bench.members.items():
+        for drive, connected in self._bench.connected_drives.items():
             mechanics = self._mechanics_of(drive)
             travel = travel_of(mechanics)
             try:
-                units = await member.axis.units()
-                limits = await _software_limits(member.drive, units)
-                key = member.drive.require("position_actual")
+                units = await connected.axis.units()
+                limits = await _software_limits(connected.drive, units)
+                key = connected.drive.require("position_actual")
                 streams = [s for s, _ in self._bench.scope.subscribe(drive, [key], POLL_S)]
             except DriveError:
                 # It does not answer now; shown without movement, and tried again with the limits.
-                units = AxisUnits(member.drive.profile.units, None)
+                units = AxisUnits(connected.drive.profile.units, None)
                 limits, streams = None, []
-            here = member.monitor.snapshot.values.get("position") or 0.0
-            axis = _Axis(member, units, mechanics, travel, track_of(travel, here, limits), streams)
+            here = connected.monitor.snapshot.values.get("position") or 0.0
+            axis = _Axis(
+                connected, units, mechanics, travel, track_of(travel, here, limits), streams
+            )
             for stream in streams:
                 stream.sink = axis.take
             axes[drive] = axis
@@ -172,8 +174,8 @@ class SceneFeed:
     async def _limits_changed(self, axis: _Axis) -> bool:
         """Whether the limits are others now, or a silent drive answers again."""
         try:
-            units = await axis.member.axis.units()
-            limits = await _software_limits(axis.member.drive, units)
+            units = await axis.connected.axis.units()
+            limits = await _software_limits(axis.connected.drive, units)
         except DriveError:
             return False
         if not axis.streams or units != axis.units:
@@ -193,7 +195,7 @@ def _looks(axes: dict[str, _Axis]) -> dict[str, AxisLook]:
     from backend.scene.view import AxisLook
 
     return {
-        drive: AxisLook(axis.member.drive.name, axis.mechanics, axis.travel, axis.track)
+        drive: AxisLook(axis.connected.drive.name, axis.mechanics, axis.travel, axis.track)
         for drive, axis in axes.items()
     }
 
@@ -211,7 +213,7 @@ def _grow(axes: dict[str, _Axis]) -> bool:
 
 def _words(axis: _Axis) -> tuple[str, str]:
     """State for the colour, and what stands above the axis."""
-    snapshot = axis.member.monitor.snapshot
+    snapshot = axis.connected.monitor.snapshot
     state = "other"
     if snapshot.state is State.OPERATION_ENABLED:
         state = "enabled"

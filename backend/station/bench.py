@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from backend.audit.witness import Witness
+from backend.audit.recorder import AuditRecorder
 from backend.axis.axis import Axis
 from backend.axis.cyclic import CyclicSession
 from backend.axis.remembered import AxisStore
@@ -24,15 +24,15 @@ from backend.people.lease import Leases
 from backend.restore.store import RestoreStore
 from backend.scope.hub import ScopeHub
 from backend.station.buses import Buses
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.station.drive_list import DriveList, SavedDrive, SavedPort
 from backend.station.exchanges import Exchanges
 from backend.station.matching import profile_for
 from backend.station.monitor import Monitor, Snapshot
 from backend.station.motion import Motion
 from backend.station.naming import PlaceNames, new_id
+from backend.station.reconnection import Reconnection
 from backend.station.records import Records
-from backend.station.returning import Returning
 from backend.store.files import StorageFailed
 from backend.work.jobs import Job, JobRunner
 from backend.work.journal import Journal, Level
@@ -66,7 +66,7 @@ class Bench:
         self.audit = self.records.audit
         self.sets = self.records.sets
         self.measurements = MeasurementStore(state_folder / "measurements")
-        self.members: dict[str, Member] = {}
+        self.connected_drives: dict[str, ConnectedDrive] = {}
         self.on_snapshot: list[Callable[[str, Snapshot], None]] = []
         self.on_readings: list[Callable[[str, list[Reading]], None]] = []
         self.on_job: list[Callable[[Job], None]] = []
@@ -80,10 +80,10 @@ class Bench:
         self.exchanges = Exchanges(self)
         self.sessions = self.exchanges.running
         self.leases = Leases(self._lease_changed)
-        self.witness = Witness(self.audit, self.name_of)
-        self.on_job.append(self.witness.job_changed)
-        self.returning = Returning(self, RestoreStore(state_folder, "a server"))
-        self.scope = ScopeHub(lambda drive: self.member(drive).axis)
+        self.recorder = AuditRecorder(self.audit, self.name_of)
+        self.on_job.append(self.recorder.job_changed)
+        self.reconnection = Reconnection(self, RestoreStore(state_folder, "a server"))
+        self.scope = ScopeHub(lambda drive: self.connected(drive).axis)
         self.state_folder = state_folder
         self.axis_records = AxisStore(state_folder / "axes")
         self._list = DriveList(state_folder / "bench.json")
@@ -118,20 +118,20 @@ class Bench:
 
     # --- drives -----------------------------------------------------------------------
 
-    def member(self, drive_id: str) -> Member:
+    def connected(self, drive_id: str) -> ConnectedDrive:
         """The drive of this id.
 
         Raises:
             NotAllowed: there is none.
         """
-        member = self.members.get(drive_id)
-        if member is None:
+        connected = self.connected_drives.get(drive_id)
+        if connected is None:
             raise NotAllowed("station.no-drive-bench", drive=drive_id)
-        return member
+        return connected
 
     async def connect(
         self, url: str, station: int, profile: str, name: str = "", *, found: Found | None = None
-    ) -> Member:
+    ) -> ConnectedDrive:
         """Make a station a drive of the bench.
 
         Raises:
@@ -143,9 +143,9 @@ class Bench:
         facts, spec = profile_for(link.kind, profile)
         link.attach(station, facts)
         name = name or self._names.unused(
-            url, station, [m.drive.name for m in self.members.values()]
+            url, station, [m.drive.name for m in self.connected_drives.values()]
         )
-        drive_id = new_id(name or f"{profile}-{station}", self.members)
+        drive_id = new_id(name or f"{profile}-{station}", self.connected_drives)
         drive = Drive(
             drive_id, name or drive_id, facts, [Port(link, station, spec)], self.authority
         )
@@ -158,7 +158,7 @@ class Bench:
         url: str,
         station: int,
         check: Callable[[Drive, Port], Awaitable[None]] | None = None,
-    ) -> Member:
+    ) -> ConnectedDrive:
         """Connect a drive over a second bus, so that each parameter goes the way that carries it.
 
         ``check`` looks at the port before it is used, and raises what speaks against it.
@@ -166,9 +166,9 @@ class Bench:
         Raises:
             NotAllowed: its family has no such link. Busy: the station is in use.
         """
-        member = self.member(drive_id)
-        drive = member.drive
-        self.motion.require_idle(member)
+        connected = self.connected(drive_id)
+        drive = connected.drive
+        self.motion.require_idle(connected)
         link = await self.buses.open(url)
         self._require_free(link, url, station)
         spec = drive.profile.link(link.kind)
@@ -186,27 +186,27 @@ class Bench:
         if check is not None:
             await check(drive, port)
             self._require_free(link, url, station)
-            self.motion.require_idle(member)
+            self.motion.require_idle(connected)
         drive.ports = (*drive.ports, port)
         self._remember()
         self.journal.add(f"{drive.name} is reached over {url} too", drive=drive.id)
         self.drives_changed()
-        return member
+        return connected
 
     def _require_free(self, link: Link, url: str, station: int) -> None:
-        for member in self.members.values():
-            if any(p.link is link and p.station == station for p in member.drive.ports):
+        for connected in self.connected_drives.values():
+            if any(p.link is link and p.station == station for p in connected.drive.ports):
                 raise Busy(
                     "station.station-already-connected",
-                    drive=member.drive.name,
+                    drive=connected.drive.name,
                     url=url,
                     station=station,
                 )
 
-    def _add(self, drive: Drive) -> Member:
+    def _add(self, drive: Drive) -> ConnectedDrive:
         axis = Axis(drive)
         places = {(self.buses.url_of(port), port.station) for port in drive.ports}
-        axis.owes_stop = bool(places & self._unstopped)
+        axis.stop_pending = bool(places & self._unstopped)
         axis.unattended = partial(self.motion.unattended, drive.id)
         self._unstopped -= places
         drive_id = drive.id
@@ -215,27 +215,27 @@ class Bench:
             axis,
             self.journal,
             lambda snapshot: self._snapshot(drive_id, snapshot),
-            lambda: self.returning.returned(drive_id),
+            lambda: self.reconnection.returned(drive_id),
             lambda: self._may_turn(drive_id),
         )
-        member = Member(drive, axis, monitor)
-        self.members[drive_id] = member
+        connected = ConnectedDrive(drive, axis, monitor)
+        self.connected_drives[drive_id] = connected
         drive.listeners.add(lambda readings: self._readings(drive_id, readings))
-        drive.listeners.add_writes(self.witness.wrote)
-        drive.listeners.add_commands(self.witness.commanded)
-        drive.listeners.add_refusals(self.witness.refused)
-        drive.owed.listen(self.drives_changed)
-        self.returning.begin(axis)
+        drive.listeners.add_writes(self.recorder.wrote)
+        drive.listeners.add_commands(self.recorder.commanded)
+        drive.listeners.add_refusals(self.recorder.refused)
+        drive.pending_restores.listen(self.drives_changed)
+        self.reconnection.begin(axis)
         monitor.start()
         self._remember()
         self.journal.add(f"connected {drive.name} ({drive.profile.title})", drive=drive_id)
         self.drives_changed()
-        return member
+        return connected
 
     def _may_turn(self, drive_id: str) -> bool:
         """Whether something has been allowed to turn this axis, or it is being stopped."""
-        member = self.members.get(drive_id)
-        if member is None:
+        connected = self.connected_drives.get(drive_id)
+        if connected is None:
             return True
         moved = self.jobs.moving(drive_id) is not None or self.motion.stopping(drive_id)
         return moved or self.authority.grant_of(drive_id) is not None
@@ -246,38 +246,40 @@ class Bench:
         Raises:
             Busy: it is moving, or another axis moves through the exchange that would end with it.
         """
-        member = self.member(drive_id)
-        self.motion.require_stays(member)
-        self.motion.require_idle(member)
-        self.exchanges.require_idle_but(member)
-        with self.motion.parting(member):
+        connected = self.connected(drive_id)
+        self.motion.require_stays(connected)
+        self.motion.require_idle(connected)
+        self.exchanges.require_idle_but(connected)
+        with self.motion.parting(connected):
             # What STOP still has to do is done, and whoever pressed it gets the verdict.
             await self.motion.standstill([drive_id])
             await self.motion.end_watches(drive_id)
-            await self.motion.let_go_of(member)
+            await self.motion.let_go_of(connected)
             for url, session in list(self.sessions.items()):
-                if member.drive in session.drives:
-                    self.exchanges.require_idle_but(member)
+                if connected.drive in session.drives:
+                    self.exchanges.require_idle_but(connected)
                     await self.stop_cyclic(url)
-            if member.axis.owes_stop:
+            if connected.axis.stop_pending:
                 self._unstopped.update(
-                    (self.buses.url_of(p), p.station) for p in member.drive.ports
+                    (self.buses.url_of(p), p.station) for p in connected.drive.ports
                 )
-            del self.members[drive_id]
-            # Whoever takes it off has read what it is owed: on its axis' pages it stands first.
-            member.drive.owed.settle([debt.key for debt in member.drive.owed.debts])
-        await member.monitor.close()
+            del self.connected_drives[drive_id]
+            # Pending restores stand first on an axis' pages: whoever removes it has read them.
+            connected.drive.pending_restores.settle(
+                [entry.key for entry in connected.drive.pending_restores.entries]
+            )
+        await connected.monitor.close()
         self._remember()
         self.drives_changed()
 
-    def rename(self, drive_id: str, name: str | None, notes: str | None) -> Member:
+    def rename(self, drive_id: str, name: str | None, notes: str | None) -> ConnectedDrive:
         """Change name or notes; None leaves them.
 
         Raises:
             StorageFailed: they could not be stored and are as before.
         """
-        member = self.member(drive_id)
-        drive = member.drive
+        connected = self.connected(drive_id)
+        drive = connected.drive
         before = drive.name, drive.notes
         drive.name = drive.name if name is None else name
         drive.notes = drive.notes if notes is None else notes
@@ -287,13 +289,13 @@ class Bench:
             drive.name, drive.notes = before
             raise
         self.drives_changed()
-        return member
+        return connected
 
     # --- events -----------------------------------------------------------------------
 
     def _snapshot(self, drive_id: str, snapshot: Snapshot) -> None:
-        if (member := self.members.get(drive_id)) is not None:
-            self.returning.seen(member, snapshot)
+        if (connected := self.connected_drives.get(drive_id)) is not None:
+            self.reconnection.seen(connected, snapshot)
         for listener in self.on_snapshot:
             listener(drive_id, snapshot)
 
@@ -310,42 +312,42 @@ class Bench:
                 log.exception("a change of the job %s could not be told", job.id)
 
     def _lease_changed(self, drive_id: str) -> None:
-        self.witness.lease_changed(drive_id, self.leases.holder(drive_id))
+        self.recorder.lease_changed(drive_id, self.leases.holder(drive_id))
         self.drives_changed()
 
-    def tell(self, text: str, member: Member, level: Level = "info") -> None:
+    def tell(self, text: str, connected: ConnectedDrive, level: Level = "info") -> None:
         """A line of the journal about a drive; the list of drives may have changed with it."""
-        self.journal.add(text, level=level, drive=member.drive.id)
+        self.journal.add(text, level=level, drive=connected.drive.id)
         self.drives_changed()
 
     def name_of(self, drive_id: str) -> str:
         """Name of a drive, or its id where it is not on the bench."""
-        member = self.members.get(drive_id)
-        return member.drive.name if member is not None else drive_id
+        connected = self.connected_drives.get(drive_id)
+        return connected.drive.name if connected is not None else drive_id
 
     def drives_changed(self) -> None:
         """Tell everybody that the list of drives and buses may look different now."""
         for listener in self.on_drives:
             listener()
 
-    async def accept_identity(self, drive_id: str) -> Member:
+    async def accept_identity(self, drive_id: str) -> ConnectedDrive:
         """The user says that the drive at this place is the right one."""
-        member = self.member(drive_id)
-        drive = member.drive
+        connected = self.connected(drive_id)
+        drive = connected.drive
         serial = await read_serial(drive)
         drive.found = replace(drive.found or Found(drive.ports[0].station), serial=serial)
         drive.identity_warning = ""
         # What was said of the drive that was here before is no matter of this one.
-        member.axis.teach(None)
-        member.axis.small_moves = None
+        connected.axis.teach(None)
+        connected.axis.small_moves = None
         record = self.axis_records.get(drive_id)
         if record.scales is not None:
             self.axis_records.put(drive_id, record.model_copy(update={"scales": None}))
-        drive.owed.settle([debt.key for debt in drive.owed.debts])
+        drive.pending_restores.settle([entry.key for entry in drive.pending_restores.entries])
         self.journal.add(f"{drive.name}: serial number {serial} accepted", drive=drive.id)
         self._remember()
         self.drives_changed()
-        return member
+        return connected
 
     # --- over restarts ----------------------------------------------------------------
 
@@ -366,7 +368,7 @@ class Bench:
                 ports=tuple(SavedPort(self.buses.url_of(p), p.station) for p in m.drive.ports),
                 serial=m.drive.found.serial if m.drive.found else None,
             )
-            for m in self.members.values()
+            for m in self.connected_drives.values()
         )
 
     async def restore(self) -> None:
@@ -378,16 +380,16 @@ class Bench:
         for item in saved:
             try:
                 first, *others = item.ports
-                member = await self.connect(first.url, first.station, item.profile, item.name)
-                member.drive.notes = item.notes
+                connected = await self.connect(first.url, first.station, item.profile, item.name)
+                connected.drive.notes = item.notes
                 for other in others:
-                    await self.add_port(member.drive.id, other.url, other.station)
+                    await self.add_port(connected.drive.id, other.url, other.station)
             except (DriveError, ProfileError) as error:
                 self.journal.add(f"{item.name}: not connected: {error}", level="warning")
                 continue
             if item.serial is not None:
-                member.drive.found = Found(first.station, serial=item.serial)
-                self.returning.returned(member.drive.id)
+                connected.drive.found = Found(first.station, serial=item.serial)
+                self.reconnection.returned(connected.drive.id)
 
     async def close(self) -> None:
         """Stop what moves, then let go of every bus; what fails keeps nothing else from its end."""
@@ -401,5 +403,5 @@ class Bench:
             await self.jobs.close()
 
     async def _close_buses(self) -> None:
-        await asyncio.gather(*(m.monitor.close() for m in self.members.values()))
+        await asyncio.gather(*(m.monitor.close() for m in self.connected_drives.values()))
         await self.buses.close_all()

@@ -55,7 +55,11 @@ class Buses:
         Raises:
             Busy: drives use it. NotAllowed: it is not open.
         """
-        users = [m.drive.name for m in self._bench.members.values() if url in self.urls_of(m.drive)]
+        users = [
+            m.drive.name
+            for m in self._bench.connected_drives.values()
+            if url in self.urls_of(m.drive)
+        ]
         if users:
             raise Busy("station.used", url=url, users=", ".join(users))
         link = self.opened.pop(url, None)
@@ -89,9 +93,9 @@ class Buses:
             Busy: a drive of it is moving; a scan may reset what it finds.
         """
         link = await self.open(url)
-        for member in self._bench.members.values():
-            if any(port.link is link for port in member.drive.ports):
-                self._bench.motion.require_idle(member)
+        for connected in self._bench.connected_drives.values():
+            if any(port.link is link for port in connected.drive.ports):
+                self._bench.motion.require_idle(connected)
         with self._bench.exchanges.searching(url):
             found = await link.scan(progress, stations, stop_after=1 if stop_after_first else None)
         self._bench.journal.add(
@@ -103,7 +107,7 @@ class Buses:
         drive = next(
             (
                 m.drive
-                for m in self._bench.members.values()
+                for m in self._bench.connected_drives.values()
                 for p in m.drive.ports
                 if self.url_of(p) == url and event.station in (None, p.station)
             ),
@@ -115,7 +119,7 @@ class Buses:
             drive=drive.id if drive else None,
         )
         if drive is not None and event.kind in ("boot", "back"):
-            self._bench.returning.returned(drive.id)
+            self._bench.reconnection.returned(drive.id)
 
     async def close_all(self) -> None:
         """Let go of every bus; one that fails keeps no other open."""

@@ -7,7 +7,7 @@ from backend.drive.drive import Drive
 from backend.station.monitor import Monitor
 
 
-class Member:
+class ConnectedDrive:
     """A drive of the bench with its axis and monitor."""
 
     def __init__(self, drive: Drive, axis: Axis, monitor: Monitor) -> None:

@@ -13,7 +13,7 @@ from drivers.errors import Busy, DriveError, NotAllowed
 
 if TYPE_CHECKING:
     from backend.station.bench import Bench
-    from backend.station.connected_drive import Member
+    from backend.station.connected_drive import ConnectedDrive
 
 #: Why no motion may begin on a bus at present.
 _CHANGING = "the cyclic exchange is just being changed"
@@ -41,12 +41,14 @@ class Exchanges:
         """Exchange process data with all drives of a bus; see `Bench.start_cyclic`."""
         bench = self._bench
         link = await bench.buses.open(url)
-        users = [m for m in bench.members.values() if any(p.link is link for p in m.drive.ports)]
+        users = [
+            m for m in bench.connected_drives.values() if any(p.link is link for p in m.drive.ports)
+        ]
         if not users:
             raise NotAllowed("station.no-connected-drives", url=url)
-        for member in users:
-            if member.drive.id != in_job_of:
-                bench.motion.require_idle(member)
+        for connected in users:
+            if connected.drive.id != in_job_of:
+                bench.motion.require_idle(connected)
         self._require_settled(url)
         if (old := self.running.get(url)) is not None and old.running:
             raise Busy("station.cyclic-exchange-runs-already", url=url)
@@ -57,8 +59,8 @@ class Exchanges:
             session = CyclicSession(link, [m.drive for m in users], by_speed)
             await session.start(cycle_s)
             self.running[url] = session
-            for member in users:
-                member.axis.session = session
+            for connected in users:
+                connected.axis.session = session
         bench.journal.add(f"{url}: cyclic exchange every {cycle_s * 1e3:g} ms")
         bench.drives_changed()
         return session
@@ -97,31 +99,31 @@ class Exchanges:
     async def _stop_later(self, url: str, session: CyclicSession) -> None:
         jobs = self._bench.jobs
         while movers := self._movers(session):
-            for member in movers:
-                if (job := jobs.moving(member.drive.id)) is not None:
+            for connected in movers:
+                if (job := jobs.moving(connected.drive.id)) is not None:
                     await job.wait()
         if self.running.get(url) is session:
             with contextlib.suppress(DriveError):
                 await self.stop(url)
 
-    def _movers(self, session: CyclicSession) -> list[Member]:
+    def _movers(self, session: CyclicSession) -> list[ConnectedDrive]:
         """Axes of this exchange that a job moves."""
         bench = self._bench
-        users = [m for m in bench.members.values() if m.axis.session is session]
+        users = [m for m in bench.connected_drives.values() if m.axis.session is session]
         return [m for m in users if bench.jobs.moving(m.drive.id) is not None]
 
-    def require_idle_but(self, member: Member) -> None:
+    def require_idle_but(self, connected: ConnectedDrive) -> None:
         """The exchange of this axis' buses moves no other axis: it may be ended.
 
         Raises:
             Busy: another axis is moved through it.
         """
-        session = member.axis.session
+        session = connected.axis.session
         for other in [] if session is None else self._movers(session):
-            if other is not member:
+            if other is not connected:
                 raise Busy(
                     "station.shares-cyclic-exchange-moves",
-                    drive=member.drive.name,
+                    drive=connected.drive.name,
                     other_drive=other.drive.name,
                 )
 
@@ -174,9 +176,9 @@ class Exchanges:
         session = self.running.pop(url, None)
         if session is None:
             return
-        for member in self._bench.members.values():
-            if member.axis.session is session:
-                member.axis.session = None
+        for connected in self._bench.connected_drives.values():
+            if connected.axis.session is session:
+                connected.axis.session = None
         await session.stop()
         self._bench.journal.add(f"{url}: cyclic exchange ended")
         self._bench.drives_changed()

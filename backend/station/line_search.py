@@ -25,9 +25,9 @@ async def search_line(
         raise NotAllowed("station.no-baud-rate-parity", value=url)
     same = [known for known in bench.buses.opened if parse_url(known).place == wanted.place]
     users = [
-        member.drive.name
-        for member in bench.members.values()
-        if any(bench.buses.url_of(port) in same for port in member.drive.ports)
+        connected.drive.name
+        for connected in bench.connected_drives.values()
+        if any(bench.buses.url_of(port) in same for port in connected.drive.ports)
     ]
     if users:
         raise Busy("station.used-take-drives", place=wanted.place, users=", ".join(users))

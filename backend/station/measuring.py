@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from backend.axis.cyclic import CyclicSession
 from backend.drive.ports import Port
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.tools.sweep import profile_speed
 from backend.work.jobs import Job
 from drivers.errors import DriveError
@@ -64,13 +64,13 @@ class Exchange:
             )  # fmt: skip
 
 
-def port_of(member: Member) -> Port:
+def port_of(connected: ConnectedDrive) -> Port:
     """The port with process data, else the first."""
-    ports = member.drive.ports
+    ports = connected.drive.ports
     return next((port for port in ports if port.link.cyclic is not None), ports[0])
 
 
-async def exchange_for(bench: Bench, member: Member, cycle_s: float) -> Exchange:
+async def exchange_for(bench: Bench, connected: ConnectedDrive, cycle_s: float) -> Exchange:
     """The running exchange if it suits, else one that is started for the measurement.
 
     A drive without cyclic modes is commanded by its profile velocity during the measurement only,
@@ -80,15 +80,15 @@ async def exchange_for(bench: Bench, member: Member, cycle_s: float) -> Exchange
         Busy: a drive of the bus is moved.
         NotAllowed: no cyclic data on this bus, or a drive refuses.
     """
-    port = port_of(member)
-    drive, url = member.drive.id, bench.buses.url_of(port)
-    by_speed = {drive} if profile_speed.needed(member.drive, port.link) else set[str]()
+    port = port_of(connected)
+    drive, url = connected.drive.id, bench.buses.url_of(port)
+    by_speed = {drive} if profile_speed.needed(connected.drive, port.link) else set[str]()
     running = bench.sessions.get(url)
     before_s = None
     if running is not None and running.running:
         if by_speed <= running.by_speed:
             return Exchange(running, bench, drive, url, own=False)
-        for other in bench.members.values():
+        for other in bench.connected_drives.values():
             if other.drive in running.drives:
                 bench.motion.require_idle(other)
         before_s = running.state.cycle_s if running.state is not None else None

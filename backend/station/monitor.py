@@ -61,7 +61,7 @@ _FAULTY = (State.FAULT, State.FAULT_REACTION, State.UNKNOWN)
 
 #: Meaning of status bits 12 and 13 in each mode (CiA 402-2 clauses 10 to 16).
 _MODE_BITS: dict[int, tuple[str, str]] = {
-    1: ("set-point acknowledged", "following error"),
+    1: ("setpoint acknowledged", "following error"),
     3: ("speed is zero", "maximum slippage"),
     6: ("homing attained", "homing error"),
     8: ("drive follows the command", "following error"),
@@ -167,7 +167,7 @@ class Monitor:
             drive = self.axis.drive
             again = text("station.stop-sent-again", drive=drive.name)
             self._journal.add(again, level="warning", drive=drive.id)
-        if self.axis.drive.rest.held:
+        if self.axis.drive.exclusive.held:
             return before
         try:
             snapshot = await read()
@@ -283,7 +283,7 @@ class Monitor:
             self._journal.add(now.problem or "", level="error", drive=drive.id)
         if now.fresh and not before.fresh:
             self._journal.add(text("station.answers", drive=drive.name), drive=drive.id)
-            if before.status_word is not None or drive.owed:
+            if before.status_word is not None or drive.pending_restores:
                 self._returned()
         if not now.fresh:
             return

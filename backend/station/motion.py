@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.stopping.facts import AxisStop, Verdict
 from backend.stopping.told import told
 from backend.stopping.watch import StopWatch
@@ -38,45 +38,45 @@ class Motion:
         self._parting: set[str] = set()
 
     @contextlib.contextmanager
-    def keeping_still(self, member: Member) -> Iterator[None]:
+    def keeping_still(self, connected: ConnectedDrive) -> Iterator[None]:
         """Nothing begins to move this axis meanwhile, as what it relies on is changed. STOP works.
 
         Raises:
             Busy: something moves it already.
         """
-        self.require_idle(member)
-        self._still[member.drive.id] += 1
+        self.require_idle(connected)
+        self._still[connected.drive.id] += 1
         try:
             yield
         finally:
-            self._still[member.drive.id] -= 1
+            self._still[connected.drive.id] -= 1
 
-    def require_idle(self, member: Member) -> None:
+    def require_idle(self, connected: ConnectedDrive) -> None:
         """Nothing moves this axis.
 
         Raises:
             Busy: a job does.
         """
-        if (job := self._bench.jobs.moving(member.drive.id)) is not None:
-            raise Busy("station.moved", drive=member.drive.name, job_title=job.title_text)
+        if (job := self._bench.jobs.moving(connected.drive.id)) is not None:
+            raise Busy("station.moved", drive=connected.drive.name, job_title=job.title_text)
 
     @contextlib.contextmanager
-    def parting(self, member: Member) -> Iterator[None]:
+    def parting(self, connected: ConnectedDrive) -> Iterator[None]:
         """STOP reaches what is on the bench: nothing may begin to move on its way off it."""
-        self._parting.add(member.drive.id)
+        self._parting.add(connected.drive.id)
         try:
             yield
         finally:
-            self._parting.discard(member.drive.id)
+            self._parting.discard(connected.drive.id)
 
-    def require_stays(self, member: Member) -> None:
+    def require_stays(self, connected: ConnectedDrive) -> None:
         """Nobody is taking this drive off the bench.
 
         Raises:
             Busy: somebody is.
         """
-        if member.drive.id in self._parting:
-            raise Busy("station.being-taken-off-bench", drive=member.drive.name)
+        if connected.drive.id in self._parting:
+            raise Busy("station.being-taken-off-bench", drive=connected.drive.name)
 
     def permit(self, drive_id: str) -> None:
         """A new motion begins by a person's command; it takes back an earlier STOP.
@@ -84,14 +84,14 @@ class Motion:
         Raises:
             Busy: the exchange of its bus is being started or ended, or it leaves the bench.
         """
-        member = self._bench.member(drive_id)
-        self.require_stays(member)
+        connected = self._bench.connected(drive_id)
+        self.require_stays(connected)
         if self._still[drive_id]:
-            raise Busy("station.settings-just-being-changed", drive=member.drive.name)
+            raise Busy("station.settings-just-being-changed", drive=connected.drive.name)
         self._bench.exchanges.require_calm(
-            member.drive.name, self._bench.buses.urls_of(member.drive)
+            connected.drive.name, self._bench.buses.urls_of(connected.drive)
         )
-        member.axis.permit()
+        connected.axis.permit()
         # It sees that and ends; a STOP of the new motion gets a watch of its own.
         self._watches.pop(drive_id, None)
 
@@ -101,10 +101,10 @@ class Motion:
         Work that keeps its axis still (`Job.stoppable`) has none. When the grant ends before the
         job does, the job is cancelled and brings its axis to rest.
         """
-        member = self._bench.members.get(job.drive or "")
-        if member is None or not job.motion or not job.stoppable:
+        connected = self._bench.connected_drives.get(job.drive or "")
+        if connected is None or not job.motion or not job.stoppable:
             return contextlib.nullcontext()
-        drive = member.drive
+        drive = connected.drive
 
         def ended(_why: Text) -> None:
             if job.task is not None:
@@ -114,10 +114,10 @@ class Motion:
 
     def unattended(self, drive_id: str, why: Text) -> None:
         """Nobody may leave this axis enabled any longer: it loses its power."""
-        member = self._bench.members.get(drive_id)
-        if member is None or member.axis.stopped:
+        connected = self._bench.connected_drives.get(drive_id)
+        if connected is None or connected.axis.stopped:
             return  # STOP takes the power off, and says what became of the axis
-        line = text("station.loses-power-unattended", drive=member.drive.name, why=why)
+        line = text("station.loses-power-unattended", drive=connected.drive.name, why=why)
         self._bench.journal.add(line, level="warning", drive=drive_id)
         task = asyncio.create_task(self.let_go(drive_id), name=f"unattended-{drive_id}")
         self._later.add(task)
@@ -130,43 +130,43 @@ class Motion:
         it is gone by then. Returns drive id to problem, None where the drive took the stop.
         Whether the axis stands is watched from then on, and tells `standstill`.
         """
-        members = [self._bench.member(drive_id) for drive_id in drive_ids]
-        for member in members:
+        connected_drives = [self._bench.connected(drive_id) for drive_id in drive_ids]
+        for connected in connected_drives:
             # Before anything else runs: nothing in progress may enable the axis from here on.
-            member.axis.stopped = True
-            self._bench.authority.revoke(member.drive.id, text("motion.stop-was-pressed"))
-            job = self._bench.jobs.moving(member.drive.id)
+            connected.axis.stopped = True
+            self._bench.authority.revoke(connected.drive.id, text("motion.stop-was-pressed"))
+            job = self._bench.jobs.moving(connected.drive.id)
             if job is not None and job.stoppable and job.task is not None:
                 # Cancelled before the write, so that it sends nothing after it but its cleanup.
                 job.task.cancel()
-        task = asyncio.create_task(self._stop(members), name="stop")
+        task = asyncio.create_task(self._stop(connected_drives), name="stop")
         self._stops.add(task)
         task.add_done_callback(self._stops.discard)
-        self._bench.witness.stopped(drive_ids)
+        self._bench.recorder.stopped(drive_ids)
         return await asyncio.shield(task)
 
-    async def _stop(self, members: Sequence[Member]) -> dict[str, Text | None]:
-        async def one(member: Member) -> Text | None:
+    async def _stop(self, connected_drives: Sequence[ConnectedDrive]) -> dict[str, Text | None]:
+        async def one(connected: ConnectedDrive) -> Text | None:
             problem: Text | None = None
             try:
-                await member.axis.stop()
+                await connected.axis.stop()
             except DriveError as error:
                 problem = error.text
-            self._begin_watch(member, problem)
-            member.monitor.hurry()
+            self._begin_watch(connected, problem)
+            connected.monitor.hurry()
             return problem
 
-        problems = await asyncio.gather(*(one(member) for member in members))
-        return {m.drive.id: problem for m, problem in zip(members, problems, strict=True)}
+        problems = await asyncio.gather(*(one(connected) for connected in connected_drives))
+        return {m.drive.id: problem for m, problem in zip(connected_drives, problems, strict=True)}
 
-    def _begin_watch(self, member: Member, problem: Text | None) -> None:
+    def _begin_watch(self, connected: ConnectedDrive, problem: Text | None) -> None:
         """One watch of an axis at a time: STOP pressed again has sent its word again."""
-        drive_id = member.drive.id
+        drive_id = connected.drive.id
         if self.stopping(drive_id):
             return
 
         async def end_process_data() -> bool:
-            session = member.axis.session
+            session = connected.axis.session
             if session is None or not session.running:
                 return False
             await self._bench.exchanges.stop(session.link.url)
@@ -174,22 +174,22 @@ class Motion:
 
         async def work() -> AxisStop:
             try:
-                found = await StopWatch(member.axis, end_process_data).run(problem)
+                found = await StopWatch(connected.axis, end_process_data).run(problem)
             except Exception as error:
                 # A watch that ended without a verdict must not pass for an axis that stands.
-                log.exception("the stop of %s cannot be watched", member.drive.name)
+                log.exception("the stop of %s cannot be watched", connected.drive.name)
                 why = internal_error(error)
                 found = AxisStop(drive_id, Verdict.STILL_MOVING, 0.0, problem=why)
-            self._note(member, found)
+            self._note(connected, found)
             return found
 
         self._watches[drive_id] = asyncio.create_task(work(), name=f"stop-watch-{drive_id}")
 
-    def _note(self, member: Member, found: AxisStop) -> None:
-        member.monitor.hurry()
-        line = told(member.drive.name, found)
+    def _note(self, connected: ConnectedDrive, found: AxisStop) -> None:
+        connected.monitor.hurry()
+        line = told(connected.drive.name, found)
         if line is not None and not found.superseded:
-            self._bench.journal.add(line, level="error", drive=member.drive.id)
+            self._bench.journal.add(line, level="error", drive=connected.drive.id)
 
     async def standstill(self, drive_ids: Sequence[str]) -> list[AxisStop]:
         """What the last STOP of these drives has reached; waits for verdicts that are due.
@@ -221,28 +221,32 @@ class Motion:
 
     async def let_go(self, drive_id: str) -> None:
         """Take the power off an axis that was enabled here and left so; never raises."""
-        member = self._bench.members.get(drive_id)
-        if member is not None:
+        connected = self._bench.connected_drives.get(drive_id)
+        if connected is not None:
             job = self._bench.jobs.moving(drive_id)
             if job is not None:
                 # Of the page that is gone, and being ended: the axis is brought to rest first.
                 await job.wait()
-            await self.let_go_of(member)
-            member.monitor.hurry()
+            await self.let_go_of(connected)
+            connected.monitor.hurry()
 
-    async def let_go_of(self, member: Member) -> None:
-        """Take the power off an axis now; where that fails, it owes its stop; never raises."""
+    async def let_go_of(self, connected: ConnectedDrive) -> None:
+        """Take the power off an axis now; where that fails, its stop is pending; never raises."""
         try:
-            await member.axis.let_go()
+            await connected.axis.let_go()
         except DriveError as error:
             # Told to stop as soon as it answers, here or after it was put back on the bench.
-            member.axis.owes_stop = True
-            line = text("station.may-still-be-enabled", drive=member.drive.name, cause=error.text)
-            self._bench.journal.add(line, level="error", drive=member.drive.id)
+            connected.axis.stop_pending = True
+            line = text(
+                "station.may-still-be-enabled", drive=connected.drive.name, cause=error.text
+            )
+            self._bench.journal.add(line, level="error", drive=connected.drive.id)
 
     async def let_go_of_all(self) -> None:
         """Take the power off every axis of the bench, all at once; never raises."""
-        await asyncio.gather(*(self.let_go_of(member) for member in self._bench.members.values()))
+        await asyncio.gather(
+            *(self.let_go_of(connected) for connected in self._bench.connected_drives.values())
+        )
 
 
 def _unseen(drive_id: str) -> AxisStop:

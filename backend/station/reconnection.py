@@ -21,18 +21,18 @@ from drivers.texts.message import text
 
 if TYPE_CHECKING:
     from backend.station.bench import Bench
-    from backend.station.connected_drive import Member
+    from backend.station.connected_drive import ConnectedDrive
 
 _STANDS_S, _STANDS_RPM = 0.5, 5.0
 
 
-class Returning:
+class Reconnection:
     """For the drives of one bench."""
 
     def __init__(self, bench: Bench, lists: RestoreStore) -> None:
         self._bench = bench
         self._lists = lists
-        #: Drives to which something is owed, and whose axis did not stand free when they answered.
+        #: Drives with pending restores whose axis did not stand free when they answered.
         self._awaited: set[str] = set()
 
     def begin(self, axis: Axis) -> None:
@@ -45,7 +45,7 @@ class Returning:
         known = self._lists.list_of(identity_of(drive), drive.id)
         pending = known.pending
         if pending.moved:
-            axis.owes_stop = True
+            axis.stop_pending = True
         if pending.held_by:
             text = f"{drive.name}: {pending.held_by} moves this drive now and restores it itself"
             journal.add(text, level="warning", drive=drive.id)
@@ -54,27 +54,30 @@ class Returning:
             text = f"a server that is killed in a motion will not know what to restore: {error}"
             journal.add(text, level="warning", drive=drive.id)
 
-        # A stop that did not reach the drive is owed to it by the next server, too.
+        # A stop that did not reach the drive stays pending for the next server, too.
         keep_list(
-            drive, known, in_motion=lambda: drive.owed.in_motion or axis.owes_stop, failed=failed
+            drive,
+            known,
+            in_motion=lambda: drive.pending_restores.in_motion or axis.stop_pending,
+            failed=failed,
         )
         if drive.found is None and pending.serial is not None:
             # What is pending is of that one: another that answers here is noticed.
             drive.found = Found(drive.ports[0].station, serial=pending.serial)
 
     def returned(self, drive_id: str) -> None:
-        """It may have restarted, so everything is read anew, and what is owed to it is put back."""
-        member = self._bench.members.get(drive_id)
-        if member is None:
+        """It may have restarted: everything is read anew, and pending values are restored."""
+        connected = self._bench.connected_drives.get(drive_id)
+        if connected is None:
             return
-        drive = member.drive
+        drive = connected.drive
         keys = [key for key, r in drive.readings.items() if r.raw is not None]
         drive.forget()
-        member.axis.forget()
+        connected.axis.forget()
 
         async def reread(progress: Progress) -> JobResult:
-            if await self._is_the_same(member) and drive.owed:
-                await self._settled(member)
+            if await self._is_the_same(connected) and drive.pending_restores:
+                await self._settled(connected)
             await drive.read_many(keys, progress)
             return {"parameters": len(keys)}
 
@@ -82,66 +85,66 @@ class Returning:
             "reread", text("station.read-anew", drive_name=drive.name), reread, drive=drive_id
         )
 
-    async def _is_the_same(self, member: Member) -> bool:
+    async def _is_the_same(self, connected: ConnectedDrive) -> bool:
         """Notice another drive at this place before anything is written to it."""
-        drive = member.drive
+        drive = connected.drive
         if _serial(drive) is None:
             return True
         try:
             await confirm_identity(drive)
         except NotAllowed:
-            self._bench.tell(drive.identity_warning, member, "error")
+            self._bench.tell(drive.identity_warning, connected, "error")
             return False
         return True
 
-    async def _settled(self, member: Member) -> None:
+    async def _settled(self, connected: ConnectedDrive) -> None:
         """Put back by itself, unless something else has the axis; then when it stands free."""
-        drive_id = member.drive.id
+        drive_id = connected.drive.id
         if self._bench.jobs.moving(drive_id) is not None:
             self._awaited.add(drive_id)
             return
-        enabled = await member.axis.state() is State.OPERATION_ENABLED
-        if enabled or not await member.axis.standstill(_STANDS_S):
+        enabled = await connected.axis.state() is State.OPERATION_ENABLED
+        if enabled or not await connected.axis.standstill(_STANDS_S):
             self._awaited.add(drive_id)
             return
         try:
-            job = self.start(member, asked=False)
+            job = self.start(connected, asked=False)
         except Busy:
             # The drive fell silent and answered once more while it was looked at.
             self._awaited.add(drive_id)
             return
         await job.wait()
 
-    def seen(self, member: Member, snapshot: Snapshot) -> None:
-        """An axis that was enabled when its drive answered stands free now: put back what is owed.
+    def seen(self, connected: ConnectedDrive, snapshot: Snapshot) -> None:
+        """An axis that was enabled when its drive answered stands now: restore what is pending.
 
         Once; what cannot be put back then stays on offer.
         """
-        drive = member.drive
+        drive = connected.drive
         if drive.id not in self._awaited or not snapshot.fresh:
             return
         turns = abs(snapshot.values.get("velocity") or 0.0) > _STANDS_RPM
         if snapshot.state is State.OPERATION_ENABLED or turns or self._bench.jobs.moving(drive.id):
             return
         self._awaited.discard(drive.id)
-        if drive.owed:
-            self.start(member, asked=False)
+        if drive.pending_restores:
+            self.start(connected, asked=False)
 
-    def start(self, member: Member, *, asked: bool) -> Job:
-        """Put back what is owed, as a job that holds the axis where it is.
+    def start(self, connected: ConnectedDrive, *, asked: bool) -> Job:
+        """Restore what is pending, as a job that holds the axis where it is.
 
         Raises:
             Busy: something moves the axis.
         """
-        bench, drive = self._bench, member.drive
+        bench, drive = self._bench, connected.drive
 
         async def work(_progress: Progress) -> JobResult:
-            found = await settle(member.axis, asked=asked)
+            found = await settle(connected.axis, asked=asked)
             for what, how in (("back", "put back"), ("left", "not put back")):
                 values = found[what]
                 if isinstance(values, dict) and values:
                     words = ", ".join(f"{key} = {value}" for key, value in values.items())
-                    bench.tell(f"{drive.name}: {how}: {words}", member, "warning")
+                    bench.tell(f"{drive.name}: {how}: {words}", connected, "warning")
             return found
 
         return bench.jobs.start(

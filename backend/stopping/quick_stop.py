@@ -14,7 +14,7 @@ from backend.scales.units import AxisUnits
 from backend.stopping.settings import COAST, OPTION, braking_option
 from profiles.schema import Parameter, Raw
 
-#: From any permitted speed to standstill, as `drivers.motion.playback` ramps set-points down.
+#: From any permitted speed to standstill, as `drivers.motion.playback` ramps setpoints down.
 STOP_S = 0.1
 
 

@@ -140,7 +140,7 @@ class StopWatch:
                 return self._superseded()
             await asyncio.sleep(_LOOK_EVERY_S)
             try:
-                if axis.owes_stop and await axis.repeat_stop():
+                if axis.stop_pending and await axis.repeat_stop():
                     problem = None
                 sample = await watch.look()
             except DriveError as error:
@@ -148,7 +148,7 @@ class StopWatch:
                     return self._verdict(Verdict.UNREACHABLE, problem or error.text)
                 continue
             if watch.stands():
-                if axis.owes_stop:
+                if axis.stop_pending:
                     return self._verdict(Verdict.UNREACHABLE, problem)
                 await self._settle(sample)
                 return self._verdict(Verdict.STOPPED)

@@ -11,7 +11,7 @@ from backend.drive.drive import Drive
 from backend.drive.identity import confirm_identity
 from backend.drive.readings import Reading
 from backend.library import SetStore
-from backend.library.identity import doubts
+from backend.library.identity import differences
 from backend.motion.grant import NotGranted
 from backend.parameters import set_file as parameter_set
 from backend.parameters.set_file import ParameterSet
@@ -171,7 +171,7 @@ def _check_identity(drive: Drive, content: ParameterSet, accepted: bool) -> bool
             value=content.profile,
             limit=drive.profile.drive,
         )
-    other = [doubt for doubt in doubts(content, drive) if doubt.other_drive]
+    other = [difference for difference in differences(content, drive) if difference.other_drive]
     if other and not accepted:
         raise NotAllowed(
             "set.file-another-drive-nothing",

@@ -33,7 +33,7 @@ class Tally:
     done: dict[str, int] = field(default_factory=dict)
     writes: list[tuple[str, str, int]] = field(default_factory=list)
     #: Writes that a killed server answered, but may not have had the time to note.
-    doubtful: list[tuple[str, str, int]] = field(default_factory=list)
+    uncertain: list[tuple[str, str, int]] = field(default_factory=list)
     _times: list[float] = field(default_factory=list)
 
     def count(self, what: str, status: int) -> None:
@@ -48,7 +48,7 @@ class Tally:
     def killed(self) -> None:
         """The server is killed now: an answer waits a second for the disk, and no longer."""
         since = time.monotonic() - _NOTED_S
-        self.doubtful += [w for w, at in zip(self.writes, self._times, strict=True) if at > since]
+        self.uncertain += [w for w, at in zip(self.writes, self._times, strict=True) if at > since]
 
 
 class Person:

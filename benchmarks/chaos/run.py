@@ -329,7 +329,7 @@ class Trial:
             body = json.loads(json.loads(line)["body"])
             if body["kind"] == "write" and isinstance(body["new"], int):
                 have[body["axis"], body["target"], body["new"]] += 1
-        wanted = Counter(self.tally.writes) - Counter(self.tally.doubtful)
+        wanted = Counter(self.tally.writes) - Counter(self.tally.uncertain)
         if lacking := dict(wanted - have):
             self.judge.violated(f"writes that the audit does not have: {lacking}")
 

@@ -56,8 +56,8 @@ class Mix:
                 benches.append(bench)
             for bench in benches:
                 # A page looks at it.
-                bench.member.monitor.watchers.add("page")
-                bench.member.monitor.hurry()
+                bench.connected.monitor.watchers.add("page")
+                bench.connected.monitor.hurry()
             await asyncio.sleep(0.3)
             await asyncio.gather(*(self._axis(bench) for bench in benches))
 
@@ -93,7 +93,7 @@ class Mix:
         return verdict == "stopped" and not bench.link.lost_data and await self._tidy(bench)
 
     async def _stop(self, bench: Rig, motion: str) -> str:
-        body = {} if self.random.random() < 0.5 else {"drive": bench.member.drive.id}
+        body = {} if self.random.random() < 0.5 else {"drive": bench.connected.drive.id}
         presses = [
             asyncio.create_task(bench.http.post("/stop", json=body))
             for _ in range(self.random.choice([1, 1, 2, 3]))
@@ -117,7 +117,7 @@ class Mix:
     async def _must_be_told(self, bench: Rig, motion: str) -> None:
         loop = asyncio.get_running_loop()
         end = loop.time() + TOLD_S
-        while bench.member.monitor.snapshot.turning is None:
+        while bench.connected.monitor.snapshot.turning is None:
             if bench.shaft_rpm < _TURNS_RPM:
                 return
             if loop.time() > end:
@@ -131,7 +131,7 @@ class Mix:
             bench.link.catch_up()
             bench.device.inject("turn_to_rev", bench.shaft_deg / 360.0 + 0.04)
             await asyncio.sleep(0.02)
-            found = bench.member.monitor.snapshot.turning
+            found = bench.connected.monitor.snapshot.turning
             if found is not None:
                 if found.kind.value != "disabled":
                     self.found(bench, f"turned by hand, told as {found.kind.value}")
@@ -150,8 +150,8 @@ class Mix:
             while not over.is_set():
                 await asyncio.sleep(0.05)
                 stood_s = 0.0 if bench.shaft_rpm > 1.0 else stood_s + 0.05
-                told = bench.member.monitor.snapshot.turning
-                job = bench.bench.jobs.moving(bench.member.drive.id)
+                told = bench.connected.monitor.snapshot.turning
+                job = bench.bench.jobs.moving(bench.connected.drive.id)
                 wrong = told is not None and (stood_s > 1.0 or job is not None)
                 wrong_s = wrong_s + 0.05 if wrong else 0.0
                 # What was read before a job began is shown until the next poll.
@@ -174,7 +174,7 @@ class Mix:
         for task in bench.kept:
             task.cancel()
         bench.kept.clear()
-        while (job := bench.bench.jobs.moving(bench.member.drive.id)) is not None:
+        while (job := bench.bench.jobs.moving(bench.connected.drive.id)) is not None:
             await job.wait()
         await bench.bench.stop_cyclic(bench.link.url)
         bench.poke("6040:00", 0)

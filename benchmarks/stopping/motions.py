@@ -33,7 +33,7 @@ async def enable(rig: Rig, mode: int) -> None:
 
 
 async def set_ramps(rig: Rig) -> None:
-    units = await rig.member.axis.units()
+    units = await rig.connected.axis.units()
     for key in ("6083:00", "6084:00", "6085:00"):
         if key in rig.device.profile.by_key:
             rig.poke(key, units.acceleration_raw(_RAMP_RPM_S))
@@ -46,7 +46,7 @@ def mode_of(rig: Rig, *modes: int) -> int:
 
 async def profile_velocity(rig: Rig) -> None:
     """60FFh, by another tool."""
-    units = await rig.member.axis.units()
+    units = await rig.connected.axis.units()
     await set_ramps(rig)
     rig.poke("60FF:00", 0)
     await enable(rig, mode_of(rig, _PV, _CSV))
@@ -56,7 +56,7 @@ async def profile_velocity(rig: Rig) -> None:
 
 async def torque(rig: Rig) -> None:
     """6071h, until the axis is fast."""
-    units = await rig.member.axis.units()
+    units = await rig.connected.axis.units()
     await set_ramps(rig)
     rig.poke("6071:00", 0)
     await enable(rig, mode_of(rig, _PT, _CST))
@@ -69,7 +69,7 @@ async def torque(rig: Rig) -> None:
 
 async def homing(rig: Rig) -> None:
     """Method 17 or 18 searches a limit switch that does not come."""
-    units = await rig.member.axis.units()
+    units = await rig.connected.axis.units()
     await set_ramps(rig)
     by_key = rig.device.profile.by_key
     rig.poke("6098:00", 18)
@@ -85,12 +85,12 @@ async def jogging(rig: Rig) -> None:
     """The server's own hold-to-run jog."""
     hold = Hold()
     settings = JogSettings(1, SPEED_RPM, _RAMP_RPM_S, 1000.0, 100.0)
-    axis = rig.member.axis
+    axis = rig.connected.axis
 
     async def work(progress: Progress) -> None:
         await jog(axis, settings, hold, progress)
 
-    rig.bench.jobs.start("jog", "Jog", work, drive=rig.member.drive.id, motion=True)
+    rig.bench.jobs.start("jog", "Jog", work, drive=rig.connected.drive.id, motion=True)
     rig.keep(_renewing(hold))
     await rig.until_rpm(0.9 * SPEED_RPM)
 
@@ -101,12 +101,12 @@ async def cyclic_jog(rig: Rig) -> None:
     session = await rig.bench.start_cyclic(url, 0.002)
     hold = Hold()
     settings = JogSettings(1, SPEED_RPM, _RAMP_RPM_S, 1000.0, 100.0)
-    axis = rig.member.axis
+    axis = rig.connected.axis
 
     async def work(progress: Progress) -> None:
         await jog_cyclic(axis, session, settings, hold, progress)
 
-    rig.bench.jobs.start("jog", "Jog", work, drive=rig.member.drive.id, motion=True)
+    rig.bench.jobs.start("jog", "Jog", work, drive=rig.connected.drive.id, motion=True)
     rig.keep(_renewing(hold))
     await rig.until_rpm(0.9 * SPEED_RPM)
 

@@ -15,7 +15,7 @@ import httpx
 
 from backend.api.app import make_app
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from drivers.errors import LinkTimeout
 from drivers.link import Address
 from drivers.virtual.device import Device
@@ -120,7 +120,7 @@ class Rig:
 
     family: str
     bench: Bench
-    member: Member
+    connected: ConnectedDrive
     link: RigLink
     device: VirtualServo
     http: httpx.AsyncClient
@@ -181,13 +181,13 @@ async def rig(family: str, spec: MechanicsSpec | None = None) -> AsyncIterator[R
     link.url = url
     with tempfile.TemporaryDirectory() as folder:
         bench = Bench(Path(folder), {url: lambda: link})
-        member = await bench.connect(url, STATION, family, "X")
+        connected = await bench.connect(url, STATION, family, "X")
         app: Any = make_app(bench, hosts=frozenset({"test"}))
         transport = httpx.ASGITransport(app)
         root = "http://test/api/v1"
         async with httpx.AsyncClient(transport=transport, base_url=root, timeout=60) as http:
             try:
-                made = Rig(family, bench, member, link, device, http)
+                made = Rig(family, bench, connected, link, device, http)
                 yield made
             finally:
                 for task in made.kept:

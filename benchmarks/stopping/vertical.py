@@ -64,7 +64,7 @@ async def _lowering(bench: Rig) -> None:
 
 
 async def _at_speed(bench: Rig, rpm: float) -> None:
-    units = await bench.member.axis.units()
+    units = await bench.connected.axis.units()
     await set_ramps(bench)
     bench.poke("60FF:00", 0)
     await enable(bench, mode_of(bench, Mode.PV, Mode.CSV))
@@ -75,12 +75,12 @@ async def _at_speed(bench: Rig, rpm: float) -> None:
 
 async def _positioning(bench: Rig) -> None:
     """Profile position, 90 revolutions up."""
-    units = await bench.member.axis.units()
+    units = await bench.connected.axis.units()
     await set_ramps(bench)
     bench.poke("6081:00", units.velocity_raw_of(bench.device.profile.by_key["6081:00"], SPEED_RPM))
     await enable(bench, Mode.PP)
     await asyncio.sleep(_BRAKE_OPENS_S)
-    start = await bench.member.axis.position_raw()
+    start = await bench.connected.axis.position_raw()
     bench.poke("607A:00", start + units.position_raw(90.0))
     bench.poke("6040:00", 0x3F)
     await bench.until_rpm(0.9 * SPEED_RPM)
@@ -88,7 +88,7 @@ async def _positioning(bench: Rig) -> None:
 
 async def _homing(bench: Rig) -> None:
     """Method 18 searches a limit switch that does not come."""
-    units, by_key = await bench.member.axis.units(), bench.device.profile.by_key
+    units, by_key = await bench.connected.axis.units(), bench.device.profile.by_key
     await set_ramps(bench)
     bench.poke("6098:00", 18)
     bench.poke("6099:01", units.velocity_raw_of(by_key["6099:01"], SPEED_RPM))
@@ -102,7 +102,7 @@ async def _homing(bench: Rig) -> None:
 
 async def _torque(bench: Rig) -> None:
     """6071h lifts the load, then holds it at its speed."""
-    units = await bench.member.axis.units()
+    units = await bench.connected.axis.units()
     await set_ramps(bench)
     bench.poke("6071:00", units.torque_raw(_HOLDS_PERCENT))
     await enable(bench, mode_of(bench, Mode.PT, Mode.CST))

@@ -51,7 +51,7 @@ class DriveSetup:
         return self._read(station, 0x1016, 1) == value
 
     def interpolate(self, station: int, cycle_s: float) -> None:
-        """Tell a drive that interpolates between set-points how far apart they come (60C2h)."""
+        """Tell a drive that interpolates between setpoints how far apart they come (60C2h)."""
         try:
             value, exponent = interpolation_period(round(cycle_s * 1e9))
             self._change(station, SdoWrite(0x60C2, 1, bytes([value])))

@@ -31,7 +31,7 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """A remark of our own: a change of state, a set-point, a fault. ``station`` None: the bus."""
+    """A remark of our own: a change of state, a setpoint, a fault. ``station`` None: the bus."""
 
     time_ns: int
     text: str

@@ -12,7 +12,7 @@ from profiles.importer.description import DescribedEntry
 from profiles.schema import UnitOrigin, UnitSpec
 from profiles.si_unit import SiUnit, decode_si_unit
 
-#: Object with the unit's code, and the set-point object whose printed unit counts otherwise.
+#: Object with the unit's code, and the setpoint object whose printed unit counts otherwise.
 _QUANTITIES = {
     "position": ("60A8:00", "607A:00"),
     "velocity": ("60A9:00", "60FF:00"),

@@ -1,4 +1,4 @@
-"""EtherCAT through the interface: from scan to motion with one set-point per cycle.
+"""EtherCAT through the interface: from scan to motion with one setpoint per cycle.
 
 The segment's clock follows the frames, so a busy test machine changes nothing but the time that
 the tests take.

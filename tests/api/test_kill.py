@@ -151,7 +151,10 @@ def test_what_a_killed_server_left_in_the_drive_is_put_back(
 
         def put_back() -> bool:
             """On one press, again where the server was just about it by itself."""
-            owed = {o["key"]: o["raw"] for o in again.http.get(f"/drives/{x}").json()["owed"]}
+            owed = {
+                o["key"]: o["raw"]
+                for o in again.http.get(f"/drives/{x}").json()["pending_restores"]
+            }
             if not owed:
                 return True
             assert owed.get("6083:00", before) == before

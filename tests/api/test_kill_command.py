@@ -137,7 +137,10 @@ def test_a_sweep_killed_on_canopen_is_restored_by_the_next_server(canopen: Bench
 
         def restored() -> bool:
             """On one press, again where the server was just about it by itself."""
-            pending = {o["key"]: o["raw"] for o in server.http.get(f"/drives/{x}").json()["owed"]}
+            pending = {
+                o["key"]: o["raw"]
+                for o in server.http.get(f"/drives/{x}").json()["pending_restores"]
+            }
             if not pending:
                 return True
             assert pending.get(RAMP, before[RAMP]) == before[RAMP]

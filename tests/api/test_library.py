@@ -22,8 +22,8 @@ GAIN, NAME = "2005:03", "as found.sdset"
 
 @pytest.fixture
 async def bench(tmp_path: Path) -> AsyncIterator[Bench]:
-    bench, member = await bench_with(Servo(), tmp_path)  # it has serial number 7
-    member.drive.found = Found(1, vendor_id=0x11, product_code=0x22, revision=3, serial=7)
+    bench, connected = await bench_with(Servo(), tmp_path)  # it has serial number 7
+    connected.drive.found = Found(1, vendor_id=0x11, product_code=0x22, revision=3, serial=7)
     yield bench
     await bench.close()
 
@@ -82,12 +82,12 @@ async def test_roll_back_writes_an_earlier_version_and_can_be_undone(
     await put(http, set_of(350))
     assert (await put(http, set_of(400)))["version"] == 2
     assert (await load(http, [GAIN]))["result"]["written"] == 1
-    assert (await bench.member("x").drive.read(GAIN)).raw == 400
+    assert (await bench.connected("x").drive.read(GAIN)).raw == 400
     diff = (await http.get("/drives/x/diff", params={"file": NAME, "version": 1})).json()
     row = next(r for r in diff["rows"] if r["key"] == GAIN)
     assert (row["file_raw"], row["drive_raw"], row["selected"]) == (350, 400, True)
     done = await load(http, [GAIN], version=1)
-    assert (await bench.member("x").drive.read(GAIN)).raw == 350
+    assert (await bench.connected("x").drive.read(GAIN)).raw == 350
     undo = done["result"]["backup"]
     stored = {s["file"]: s for s in (await http.get("/sets")).json()}
     assert stored[undo]["tags"] == ["undo"]
@@ -103,7 +103,7 @@ async def test_three_way(http: httpx.AsyncClient, bench: Bench) -> None:
     def row(key: str, raw: int) -> str:
         return f'[[parameter]]\nkey = "{key}"\nraw = {raw}\n'
 
-    drive = bench.member("x").drive
+    drive = bench.connected("x").drive
     keys = [p.key for p in drive.profile.parameters
             if p.group == drive.parameter(GAIN).group and p.access == "rw"
             and p.key != GAIN and not p.enum and p.type == "UINT16"][:3]  # fmt: skip
@@ -139,20 +139,20 @@ async def test_another_drive_s_set_needs_consent(
     http: httpx.AsyncClient, bench: Bench, data: bytes, words: str
 ) -> None:
     await put(http, data)
-    before = (await bench.member("x").drive.read(GAIN)).raw
+    before = (await bench.connected("x").drive.read(GAIN)).raw
     diff = (await http.get("/drives/x/diff", params={"file": NAME})).json()
     assert diff["same_serial"] is False
     assert any(words in text for text in diff["warnings"])
     job = await load(http, [GAIN])
     assert job["state"] == "failed"
     assert words in job["problem"]["detail"]
-    assert (await bench.member("x").drive.read(GAIN)).raw == before
+    assert (await bench.connected("x").drive.read(GAIN)).raw == before
     assert (await load(http, [GAIN], accept_other_identity=True))["state"] == "done"
-    assert (await bench.member("x").drive.read(GAIN)).raw == 350
+    assert (await bench.connected("x").drive.read(GAIN)).raw == 350
 
 
 async def test_values_of_one_motor_stay_with_it(http: httpx.AsyncClient, bench: Bench) -> None:
-    profile = bench.member("x").drive.profile
+    profile = bench.connected("x").drive.profile
     own = next(p for p in profile.parameters if p.motor_individual and p.access == "rw"
                and p.type not in ("STRING", "OCTETS"))  # fmt: skip
     low = own.raw_limits[0]
@@ -164,7 +164,7 @@ async def test_values_of_one_motor_stay_with_it(http: httpx.AsyncClient, bench: 
     refused = await load(http, [GAIN, own.key], accept_other_identity=True)
     assert refused["state"] == "failed"
     assert "belongs to the motor" in refused["problem"]["detail"]
-    assert (await bench.member("x").drive.read(GAIN)).raw != 350, "nothing was written"
+    assert (await bench.connected("x").drive.read(GAIN)).raw != 350, "nothing was written"
     accepted = await load(
         http, [GAIN, own.key], accept_other_identity=True, accept_motor_individual=True
     )
@@ -175,7 +175,7 @@ async def test_a_swap_is_noticed_before_the_first_write(
     http: httpx.AsyncClient, bench: Bench
 ) -> None:
     await put(http, set_of(350))
-    drive = bench.member("x").drive
+    drive = bench.connected("x").drive
     before = (await drive.read(GAIN)).raw
     # The cables were exchanged: the drive that answers has another serial number.
     drive.found = replace(drive.found or Found(1), serial=6)
@@ -235,7 +235,7 @@ async def test_files_of_the_station_are_listed_and_not_copied(
 
 
 async def test_the_audit_tells_who_wrote_what(http: httpx.AsyncClient, bench: Bench) -> None:
-    drive = bench.member("x").drive
+    drive = bench.connected("x").drive
     before = (await drive.read(GAIN)).raw
     assert (await http.put(f"/drives/x/parameters/{GAIN}", json={"raw": 360})).is_success
     # No waiting here: the answer came when the entry was stored.

@@ -137,10 +137,10 @@ def test_a_person_classifies_an_object_of_an_imported_profile(station: Station) 
         # The drive on the bench has it at once.
         bench = station.bench
         assert bench is not None
-        assert bench.members[drive].drive.profile.by_key["2F01:00"].motion == "at_enable"
+        assert bench.connected_drives[drive].drive.profile.by_key["2F01:00"].motion == "at_enable"
         back = station.ok(station.http.delete(where))
         assert (back["motion"], back["origin"]) == ("energises", "unclassified")
-        assert bench.members[drive].drive.profile.by_key["2F01:00"].motion == "energises"
+        assert bench.connected_drives[drive].drive.profile.by_key["2F01:00"].motion == "energises"
     finally:
         station.remove(drive)
 

@@ -51,7 +51,7 @@ def test_from_refused_to_taught(station: Station) -> None:
     drive = station.add(5, CAN, "generic402", "N")
     before = scales(station, drive)
     assert not before["certain"]
-    assert {s["doubt"] for s in before["scales"]} == {"no_resolution", "not_stated"}
+    assert {s["uncertainty"] for s in before["scales"]} == {"no_resolution", "not_stated"}
     assert all(s["remedy"] for s in before["scales"])
 
     for job, body in {

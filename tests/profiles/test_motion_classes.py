@@ -54,7 +54,7 @@ DOORS = [
     ("ds_c", "2400:0D"),  # 003:530 brake output
 ]
 
-#: Set-points of CiA 402-2: control word, mode, targets, offsets.
+#: Setpoints of CiA 402-2: control word, mode, targets, offsets.
 SETPOINTS = ("6040:00", "6060:00", "607A:00", "60FF:00", "6071:00", "60B0:00", "60B1:00", "60B2:00")
 
 #: What decides how an axis moves or stops (CiA 402-2); named one by one in issue 17.

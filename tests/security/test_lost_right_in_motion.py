@@ -92,7 +92,7 @@ def test_the_motion_of_another_goes_on(guarded: GuardedServer) -> None:
 
 def test_an_axis_left_enabled_loses_its_power_with_the_token(guarded: GuardedServer) -> None:
     script = guarded.token(Role.OPERATOR, Right.LOOK, Right.MOTION)
-    identity, axis = identity_of(guarded, script), guarded.member.axis
+    identity, axis = identity_of(guarded, script), guarded.connected.axis
 
     async def enabling() -> None:
         acting.set(Actor(identity))

@@ -22,7 +22,7 @@ from backend.drive.readings import Reading
 from backend.parameters import set_file as parameter_set
 from backend.people.rights import Right, Role
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from profiles.schema import LinkKind, Parameter, Profile, Raw
@@ -81,11 +81,11 @@ class Scene:
         self.operator = operator
         self.start_rad = self.link.angle_rad
 
-    async def _bench(self, folder: Path) -> tuple[Bench, Member]:
+    async def _bench(self, folder: Path) -> tuple[Bench, ConnectedDrive]:
         bench = Bench(folder, {self.url: lambda: self.link})
-        member = await bench.connect(self.url, STATION, self.profile.drive, "X")
-        await member.monitor.close()
-        return bench, member
+        connected = await bench.connect(self.url, STATION, self.profile.drive, "X")
+        await connected.monitor.close()
+        return bench, connected
 
     @property
     def profile(self) -> Profile:
@@ -93,7 +93,7 @@ class Scene:
 
     def writable(self) -> list[Parameter]:
         """Everything that this bus carries and that can be written."""
-        drive = self.server.member.drive
+        drive = self.server.connected.drive
         return [p for p in self.profile.parameters if p.access != "ro"
                 and not drive.unreachable_why(p)]  # fmt: skip
 
@@ -114,10 +114,10 @@ class Scene:
 
         def look() -> tuple[float, bool]:
             self.link.pass_s(REACTION_S)
-            return self.link.angle_rad, self.server.member.axis.stopped
+            return self.link.angle_rad, self.server.connected.axis.stopped
 
         angle, _ = self.server.call(look)
-        state = self.server.run(self.server.member.axis.state())
+        state = self.server.run(self.server.connected.axis.state())
         assert state is not State.OPERATION_ENABLED, after
         assert abs(angle - self.start_rad) < STILL_RAD, (after, angle - self.start_rad)
 
@@ -189,7 +189,7 @@ def test_no_write_by_anybody_moves_the_axis(scene: Scene, wired: bool) -> None:
 
 def a_set(scene: Scene) -> bytes:
     """A parameter set that holds every writable object, made as the product makes one."""
-    drive = scene.server.member.drive
+    drive = scene.server.connected.drive
     readings = [Reading(p.key, values_of(p)[-1], None, 1.0) for p in scene.writable()]
     return parameter_set.dump(drive, readings, author="somebody", notes="", saved=datetime.now(UTC))
 

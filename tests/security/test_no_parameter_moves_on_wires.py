@@ -20,7 +20,7 @@ import pytest
 
 from backend.people.rights import Right, Role
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.station.demo import DemoBench
 from drivers import cia402
 from drivers.cia402 import State
@@ -100,18 +100,18 @@ class Wires:
         }
         self.start = {place: self.shaft_rev(place) for place in places}
 
-    async def _bench(self, folder: Path) -> tuple[Bench, Member]:
+    async def _bench(self, folder: Path) -> tuple[Bench, ConnectedDrive]:
         bench = Bench(folder, dict(self.drives.wires))
-        members = []
+        connected_drives = []
         for place in self.places:
-            member = await bench.connect(place.url, place.station, place.family, place.name)
-            await member.monitor.close()
-            self.ids[place.name] = member.drive.id
-            members.append(member)
-        return bench, members[0]
+            connected = await bench.connect(place.url, place.station, place.family, place.name)
+            await connected.monitor.close()
+            self.ids[place.name] = connected.drive.id
+            connected_drives.append(connected)
+        return bench, connected_drives[0]
 
-    def member(self, place: Place) -> Member:
-        return self.server.bench.members[self.ids[place.name]]
+    def connected(self, place: Place) -> ConnectedDrive:
+        return self.server.bench.connected_drives[self.ids[place.name]]
 
     def stop(self) -> None:
         self.server.stop()
@@ -147,7 +147,7 @@ class Wires:
 
     def writable(self, place: Place) -> list[Parameter]:
         """Everything that this bus carries and that can be written, what restarts it last."""
-        drive = self.member(place).drive
+        drive = self.connected(place).drive
         found = [p for p in drive.profile.parameters if p.access != "ro"
                  and not drive.unreachable_why(p)]  # fmt: skip
         return sorted(found, key=lambda p: p.key.startswith(LAST))

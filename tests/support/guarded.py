@@ -19,7 +19,7 @@ from backend.people.passwords import Passwords
 from backend.people.rights import Right, Role
 from backend.people.station import People
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from tests.support.servo import Servo, bench_with
 from tests.support.station import HANG_S, Live
 
@@ -84,7 +84,7 @@ class GuardedServer:
 
     def __init__(
         self, folder: Path, *, accounts: bool = True,
-        making: Callable[[Path], Awaitable[tuple[Bench, Member]]] | None = None,
+        making: Callable[[Path], Awaitable[tuple[Bench, ConnectedDrive]]] | None = None,
     ) -> None:  # fmt: skip
         self.servo = Servo()
         self._making = making or (lambda folder: bench_with(self.servo, folder))
@@ -96,7 +96,7 @@ class GuardedServer:
             datetime.now(UTC) + self.ahead
         )
         self.bench: Bench
-        self.member: Member
+        self.connected: ConnectedDrive
         self.app: Any = None
         self.config: uvicorn.Config
         self.port = 0
@@ -127,7 +127,7 @@ class GuardedServer:
 
         async def main() -> None:
             self._loop = asyncio.get_running_loop()
-            self.bench, self.member = await self._making(self.folder)
+            self.bench, self.connected = await self._making(self.folder)
             serving = Serving(accounts=self.people.accounts_needed)
             config = _config(self.bench, self.people, serving, None)
             config.accepting = [listening]

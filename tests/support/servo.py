@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from drivers.codec import size_of
 from drivers.errors import DriveError, LinkTimeout
 from drivers.link import Address
@@ -111,9 +111,9 @@ class Servo(MemoryLink):
         self.set(STATUS, _FAULT)
 
 
-async def bench_with(servo: Servo, folder: Path) -> tuple[Bench, Member]:
+async def bench_with(servo: Servo, folder: Path) -> tuple[Bench, ConnectedDrive]:
     """A bench with this servo at station 1, its monitor at rest."""
     bench = Bench(folder, {URL: lambda: servo})
-    member = await bench.connect(URL, 1, "mms7", "X")
-    await member.monitor.close()
-    return bench, member
+    connected = await bench.connect(URL, 1, "mms7", "X")
+    await connected.monitor.close()
+    return bench, connected

@@ -114,7 +114,7 @@ def test_no_parameter_write_releases_the_brake_of_a_load_that_hangs(family: str)
 
 
 async def _refused_all(bench: Rig) -> None:
-    path = f"/drives/{bench.member.drive.id}/parameters"
+    path = f"/drives/{bench.connected.drive.id}/parameters"
     known = bench.device.profile.by_key
     wanted = [(key, raw) for key, raw in BRAKE_DOORS[bench.family] if key in known]
     assert wanted

@@ -16,7 +16,7 @@ from backend.axis.axis import Axis, Envelope
 from backend.axis.cyclic import CyclicSession
 from backend.drive.drive import Drive
 from backend.drive.ports import Port
-from backend.scales.scale import Doubt, Origin, ScaleUnknown
+from backend.scales.scale import Origin, ScaleUnknown, Uncertainty
 from backend.tools.jog.cyclic import GeneratorSettings, generate
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.mechanics.rough_feedback import RoughFeedbackSpec
@@ -96,7 +96,7 @@ async def test_a_file_and_a_drive_without_the_unit_move_nothing() -> None:
     device = make_device("generic402", spec(lacks=("60A9",)))
     axis, session, link = await over_ethercat(profile, device)
     try:
-        assert (await axis.units()).scales.velocity.doubt is Doubt.NOT_STATED
+        assert (await axis.units()).scales.velocity.uncertainty is Uncertainty.NOT_STATED
         with pytest.raises(ScaleUnknown):
             await generate(axis, session, SPIN, silent())
     finally:

@@ -106,7 +106,7 @@ class LoopVerdict:
     ) -> tuple[Missed, ...]:
         """What is worse than promised, less what a margin may be off by; empty where all is kept.
 
-        The stated figures must reach the promise but for that. The worst ends of the intervals, of
+        The stated figures must reach the goals but for that. The worst ends of the intervals, of
         each band, must not be more than `WORST_DEG` or `WORST_DB` below it.
         """
         found = []

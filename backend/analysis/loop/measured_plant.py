@@ -43,14 +43,15 @@ class MeasuredPlant:
         moved = self.model.perturbed(1.0, damping_factor)
         modes = tuple(
             replace(
-                m, frequency_hz=m.frequency_hz * frequency_factor ** self._doubt(m.frequency_hz)
+                m,
+                frequency_hz=m.frequency_hz * frequency_factor ** self._uncertainty(m.frequency_hz),
             )
             for m in moved.modes
         )
         moved = replace(moved, modes=modes)
         return np.asarray(moved.response(self.frequency_hz) * self.correction)
 
-    def _doubt(self, mode_hz: float) -> int:
+    def _uncertainty(self, mode_hz: float) -> int:
         """How many times a shift counts for a mode here."""
         if mode_hz <= self.measured_hz:
             return 1

@@ -1,7 +1,7 @@
 """What a notch in the path of the torque does, seen in the reported torque. Pure.
 
 With no loop closed the same torque is played with and without the notch. The ratio of the two
-reported torques is the notch, blurred by what sampling folds back: the held set-points contain
+reported torques is the notch, blurred by what sampling folds back: the held setpoints contain
 images of every line above half the sample rate, which pass the notch untouched, so that a deep
 notch looks shallow. The shape is therefore fitted through hold and sampling.
 

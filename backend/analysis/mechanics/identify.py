@@ -17,7 +17,7 @@ import numpy as np
 from backend.analysis.loop.loop_fit import fit_loop
 from backend.analysis.mechanics.fit_problem import KnownInertia
 from backend.analysis.mechanics.inertia_by_place import InertiaByPlace, inertia_by_place
-from backend.analysis.mechanics.mode_uncertainty import ModeDoubt, mode_doubts
+from backend.analysis.mechanics.mode_uncertainty import ModeUncertainty, mode_uncertainties
 from backend.analysis.mechanics.model_fit import Solution, fit_sampled_model, views_of
 from backend.analysis.mechanics.reversals import with_balanced_reversals
 from backend.analysis.response.distortion import Distortion, distortion
@@ -51,8 +51,8 @@ from backend.analysis.response.stated_band import (
     without_images,
 )
 from backend.analysis.response.two_signals import ways_of
-from backend.analysis.response.uncertainty import Doubt, Shifted
-from backend.analysis.response.uncertainty import doubt as joint_doubt
+from backend.analysis.response.uncertainty import Shifted, Uncertainty
+from backend.analysis.response.uncertainty import uncertainty as joint_uncertainty
 from backend.analysis.signals.arrays import ComplexArray
 from backend.analysis.signals.line_spectra import Quantity, Record, loop_spectra, speed_lag_s
 from backend.analysis.signals.transient_removal import settled
@@ -60,7 +60,7 @@ from backend.analysis.signals.transient_removal import settled
 #: A model whose median relative misfit is larger, and larger than the noise, corrects nothing.
 TRUSTED_ERROR = 0.03
 
-#: A path that leaves more cycles of delay than this is doubted.
+#: A path that leaves more cycles of delay than this is uncertaintyed.
 _LEFT_LATE = 0.3
 #: Paths whose criteria differ by less are both possible.
 _UNDECIDED = 80.0
@@ -122,7 +122,7 @@ class Identification:
     fit: SampledFit
     trusted: bool = True
     distortion: Distortion | None = None
-    modes: tuple[ModeDoubt, ...] = ()
+    modes: tuple[ModeUncertainty, ...] = ()
     """How exactly each mode of the model is known; empty where no model is trusted."""
     torque_dropped: bool = False
     """Whether the reported torque cannot be the mechanics' input, and was not used as such."""
@@ -150,8 +150,10 @@ def identify_mechanics(
     found = task.refined(task.trial(path, coulomb_nm), lambda _: path)
     if coulomb_nm is None:
         task, found = task.balanced(found)
-    found, doubt = task.with_sure_modes(found, task.doubt(found, corner_known=True), True)
-    return _identification(task, found, doubt)
+    found, uncertainty = task.with_sure_modes(
+        found, task.uncertainty(found, corner_known=True), True
+    )
+    return _identification(task, found, uncertainty)
 
 
 def identify_with_path(
@@ -160,7 +162,7 @@ def identify_with_path(
 ) -> Identification:  # fmt: skip
     """As `identify_mechanics`, with what ``path`` does not tell found from the recording.
 
-    The torque alone cannot always tell whether set-points are interpolated; the motion can: a
+    The torque alone cannot always tell whether setpoints are interpolated; the motion can: a
     wrong answer leaves a delay that is negative, or a roll-off that no mechanics have. Beside a
     closed loop, path and mechanics need each other, and are refined in turn. ``inertia`` is the
     whole axis', where moves have told it. ``loop`` is the closed loop, where its
@@ -188,16 +190,16 @@ def identify_with_path(
         )[0]  # fmt: skip
 
     task, found = task.balanced(task.refined(best, again))
-    doubt = task.doubt(found, corner_known)
+    uncertainty = task.uncertainty(found, corner_known)
     by_torque = found.path
-    for _ in range(_PASSES if np.all(np.isfinite(doubt.path_step)) else 0):
-        if np.all(np.abs(doubt.path_step) < _SETTLED * doubt.path_std):
+    for _ in range(_PASSES if np.all(np.isfinite(uncertainty.path_step)) else 0):
+        if np.all(np.abs(uncertainty.path_step) < _SETTLED * uncertainty.path_std):
             break
-        found = task.moved(found, doubt)
-        doubt = task.doubt(found, corner_known, by_torque)
-    found, doubt = task.with_sure_modes(found, doubt, corner_known)
+        found = task.moved(found, uncertainty)
+        uncertainty = task.uncertainty(found, corner_known, by_torque)
+    found, uncertainty = task.with_sure_modes(found, uncertainty, corner_known)
     alike = [t for t in trials[1:] if _rank(t) < _rank(best) + _UNDECIDED]
-    made = _undecided(_identification(task, found, doubt), best, alike)
+    made = _undecided(_identification(task, found, uncertainty), best, alike)
     unexplained_torque = (
         not closed
         and all(record.torque is not None for record in records)
@@ -353,11 +355,13 @@ class _Task:
     def by_motion(self, trial: _Trial) -> _Trial:
         """The same with a path that only the motion moves, from where it is usual."""
         for _ in range(_MOTION_PASSES):
-            doubt = self.doubt(trial, corner_known=False)
-            finite = np.all(np.isfinite(doubt.path_step))
-            if not finite or np.all(np.abs(doubt.path_step) < _SETTLED * doubt.path_std):
+            uncertainty = self.uncertainty(trial, corner_known=False)
+            finite = np.all(np.isfinite(uncertainty.path_step))
+            if not finite or np.all(
+                np.abs(uncertainty.path_step) < _SETTLED * uncertainty.path_std
+            ):
                 break
-            moved = self.moved(trial, doubt)
+            moved = self.moved(trial, uncertainty)
             if moved.fit.score >= trial.fit.score:
                 break
             trial = moved
@@ -413,32 +417,32 @@ class _Task:
         return best
 
     def with_sure_modes(
-        self, trial: _Trial, doubt: Doubt, corner_known: bool
-    ) -> tuple[_Trial, Doubt]:
+        self, trial: _Trial, uncertainty: Uncertainty, corner_known: bool
+    ) -> tuple[_Trial, Uncertainty]:
         """The same with fewer modes as long as one of them may as well be none.
 
         Two that share what one does are as little known, each by itself.
         """
         motion = trial.fit if self.quantity == "torque_injection" else None
-        while trial.fit.error <= TRUSTED_ERROR and _unsure(trial, doubt):
+        while trial.fit.error <= TRUSTED_ERROR and _unsure(trial, uncertainty):
             task = replace(self, max_modes=len(trial.fit.model.modes) - 1)
             fewer = task.trial(trial.path, trial.views.velocity.coulomb_nm, motion)
             if fewer.fit.score > trial.fit.score + _WORTH_A_MODE:
                 break
-            trial, doubt = fewer, task.doubt(fewer, corner_known)
-        return trial, doubt
+            trial, uncertainty = fewer, task.uncertainty(fewer, corner_known)
+        return trial, uncertainty
 
-    def moved(self, trial: _Trial, doubt: Doubt) -> _Trial:
+    def moved(self, trial: _Trial, uncertainty: Uncertainty) -> _Trial:
         """The same mechanics refined on the path that torque and motion together would have."""
-        most = np.maximum(2.0 * doubt.path_std, _LONGEST_STEP)
-        step = np.clip(doubt.path_step, -most, most)
+        most = np.maximum(2.0 * uncertainty.path_std, _LONGEST_STEP)
+        step = np.clip(uncertainty.path_step, -most, most)
         path = moved_path(trial.path, float(step[0]), float(step[1]) if step.size > 1 else 0.0)
         motion = trial.fit if self.quantity == "torque_injection" else None
         return self.trial(path, trial.views.velocity.coulomb_nm, motion, trial.solution)
 
-    def doubt(
+    def uncertainty(
         self, trial: _Trial, corner_known: bool, by_torque: SignalPath | None = None
-    ) -> Doubt:
+    ) -> Uncertainty:
         """How far path and mechanics may be off together.
 
         ``by_torque`` is the path that the torque alone tells, where the trial has another one.
@@ -460,7 +464,7 @@ class _Task:
             )
             shifted.append(Shifted(views, _STEP))
         moved = path_between(by_torque or trial.path, trial.path)[: len(covariance)]
-        return joint_doubt(problem, trial.solution.x, shifted, covariance, moved)
+        return joint_uncertainty(problem, trial.solution.x, shifted, covariance, moved)
 
     def _loop(self, path: SignalPath, motion: SampledFit | None) -> LoopModel:
         """The controller that is closed meanwhile."""
@@ -488,7 +492,7 @@ def _rank(trial: _Trial) -> float:
 
 
 def _implausible(fit: SampledFit) -> float:
-    """A drive does not report what has not happened yet, and takes set-points at whole cycles."""
+    """A drive does not report what has not happened yet, and takes setpoints at whole cycles."""
     path = fit.path
     first_s = min(fit.delay_s, fit.position_delay_s)
     early = max(-first_s * path.sample_rate_hz - 0.1, 0.0)
@@ -496,7 +500,7 @@ def _implausible(fit: SampledFit) -> float:
     return _EARLY * early + _FRACTION * abs(cycles - round(cycles))
 
 
-def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
+def _identification(task: _Task, trial: _Trial, uncertainty: Uncertainty) -> Identification:
     """The estimates with what the fit found taken out."""
     views, path, fit = trial.views, trial.path, trial.fit
     spoilt = distortion(task.records, path, task.quantity, views.velocity)
@@ -515,7 +519,7 @@ def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
             plain = unexplained(views.velocity, trial.solution, 0)
         plain = everywhere(plain)
         return Identification(plain, plain, fit, False, spoilt, by_place=by_place)
-    parts = ways_of(views.velocity, views.position, path, fit, doubt)
+    parts = ways_of(views.velocity, views.position, path, fit, uncertainty)
     # Images stay in the direct estimate: its band must contain them.
     direct = [widened(p.lines, p.factor, 1.0, p.direct) for p in parts]
     corrected = [without_images(p.lines, p.factor, task.jitter_s, p.corrected) for p in parts]
@@ -527,35 +531,35 @@ def _identification(task: _Task, trial: _Trial, doubt: Doubt) -> Identification:
         return Identification(lines, lines, fit, False, spoilt, by_place=by_place)
     best = ended_where_unknown(best)
     moved = None if by_place is None else by_place.share(best)
-    doubts = tuple(
+    uncertainties = tuple(
         each.with_band(mode, best.frequency_hz, spoilt.share, moved)
-        for mode, each in zip(fit.model.modes, _mode_doubts(trial, doubt), strict=True)
+        for mode, each in zip(fit.model.modes, _mode_uncertainties(trial, uncertainty), strict=True)
     )
-    return Identification(lines, best, fit, True, spoilt, doubts, by_place=by_place)
+    return Identification(lines, best, fit, True, spoilt, uncertainties, by_place=by_place)
 
 
 def _hidden_by_friction(trial: _Trial) -> bool:
     """Whether lines were so uncertain by friction that other mechanics may have been there."""
-    doubt = trial.views.velocity.friction
-    return doubt is not None and float(np.mean(np.abs(doubt) > _HIDDEN)) > _HIDDEN_SHARE
+    uncertainty = trial.views.velocity.friction
+    return uncertainty is not None and float(np.mean(np.abs(uncertainty) > _HIDDEN)) > _HIDDEN_SHARE
 
 
-def _unsure(trial: _Trial, doubt: Doubt) -> bool:
+def _unsure(trial: _Trial, uncertainty: Uncertainty) -> bool:
     """Whether a mode within the band has a part in the response that may be nothing."""
     low, high = trial.views.velocity.frequency_hz[0], trial.fit.valid_band_hz[1]
-    pairs = zip(trial.fit.model.modes, _mode_doubts(trial, doubt), strict=True)
+    pairs = zip(trial.fit.model.modes, _mode_uncertainties(trial, uncertainty), strict=True)
     return any(d.residue > _UNSURE and low < m.frequency_hz < high for m, d in pairs)
 
 
-def _mode_doubts(trial: _Trial, doubt: Doubt) -> tuple[ModeDoubt, ...]:
+def _mode_uncertainties(trial: _Trial, uncertainty: Uncertainty) -> tuple[ModeUncertainty, ...]:
     """With what friction may do to all lines together."""
     given = [view for view in (trial.views.velocity, trial.views.position) if view is not None]
     together = [
         np.zeros(v.frequency_hz.size, np.complex128) if v.friction is None else v.friction
         for v in given
     ]
-    return mode_doubts(
-        trial.solution.problem, trial.solution.x, doubt.covariance, together,
+    return mode_uncertainties(
+        trial.solution.problem, trial.solution.x, uncertainty.covariance, together,
         friction_seen=trial.views.velocity.coulomb_nm > 0,
     )  # fmt: skip
 

@@ -274,8 +274,8 @@ def _intervals(
     blocks = max(float(np.count_nonzero(keep)) / block - 1.0, 1.0)
     swinging = _swinging_variance(whole, residual, weight, keep, block)
     swinging = swinging * float(student_t.ppf(0.975, blocks)) ** 2
-    doubt = np.sqrt(np.maximum(np.maximum(plain, swinging), 0.0)) / scale
-    half = np.hypot(doubt[:4], SYSTEMATIC_SHARE * np.abs(x[:4]))
+    uncertainty = np.sqrt(np.maximum(np.maximum(plain, swinging), 0.0)) / scale
+    half = np.hypot(uncertainty[:4], SYSTEMATIC_SHARE * np.abs(x[:4]))
     # What reversals bend of Coulomb friction, viscous friction makes up for at the speeds moved at.
     speed = float(np.sqrt(np.mean(a[:, 1] ** 2)))
     half[1] = np.hypot(half[1], _TOLD_APART * abs(x[2]) / speed)

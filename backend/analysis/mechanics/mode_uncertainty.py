@@ -33,7 +33,7 @@ _STEP = 1e-5
 
 
 @dataclass(frozen=True)
-class ModeDoubt:
+class ModeUncertainty:
     """One standard deviation each, relative: frequency, damping and residue of a mode."""
 
     frequency: float
@@ -43,7 +43,7 @@ class ModeDoubt:
     def with_band(
         self, mode: Mode, frequency_hz: FloatArray, distortion: FloatArray,
         by_place: FloatArray | None,
-    ) -> ModeDoubt:  # fmt: skip
+    ) -> ModeUncertainty:  # fmt: skip
         """Wider by what the model leaves open: ``distortion`` and ``by_place`` [lines] of the band.
 
         A line's phase beside a mode turns by 1/damping of a relative change of its frequency. An
@@ -67,10 +67,10 @@ class ModeDoubt:
         return damping * max(1.0 - apart, 0.0), damping * (1.0 + apart)
 
 
-def mode_doubts(
+def mode_uncertainties(
     problem: Problem, x: FloatArray, covariance: FloatArray, together: Sequence[ComplexArray],
     *, friction_seen: bool,
-) -> tuple[ModeDoubt, ...]:  # fmt: skip
+) -> tuple[ModeUncertainty, ...]:  # fmt: skip
     """For each mode of the model at ``x``, in its order.
 
     ``covariance`` is that of ``x``; ``together`` are, per view, one deviation [lines] of the
@@ -90,7 +90,7 @@ def mode_doubts(
     shift = np.einsum("pml,p->ml", slopes, _step_of(problem, x, together))
     least = _SYSTEMATIC**2 + (0.0 if friction_seen else 1.0) * _UNSEEN_FRICTION**2
     total = np.sqrt(np.maximum(spread, 0.0) + shift**2 + least)
-    return tuple(ModeDoubt(*(float(v) for v in row)) for row in total)
+    return tuple(ModeUncertainty(*(float(v) for v in row)) for row in total)
 
 
 def _modes(problem: Problem, x: FloatArray) -> FloatArray:

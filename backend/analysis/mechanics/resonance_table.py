@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from backend.analysis.mechanics.mechanical_model import MechanicalModel
-from backend.analysis.mechanics.mode_uncertainty import ModeDoubt
+from backend.analysis.mechanics.mode_uncertainty import ModeUncertainty
 from backend.analysis.mechanics.resonance import Resonance
 from backend.analysis.signals.arrays import FloatArray
 
@@ -20,17 +20,17 @@ _CI95 = 1.96
 
 def resonance_table(
     model: MechanicalModel, lines_hz: FloatArray, highest_hz: float,
-    doubts: tuple[ModeDoubt, ...] = (),
+    uncertainties: tuple[ModeUncertainty, ...] = (),
 ) -> tuple[Resonance, ...]:  # fmt: skip
     """Resonances and antiresonances that the lines show, ascending; heights are local, in dB.
 
     A mode that hardly rises, or that no line shows because it is narrower than what lies between
-    two of them, explains noise; so does one whose own part may as well be nothing, by ``doubts``
-    (one for each mode, or none).
+    two of them, explains noise; so does one whose own part may as well be nothing, by
+    ``uncertainties`` (one for each mode, or none).
     """
     rows: list[Resonance] = []
     for number, mode in enumerate(model.modes):
-        known = doubts[number] if doubts else None
+        known = uncertainties[number] if uncertainties else None
         height = model.height_db(mode)
         low = mode.frequency_hz < _LOWEST_MODE_HZ
         nearest_hz = float(np.min(np.abs(lines_hz - mode.frequency_hz)))

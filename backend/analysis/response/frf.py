@@ -138,8 +138,8 @@ def estimate_periodic(
     plain = instrument_estimate(s, continuous_input(s, path, quantity, position=position))[0]
     told = all(record.told_direction is not None for record in records)
     # Where friction takes most of the torque, a share of it is much of what is left.
-    doubt = _BY_BALANCE * (g / plain - 1.0) if told else _BY_SPEED * np.log(g / plain)
-    size, turn = np.abs(doubt.real), np.abs(doubt.imag)
+    uncertainty = _BY_BALANCE * (g / plain - 1.0) if told else _BY_SPEED * np.log(g / plain)
+    size, turn = np.abs(uncertainty.real), np.abs(uncertainty.imag)
     if told:
         # What the balance leaves is no share of what friction did: it may turn a line as well.
         size = turn = _EACH_BY_BALANCE * np.abs(g / plain - 1.0)
@@ -170,7 +170,7 @@ def estimate_periodic(
         periods_dropped=s.dropped,
         coulomb_nm=coulomb_nm,
         scatter_left=scatter_left(s, path, quantity, coulomb_nm),
-        friction=np.asarray(doubt),
+        friction=np.asarray(uncertainty),
     )
 
 

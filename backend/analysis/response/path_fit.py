@@ -1,6 +1,6 @@
-"""Hold, delay and current loop between the sent set-points and the torque, from the recording.
+"""Hold, delay and current loop between the sent setpoints and the torque, from the recording.
 
-The sampled torque is what the set-points cause by a short difference equation, and beside a
+The sampled torque is what the setpoints cause by a short difference equation, and beside a
 closed loop what that makes of the sampled speed. Both are fitted together, line by line.
 """
 
@@ -24,7 +24,7 @@ from backend.analysis.response.sampling import (
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.analysis.signals.line_spectra import Record, mean_spectra
 
-#: Set-points are in force after this many cycles at most.
+#: Setpoints are in force after this many cycles at most.
 _MOST_CYCLES = 3.5
 #: Parts of a cycle that a search begins with.
 _PARTS = (0.0, 0.25, 0.5, 0.75, 0.88, 0.94)
@@ -85,7 +85,7 @@ def path_covariance(
     """How exactly the torque tells a path that it was found with: cycles and log of the corner.
 
     Covariance [2, 2], or [1, 1] without a corner. What the torque leaves open is as unusual as
-    drives are: those in step with the bus take set-points at its cycles, and a corner that a
+    drives are: those in step with the bus take setpoints at its cycles, and a corner that a
     drive tells is meant to be one of first order. ``controller`` is the closed loop's, where it is
     known.
     """
@@ -148,7 +148,7 @@ def ranked(fit: PathFit, holds: tuple[Hold, ...]) -> tuple[SignalPath, ...]:
 
 
 def at_whole_cycles(path: SignalPath) -> bool:
-    """Whether set-points take effect with a cycle of the bus, as drives in step with it do."""
+    """Whether setpoints take effect with a cycle of the bus, as drives in step with it do."""
     cycles = cycles_of(path)
     return abs(cycles - round(cycles)) < _WHOLE
 

@@ -61,12 +61,12 @@ def commanded(path: SignalPath) -> bool:
     return path.current_bandwidth_hz is not None and path.current_bandwidth_hz > _COMMANDED_HZ
 
 
-def current_doubt(frequency_hz: FloatArray) -> ComplexArray:
+def current_uncertainty(frequency_hz: FloatArray) -> ComplexArray:
     """Logarithm of what an ordinary current loop takes that no recording shows, but its delay."""
     return _without_delay(frequency_hz, np.log(lag_response(frequency_hz, _USUAL_HZ)))
 
 
-def slow_doubt(frequency_hz: FloatArray, corner_hz: float) -> ComplexArray:
+def slow_uncertainty(frequency_hz: FloatArray, corner_hz: float) -> ComplexArray:
     """Logarithm of what one lag of this corner may be beside two of the same delay.
 
     A slow torque is an ordinary current loop behind a filter as well as one slow lag.
@@ -78,7 +78,7 @@ def slow_doubt(frequency_hz: FloatArray, corner_hz: float) -> ComplexArray:
     return np.asarray(np.log(two / lag_response(frequency_hz, corner_hz)))
 
 
-def path_doubt(frequency_hz: FloatArray) -> ComplexArray:
+def path_uncertainty(frequency_hz: FloatArray) -> ComplexArray:
     """Logarithm of what a path may take that neither the drive nor its torque explains.
 
     One lag more as slow as current loops hardly are, the delay of which is found to `_LATE_S`.
@@ -88,9 +88,11 @@ def path_doubt(frequency_hz: FloatArray) -> ComplexArray:
     return np.asarray(form.real + 1j * np.hypot(form.imag, 2 * np.pi * f * _LATE_S))
 
 
-def charged(frf: Frf, lines_hz: FloatArray, doubt: ComplexArray) -> Frf:
-    """A wider band by a doubt that is known on ``lines_hz``."""
-    size, turn = (np.interp(frf.frequency_hz, lines_hz, x) for x in (doubt.real, doubt.imag))
+def charged(frf: Frf, lines_hz: FloatArray, uncertainty: ComplexArray) -> Frf:
+    """A wider band by a uncertainty that is known on ``lines_hz``."""
+    size, turn = (
+        np.interp(frf.frequency_hz, lines_hz, x) for x in (uncertainty.real, uncertainty.imag)
+    )
     return replace(
         frf,
         std_db=np.hypot(frf.std_db, 20 / np.log(10) * size),

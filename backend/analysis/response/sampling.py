@@ -58,15 +58,15 @@ def lead_s(hold: Hold) -> float:
 
 
 def command_delay_s(cycles: float, hold: Hold, sample_rate_hz: float) -> float:
-    """Delay of a path whose set-points take effect after so many cycles, in s; 0 cycles at least.
+    """Delay of a path whose setpoints take effect after so many cycles, in s; 0 cycles at least.
 
-    Negative by the lead where a drive begins its interpolation in the cycle of the set-point.
+    Negative by the lead where a drive begins its interpolation in the cycle of the setpoint.
     """
     return max(cycles, 0.0) / sample_rate_hz - lead_s(hold)
 
 
 def cycles_of(path: SignalPath) -> float:
-    """After how many cycles set-points take effect: the reverse of `command_delay_s`."""
+    """After how many cycles setpoints take effect: the reverse of `command_delay_s`."""
     return (path.command_delay_s + lead_s(path.hold)) * path.sample_rate_hz
 
 
@@ -194,6 +194,6 @@ def _difference_equation(path: SignalPath) -> tuple[FloatArray, float, int]:
     a = 0.0 if wc is None else float(np.exp(-wc * period_s))
     numerator = impulse - a * np.concatenate([[0.0], impulse[:-1]])
     if whole < 0.0:
-        # A line that begins before its set-point's cycle does is not yet at its value there.
+        # A line that begins before its setpoint's cycle does is not yet at its value there.
         return numerator[1:], a, int(whole) + 1
     return numerator, a, int(whole)

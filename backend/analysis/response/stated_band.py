@@ -16,7 +16,7 @@ from backend.analysis.signals.arrays import ComplexArray, FloatArray, neighbour_
 SYSTEMATIC_DB = 0.05
 SYSTEMATIC_DEG = 0.35
 
-#: So much of what is taken out as images may be wrong beside what the model's doubt says.
+#: So much of what is taken out as images may be wrong beside what the model's uncertainty says.
 _IMAGES_LEFT = 0.08
 
 #: By a model, an answer holds while 95 of 100 cases lie within these limits of it.
@@ -109,23 +109,25 @@ def _better(one: Frf, other: Frf) -> Frf:
     )
 
 
-def widened(frf: Frf, factor: ComplexArray, share: float, doubt: ComplexArray) -> Frf:
-    """Charge a share of the image factor, the doubt, and what none is better than, to the band."""
+def widened(frf: Frf, factor: ComplexArray, share: float, uncertainty: ComplexArray) -> Frf:
+    """Charge a share of the image factor, the uncertainty and the least error to the band."""
     image = np.log(factor)
-    doubt_db = 20 / np.log(10) * np.hypot(image.real * share, doubt.real)
-    doubt_deg = np.degrees(np.hypot(image.imag * share, doubt.imag))
+    uncertainty_db = 20 / np.log(10) * np.hypot(image.real * share, uncertainty.real)
+    uncertainty_deg = np.degrees(np.hypot(image.imag * share, uncertainty.imag))
     return replace(
         frf,
-        std_db=np.hypot(frf.std_db, np.hypot(doubt_db, SYSTEMATIC_DB)),
-        std_deg=np.hypot(frf.std_deg, np.hypot(doubt_deg, SYSTEMATIC_DEG)),
+        std_db=np.hypot(frf.std_db, np.hypot(uncertainty_db, SYSTEMATIC_DB)),
+        std_deg=np.hypot(frf.std_deg, np.hypot(uncertainty_deg, SYSTEMATIC_DEG)),
     )
 
 
-def without_images(direct: Frf, factor: ComplexArray, jitter_s: float, doubt: ComplexArray) -> Frf:
+def without_images(
+    direct: Frf, factor: ComplexArray, jitter_s: float, uncertainty: ComplexArray
+) -> Frf:
     """The lines without what sampling folds back, and the band that is left to them."""
-    # The correction is as uncertain as the model; beside its doubt a part of it stays in the band.
+    # The correction is as uncertain as the model: a part of it stays in the band, too.
     return replace(
-        widened(direct, factor, _IMAGES_LEFT, doubt),
+        widened(direct, factor, _IMAGES_LEFT, uncertainty),
         response=np.asarray(direct.response / factor),
         valid_band_hz=valid_band_hz(
             float(direct.frequency_hz[0]), direct.sample_rate_hz, model=True, jitter_s=jitter_s

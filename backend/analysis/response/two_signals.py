@@ -12,7 +12,7 @@ import numpy as np
 from backend.analysis.response.frf import Frf
 from backend.analysis.response.sampled_model import SampledFit
 from backend.analysis.response.sampling import SignalPath, delay_response, lag_response
-from backend.analysis.response.uncertainty import Doubt
+from backend.analysis.response.uncertainty import Uncertainty
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 #: Of what the two are folded differently by, so much may be wrong: a drive's speed is not quite a
@@ -22,7 +22,7 @@ _NOT_QUITE = 0.1
 
 @dataclass(frozen=True)
 class Way:
-    """One estimate with delay and filter taken out: its lines, what images make of them, doubts."""
+    """One estimate without delay and filter: its lines, their images, their uncertainties."""
 
     lines: Frf
     factor: ComplexArray
@@ -31,7 +31,7 @@ class Way:
 
 
 def ways_of(
-    velocity: Frf, position: Frf | None, path: SignalPath, fit: SampledFit, doubt: Doubt
+    velocity: Frf, position: Frf | None, path: SignalPath, fit: SampledFit, uncertainty: Uncertainty
 ) -> list[Way]:
     """From velocity, from position where there is one, and then from both together.
 
@@ -43,13 +43,13 @@ def ways_of(
     if path.response_bandwidth_hz is None:
         late = late * lag_response(f, fit.path.response_bandwidth_hz)
     lines = replace(velocity, response=np.asarray(velocity.response / late))
-    by_speed = Way(lines, fit.image_factor(f), doubt.corrected[0], doubt.direct[0])
+    by_speed = Way(lines, fit.image_factor(f), uncertainty.corrected[0], uncertainty.direct[0])
     if position is None:
         return [by_speed]
     late = delay_response(f, fit.position_delay_s)
     lines = replace(position, response=np.asarray(position.response / late))
     factor = fit.image_factor(f, integrated=True)
-    by_place = Way(lines, factor, doubt.corrected[1], doubt.direct[1])
+    by_place = Way(lines, factor, uncertainty.corrected[1], uncertainty.direct[1])
     return [by_speed, by_place, _without_first_image(by_speed, by_place, fit)]
 
 

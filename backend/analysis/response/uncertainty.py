@@ -30,7 +30,7 @@ class Shifted:
 
 
 @dataclass(frozen=True)
-class Doubt:
+class Uncertainty:
     """One standard deviation per view and line, as the logarithm: real is size, imaginary phase.
 
     ``corrected`` for lines with images taken out, ``direct`` for those with them. ``path_step`` is
@@ -45,11 +45,11 @@ class Doubt:
     """Of the fit's parameters, [n, n]."""
 
 
-def doubt(
+def uncertainty(
     problem: Problem, x: FloatArray, shifted: Sequence[Shifted], path_covariance: FloatArray,
     moved: FloatArray,
-) -> Doubt:  # fmt: skip
-    """Joint doubt at a solution ``x``; ``path_covariance`` [n, n] is known of the n shifts.
+) -> Uncertainty:  # fmt: skip
+    """Joint uncertainty at a solution ``x``; ``path_covariance`` [n, n] is known of the n shifts.
 
     ``moved`` [n] is how far the path already is from where the torque alone would have it.
     """
@@ -81,7 +81,7 @@ def doubt(
         raw = [np.log(s.views[place].g / view.g) / s.step for s in shifted]
         plain = np.vstack([_late_slopes(problem, view, x), *raw])
         direct.append(_spread(plain, covariance))
-    return Doubt(
+    return Uncertainty(
         tuple(corrected), tuple(direct), step[x.size :],
         np.sqrt(np.maximum(np.diag(covariance)[x.size :], 0.0)),
         # All lines together may be explained better than each of a few is known.

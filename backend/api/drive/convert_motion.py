@@ -12,7 +12,7 @@ from backend.api.live.messages import JogStart
 from backend.axis.axis import Envelope
 from backend.scales.travel_units import REVOLUTIONS, TravelUnit, travel_unit
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.tools.jog.cyclic import GeneratorSettings
 from backend.tools.jog.run import JogSettings
 from backend.tools.moves.homing import HomingSettings
@@ -23,7 +23,7 @@ _SPEED_UNLIMITED_RPM = 20_000.0
 _SEQUENCE_MOVE_S = 60.0
 
 
-async def unit_of(bench: Bench, member: Member, name: str) -> TravelUnit:
+async def unit_of(bench: Bench, connected: ConnectedDrive, name: str) -> TravelUnit:
     """The travel unit that a request names.
 
     Raises:
@@ -31,8 +31,8 @@ async def unit_of(bench: Bench, member: Member, name: str) -> TravelUnit:
     """
     if name == REVOLUTIONS.name:
         return REVOLUTIONS
-    mechanics = bench.axis_records.get(member.drive.id).mechanics
-    return travel_unit(member.drive.name, name, mechanics, await member.axis.units())
+    mechanics = bench.axis_records.get(connected.drive.id).mechanics
+    return travel_unit(connected.drive.name, name, mechanics, await connected.axis.units())
 
 
 def _envelope(

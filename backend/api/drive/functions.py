@@ -8,7 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Request
 
 from backend.api import convert
-from backend.api.context import Controlled, TheBench, TheMember
+from backend.api.context import Controlled, TheBench, TheDrive
 from backend.api.drive.models_functions import (
     AxisRecordInfo,
     BrakingInfo,
@@ -35,7 +35,7 @@ from backend.drive.readings import Reading
 from backend.functions import gear, regeneration
 from backend.scales.gear_calculator import GearPlan, Mechanics
 from backend.scales.units import gentlest_ramp_rpm_s
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.tools.moves import identification
 from drivers.errors import DriveError
 from drivers.texts.message import text
@@ -59,29 +59,29 @@ TheStore = Annotated[AxisStore, Depends(store_of)]
 
 
 @router.get(f"{_DRIVE}/functions")
-async def describe_functions(member: TheMember) -> Functions:
+async def describe_functions(connected: TheDrive) -> Functions:
     """What the pages need of this family beyond its parameters; nothing is read from the drive."""
-    return functions_of(member.drive.profile)
+    return functions_of(connected.drive.profile)
 
 
 # --- fault history ----------------------------------------------------------------------
 
 
 @router.get(f"{_DRIVE}/fault-history")
-async def fault_history(member: TheMember) -> FaultHistoryInfo:
+async def fault_history(connected: TheDrive) -> FaultHistoryInfo:
     """The drive's own record, read now where that takes no write; else how it is kept."""
-    history = history_of(member.drive)
+    history = history_of(connected.drive)
     if history is None or history.kind != "slots":
-        return _history(member.drive, history, None)
-    return _history(member.drive, history, await read_history(member.axis))
+        return _history(connected.drive, history, None)
+    return _history(connected.drive, history, await read_history(connected.axis))
 
 
 @router.post(f"{_DRIVE}/fault-history/read")
-async def read_fault_history(bench: TheBench, member: Controlled) -> FaultHistoryInfo:
+async def read_fault_history(bench: TheBench, connected: Controlled) -> FaultHistoryInfo:
     """The drive's own record, read now; a selector is written and put back where it takes one."""
-    entries = await read_history(member.axis)
-    bench.journal.add(f"{member.drive.name}: fault history read", drive=member.drive.id)
-    return _history(member.drive, history_of(member.drive), entries)
+    entries = await read_history(connected.axis)
+    bench.journal.add(f"{connected.drive.name}: fault history read", drive=connected.drive.id)
+    return _history(connected.drive, history_of(connected.drive), entries)
 
 
 def _history(
@@ -132,21 +132,23 @@ def _frozen(reading: Reading) -> ParameterValue:
 
 @router.post(f"{_DRIVE}/jobs/identify", status_code=202)
 async def start_identification(
-    bench: TheBench, member: Controlled, request: IdentifyRequest
+    bench: TheBench, connected: Controlled, request: IdentifyRequest
 ) -> JobInfo:
     """Let the drive identify motor and load by itself; the motor moves."""
-    identification.require_identification(member.axis)
+    identification.require_identification(connected.axis)
     # The drive chooses the speed: only travel, torque and time are bounded here.
     envelope = Envelope(request.travel_limit, _ANY_RPM, request.torque_limit, request.timeout_s)
     settings = identification.IdentifySettings(envelope, request.confirmed)
     job = bench.jobs.start(
         "identify",
-        text("api-drive.identification-drive", member_drive=member.drive.name),
-        lambda progress: identification.identify(member.axis, settings, progress),
-        drive=member.drive.id,
+        text("api-drive.identification-drive", member_drive=connected.drive.name),
+        lambda progress: identification.identify(connected.axis, settings, progress),
+        drive=connected.drive.id,
         motion=True,
     )
-    bench.journal.add(f"{member.drive.name}: identification by the drive", drive=member.drive.id)
+    bench.journal.add(
+        f"{connected.drive.name}: identification by the drive", drive=connected.drive.id
+    )
     return convert.job(job)
 
 
@@ -154,26 +156,28 @@ async def start_identification(
 
 
 @router.get(f"{_DRIVE}/record")
-async def axis_record(member: TheMember, store: TheStore) -> AxisRecordInfo:
+async def axis_record(connected: TheDrive, store: TheStore) -> AxisRecordInfo:
     """Mechanics and watch list of an axis, and what its drive bounds motions to."""
-    return _record(member, store.get(member.drive.id))
+    return _record(connected, store.get(connected.drive.id))
 
 
 @router.put(f"{_DRIVE}/mechanics")
 async def keep_mechanics(
-    member: Controlled, store: TheStore, request: MechanicsUpdate
+    connected: Controlled, store: TheStore, request: MechanicsUpdate
 ) -> AxisRecordInfo:
     """Keep the mechanics, so that pages show travel. Nothing is written to the drive."""
     if request.mechanics is not None:
         request.mechanics.travel_per_load_turn()
-    old = store.get(member.drive.id)
+    old = store.get(connected.drive.id)
     note_before(mechanics=None if old.mechanics is None else old.mechanics.model_dump())
     kept = old.model_copy(update={"mechanics": request.mechanics})
-    return _record(member, store.put(member.drive.id, kept))
+    return _record(connected, store.put(connected.drive.id, kept))
 
 
 @router.put(f"{_DRIVE}/watch")
-async def keep_watch(member: Controlled, store: TheStore, request: WatchUpdate) -> AxisRecordInfo:
+async def keep_watch(
+    connected: Controlled, store: TheStore, request: WatchUpdate
+) -> AxisRecordInfo:
     """Keep the watch list.
 
     Raises:
@@ -181,23 +185,23 @@ async def keep_watch(member: Controlled, store: TheStore, request: WatchUpdate) 
     """
     keys: list[str] = []
     for key in request.keys:
-        parameter = member.drive.profile.parameter(key)
+        parameter = connected.drive.profile.parameter(key)
         if parameter is None:
-            raise NotFound("api-drive.no-parameter", drive=member.drive.name, key=key)
+            raise NotFound("api-drive.no-parameter", drive=connected.drive.name, key=key)
         if parameter.key not in keys:
             keys.append(parameter.key)
-    old = store.get(member.drive.id)
+    old = store.get(connected.drive.id)
     note_before(keys=old.watch)
     kept = old.model_copy(update={"watch": tuple(keys)})
-    return _record(member, store.put(member.drive.id, kept))
+    return _record(connected, store.put(connected.drive.id, kept))
 
 
-def _record(member: Member, record: AxisRecord) -> AxisRecordInfo:
+def _record(connected: ConnectedDrive, record: AxisRecord) -> AxisRecordInfo:
     mechanics = record.mechanics
-    ramp = member.drive.key("profile_acceleration")
+    ramp = connected.drive.key("profile_acceleration")
     return AxisRecordInfo(
         mechanics=mechanics,
-        gentlest_ramp_rpm_s=gentlest_ramp_rpm_s(member.drive, ramp) if ramp else None,
+        gentlest_ramp_rpm_s=gentlest_ramp_rpm_s(connected.drive, ramp) if ramp else None,
         travel_unit=mechanics.unit if mechanics else "",
         travel_per_motor_turn=float(mechanics.travel_per_motor_turn()) if mechanics else None,
         watch=list(record.watch),
@@ -205,12 +209,12 @@ def _record(member: Member, record: AxisRecord) -> AxisRecordInfo:
 
 
 @router.post(f"{_DRIVE}/gear/plan")
-async def plan_gear(member: TheMember, request: Mechanics) -> GearPlanInfo:
+async def plan_gear(connected: TheDrive, request: Mechanics) -> GearPlanInfo:
     """What the gear would be for these mechanics. Nothing is written."""
-    plan = await gear.plan(member.axis, request)
-    readings = await member.drive.read_many([value.parameter.key for value in plan.values])
-    rpm = await _greatest_rpm(member)
-    limits = functions_of(member.drive.profile).gear
+    plan = await gear.plan(connected.axis, request)
+    readings = await connected.drive.read_many([value.parameter.key for value in plan.values])
+    rpm = await _greatest_rpm(connected)
+    limits = functions_of(connected.drive.profile).gear
     return GearPlanInfo(
         unit=plan.unit,
         values=[
@@ -235,28 +239,28 @@ async def plan_gear(member: TheMember, request: Mechanics) -> GearPlanInfo:
         notes=limits.notes,
         source=limits.source,
         warnings=list(plan.warnings),
-        counted=counted(member, plan),
+        counted=counted(connected, plan),
     )
 
 
-def counted(member: Member, plan: GearPlan) -> list[str]:
+def counted(connected: ConnectedDrive, plan: GearPlan) -> list[str]:
     """Parameters that count in user increments, while the gear really changes."""
-    now = member.drive.readings
+    now = connected.drive.readings
     same = all(
         (reading := now.get(value.parameter.key)) is not None and reading.raw == value.raw
         for value in plan.values
     )
-    return [] if same else gear.counted_in_increments(member.axis)
+    return [] if same else gear.counted_in_increments(connected.axis)
 
 
-async def _greatest_rpm(member: Member) -> float | None:
+async def _greatest_rpm(connected: ConnectedDrive) -> float | None:
     """Greatest motor speed, or the rated one, where the drive tells it in rpm."""
     for role in ("max_speed", "rated_speed"):
-        parameter = member.drive.profile.by_role.get(role)
-        if parameter is None or parameter.unit != "rpm" or member.drive.key(role) is None:
+        parameter = connected.drive.profile.by_role.get(role)
+        if parameter is None or parameter.unit != "rpm" or connected.drive.key(role) is None:
             continue
         try:
-            value = (await member.drive.read(parameter.key)).value
+            value = (await connected.drive.read(parameter.key)).value
         except DriveError:
             continue  # only a comfort of the calculator
         if isinstance(value, (int, float)) and value > 0:
@@ -266,21 +270,21 @@ async def _greatest_rpm(member: Member) -> float | None:
 
 @router.post(f"{_DRIVE}/gear/write")
 async def write_gear(
-    bench: TheBench, member: Controlled, store: TheStore, request: Mechanics
+    bench: TheBench, connected: Controlled, store: TheStore, request: Mechanics
 ) -> GearWritten:
     """Write the gear for these mechanics, all or nothing, and keep the mechanics."""
-    with bench.motion.keeping_still(member):
-        plan = await gear.plan(member.axis, request)
-        change = await gear.write_gear(member.axis, plan.values)
-    old = store.get(member.drive.id)
-    store.put(member.drive.id, old.model_copy(update={"mechanics": request}))
+    with bench.motion.keeping_still(connected):
+        plan = await gear.plan(connected.axis, request)
+        change = await gear.write_gear(connected.axis, plan.values)
+    old = store.get(connected.drive.id)
+    store.put(connected.drive.id, old.model_copy(update={"mechanics": request}))
     for value in plan.values:
         key = value.parameter.key
         if key in change.before:
             bench.journal.add(
-                f"{member.drive.name}: {key} {value.parameter.name}: "
+                f"{connected.drive.name}: {key} {value.parameter.name}: "
                 f"{change.before[key]} → {value.raw}",
-                drive=member.drive.id,
+                drive=connected.drive.id,
             )
     return GearWritten(before=change.before, waits=change.waits)
 

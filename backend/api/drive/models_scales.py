@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from backend.api.models import Message
-from backend.scales.scale import Doubt, Origin, Quantity
+from backend.scales.scale import Origin, Quantity, Uncertainty
 
 
 class ScaleInfo(Message):
@@ -20,7 +20,7 @@ class ScaleInfo(Message):
     is_time: bool = Field(description="a ramp given as a time in ms, which no factor converts")
     origin: Origin
     source: str = Field(description="objects, file or the manual's place")
-    doubt: Doubt | None = Field(description="why it is not certain")
+    uncertainty: Uncertainty | None = Field(description="why it is not certain")
     why: str = Field(description="the same in words, or empty")
     remedy: str = Field(description="how it becomes certain, or empty")
 

@@ -103,8 +103,8 @@ def _refused(key: str, error: CannotClassify) -> NotAllowed:
 async def _changed(bench: Bench, profile: str, parameter: Parameter) -> MotionClass:
     """Drives on the bench have the new class at once."""
     known = await asyncio.to_thread(load_profile, profile)
-    for member in bench.members.values():
-        if member.drive.profile.drive == profile:
-            member.drive.profile = known
+    for connected in bench.connected_drives.values():
+        if connected.drive.profile.drive == profile:
+            connected.drive.profile = known
     bench.journal.add(f"{known.title}: {parameter.key} {parameter.name}: {parameter.motion}")
     return _answer(profile, parameter.key)

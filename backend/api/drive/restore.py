@@ -14,18 +14,20 @@ router = APIRouter(prefix="/drives/{drive_id}")
 
 
 @router.post("/jobs/put-back", status_code=202)
-async def put_back(bench: TheBench, member: Controlled) -> JobInfo:
-    """Put back every value that is owed to the drive, while its axis stands."""
-    if not member.drive.owed:
-        raise NotAllowed("api-drive.nothing-put-back", drive=member.drive.name)
-    return convert.job(bench.returning.start(member, asked=True))
+async def put_back(bench: TheBench, connected: Controlled) -> JobInfo:
+    """Restore every pending value of the drive, while its axis stands."""
+    if not connected.drive.pending_restores:
+        raise NotAllowed("api-drive.nothing-put-back", drive=connected.drive.name)
+    return convert.job(bench.reconnection.start(connected, asked=True))
 
 
-@router.delete("/owed")
-async def keep_as_it_is(bench: TheBench, member: Controlled) -> DriveSummary:
+@router.delete("/pending-restores")
+async def keep_as_it_is(bench: TheBench, connected: Controlled) -> DriveSummary:
     """The values shall stay as they are now; nothing is written."""
-    debts = member.drive.owed.debts
-    member.drive.owed.settle([debt.key for debt in debts])
-    for debt in debts:
-        bench.tell(f"{member.drive.name}: {debt.key} (was {debt.raw}) stays as it is", member)
-    return convert.drive_summary(bench, member)
+    entries = connected.drive.pending_restores.entries
+    connected.drive.pending_restores.settle([entry.key for entry in entries])
+    for entry in entries:
+        bench.tell(
+            f"{connected.drive.name}: {entry.key} (was {entry.raw}) stays as it is", connected
+        )
+    return convert.drive_summary(bench, connected)

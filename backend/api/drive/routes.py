@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable, Iterable
 from fastapi import APIRouter
 
 from backend.api import convert
-from backend.api.context import Controlled, TheBench, TheMember
+from backend.api.context import Controlled, TheBench, TheDrive
 from backend.api.drive import convert_motion
 from backend.api.drive.models_axis import (
     ActiveFault,
@@ -41,7 +41,7 @@ from backend.drive.readings import Reading
 from backend.functions.assign import assign
 from backend.motion.classes import held_still, motion_of
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.tools import parameters
 from backend.tools.jog import cyclic as cyclic_motion
 from backend.tools.moves import homing, move, procedures
@@ -55,29 +55,31 @@ router = APIRouter(prefix="/drives/{drive_id}")
 
 
 @router.get("/state")
-async def state(bench: TheBench, member: TheMember) -> AxisState:
+async def state(bench: TheBench, connected: TheDrive) -> AxisState:
     """State of the axis, read now."""
-    return convert.axis_state(bench, member, await member.monitor.refresh())
+    return convert.axis_state(bench, connected, await connected.monitor.refresh())
 
 
 @router.get("/faults")
-async def faults(member: TheMember) -> list[ActiveFault]:
+async def faults(connected: TheDrive) -> list[ActiveFault]:
     """Faults and warnings that are present, read now."""
-    return [convert.fault(fault) for fault in await member.axis.active_faults()]
+    return [convert.fault(fault) for fault in await connected.axis.active_faults()]
 
 
 @router.post("/transition")
-async def transition(bench: TheBench, member: Controlled, request: TransitionRequest) -> AxisState:
-    """Drive the power state machine. Enabling aims the set-point at where the axis stands."""
+async def transition(
+    bench: TheBench, connected: Controlled, request: TransitionRequest
+) -> AxisState:
+    """Drive the power state machine. Enabling aims the setpoint at where the axis stands."""
     goal = State(request.goal)
-    mode = None if request.mode is None else _mode(member, request.mode)
-    await _alone(bench, member, goal.value, lambda: member.axis.transition(goal, mode))
-    bench.journal.add(f"{member.drive.name}: {goal.value}", drive=member.drive.id)
-    return convert.axis_state(bench, member, await member.monitor.refresh())
+    mode = None if request.mode is None else _mode(connected, request.mode)
+    await _alone(bench, connected, goal.value, lambda: connected.axis.transition(goal, mode))
+    bench.journal.add(f"{connected.drive.name}: {goal.value}", drive=connected.drive.id)
+    return convert.axis_state(bench, connected, await connected.monitor.refresh())
 
 
 async def _alone(
-    bench: Bench, member: Member, title: str, work: Callable[[], Awaitable[object]]
+    bench: Bench, connected: ConnectedDrive, title: str, work: Callable[[], Awaitable[object]]
 ) -> None:
     """Change the power state as a motion job: no other motion begins meanwhile, STOP ends it.
 
@@ -91,7 +93,7 @@ async def _alone(
         await work()
         return None
 
-    drive = member.drive
+    drive = connected.drive
     job = bench.jobs.start(
         "power",
         text("work.of-drive", title=title, drive=drive.name),
@@ -106,33 +108,33 @@ async def _alone(
         raise job.error
 
 
-def _mode(member: Member, number: int) -> Mode:
+def _mode(connected: ConnectedDrive, number: int) -> Mode:
     try:
         return Mode(number)
     except ValueError as error:
         raise OutOfRange(
             "api-drive.no-mode",
-            drive=member.drive.name,
+            drive=connected.drive.name,
             value=number,
-            limit=", ".join(str(mode) for mode in member.drive.modes),
+            limit=", ".join(str(mode) for mode in connected.drive.modes),
         ) from error
 
 
 @router.post("/fault-reset")
-async def fault_reset(bench: TheBench, member: Controlled) -> AxisState:
+async def fault_reset(bench: TheBench, connected: Controlled) -> AxisState:
     """Reset faults whose cause is gone."""
-    await _alone(bench, member, "Fault reset", member.axis.reset_fault)
-    bench.journal.add(f"{member.drive.name}: fault reset", drive=member.drive.id)
-    return convert.axis_state(bench, member, await member.monitor.refresh())
+    await _alone(bench, connected, "Fault reset", connected.axis.reset_fault)
+    bench.journal.add(f"{connected.drive.name}: fault reset", drive=connected.drive.id)
+    return convert.axis_state(bench, connected, await connected.monitor.refresh())
 
 
 # --- parameters -----------------------------------------------------------------------
 
 
 @router.get("/parameters")
-async def list_parameters(member: TheMember) -> list[ParameterRow]:
+async def list_parameters(connected: TheDrive) -> list[ParameterRow]:
     """All parameters with their last readings; nothing is read from the drive."""
-    drive = member.drive
+    drive = connected.drive
     last = convert.readings(drive, [p.key for p in drive.profile.parameters])
     return [
         convert.parameter_row(drive, parameter, value)
@@ -142,38 +144,38 @@ async def list_parameters(member: TheMember) -> list[ParameterRow]:
 
 @router.put("/parameters")
 async def write_parameters(
-    bench: TheBench, member: Controlled, request: ParameterWrites
+    bench: TheBench, connected: Controlled, request: ParameterWrites
 ) -> list[WriteResult]:
     """Write several, one after the other; a failure does not stop the rest."""
     results: list[WriteResult] = []
     for key, value in request.values.items():
         try:
-            await _write(bench, member, key, value)
+            await _write(bench, connected, key, value)
             problem = None
         except DriveError as error:
             problem = problem_of(error)
-        known = member.drive.profile.parameter(key)
-        last = convert.reading(member.drive, known.key if known else key)
+        known = connected.drive.profile.parameter(key)
+        last = convert.reading(connected.drive, known.key if known else key)
         results.append(WriteResult(key=key, ok=problem is None, reading=last, problem=problem))
     return results
 
 
 @router.get("/parameters/{key}")
-async def read_parameter(member: TheMember, key: str) -> ParameterValue:
+async def read_parameter(connected: TheDrive, key: str) -> ParameterValue:
     """Read one parameter from the drive."""
-    _require_known(member, key)
-    reading = await member.drive.read(key)
-    return convert.reading(member.drive, reading.key)
+    _require_known(connected, key)
+    reading = await connected.drive.read(key)
+    return convert.reading(connected.drive, reading.key)
 
 
 @router.put("/parameters/{key}")
 async def write_parameter(
-    bench: TheBench, member: Controlled, key: str, request: ParameterWrite
+    bench: TheBench, connected: Controlled, key: str, request: ParameterWrite
 ) -> ParameterValue:
     """Write one parameter and read it back."""
-    _require_known(member, key)
-    reading = await _write(bench, member, key, request)
-    return convert.reading(member.drive, reading.key)
+    _require_known(connected, key)
+    reading = await _write(bench, connected, key, request)
+    return convert.reading(connected.drive, reading.key)
 
 
 def _choose(known: Iterable[str]) -> str:
@@ -182,15 +184,17 @@ def _choose(known: Iterable[str]) -> str:
     return f"choose one of: {there}" if there else "this drive has none: use another way"
 
 
-def _require_known(member: Member, key: str) -> None:
-    if member.drive.profile.parameter(key) is None:
+def _require_known(connected: ConnectedDrive, key: str) -> None:
+    if connected.drive.profile.parameter(key) is None:
         raise NotFound(
-            "api-drive.no-parameter-search-parameters", drive=member.drive.name, parameter=key
+            "api-drive.no-parameter-search-parameters", drive=connected.drive.name, parameter=key
         )
 
 
-async def _write(bench: TheBench, member: Member, key: str, request: ParameterWrite) -> Reading:
-    drive = member.drive
+async def _write(
+    bench: TheBench, connected: ConnectedDrive, key: str, request: ParameterWrite
+) -> Reading:
+    drive = connected.drive
     if (request.raw is None) == (request.value is None):
         raise OutOfRange("api-drive.give-either-raw-value", drive=drive.name, parameter=key)
     parameter = drive.parameter(key)
@@ -199,9 +203,9 @@ async def _write(bench: TheBench, member: Member, key: str, request: ParameterWr
     matters = drive.matters_to_motion(parameter.key) or held_still(parameter)
     # What energises is refused whatever moves; the rest waits until nothing does.
     still = matters and motion_of(parameter) != "energises"
-    with bench.motion.keeping_still(member) if still else contextlib.nullcontext():
+    with bench.motion.keeping_still(connected) if still else contextlib.nullcontext():
         if still and drive.commands_motion(parameter.key):
-            await _require_disabled(member, parameter.key)
+            await _require_disabled(connected, parameter.key)
         reading = await drive.write(key, 0 if value is None else value, raw=raw)
     bench.journal.add(
         f"{drive.name}: {parameter.key} {parameter.name}: "
@@ -209,13 +213,13 @@ async def _write(bench: TheBench, member: Member, key: str, request: ParameterWr
         drive=drive.id,
     )
     if parameter.key in drive.profile.unit_keys:
-        member.axis.forget()
+        connected.axis.forget()
     return reading
 
 
 @router.put("/motion-settings/{key}")
 async def write_motion_setting(
-    bench: TheBench, member: Controlled, key: str, request: MotionSettingWrite
+    bench: TheBench, connected: Controlled, key: str, request: MotionSettingWrite
 ) -> ParameterValue:
     """Write a setting that can start a motion at once; only while the motor has no power.
 
@@ -223,15 +227,15 @@ async def write_motion_setting(
     where it begins to turn, the setting is put back and the axis is stopped. The grant is for this
     one write and ends with it; ``reason`` stands in log and audit.
     """
-    _require_known(member, key)
-    drive = member.drive
+    _require_known(connected, key)
+    drive = connected.drive
     parameter = drive.parameter(key)
     raw = _raw_of(drive, parameter, request)
     old = drive.readings.get(parameter.key)
-    bench.motion.require_stays(member)
+    bench.motion.require_stays(connected)
     reason = request.reason.strip()
-    with bench.motion.keeping_still(member):
-        reading = await assign(member.axis, parameter.key, raw, reason)
+    with bench.motion.keeping_still(connected):
+        reading = await assign(connected.axis, parameter.key, raw, reason)
     bench.journal.add(
         f"{drive.name}: {parameter.key} {parameter.name}: "
         f"{old.value if old else 'not read'} → {reading.value}"
@@ -259,15 +263,15 @@ def _raw_of(drive: Drive, parameter: Parameter, request: ParameterWrite) -> Raw:
         ) from error
 
 
-async def _require_disabled(member: Member, key: str) -> None:
-    """A set-point, mode or control word of an enabled axis would move it with no envelope.
+async def _require_disabled(connected: ConnectedDrive, key: str) -> None:
+    """A setpoint, mode or control word of an enabled axis would move it with no envelope.
 
     Raises:
         NotAllowed: the axis is enabled.
     """
-    if await member.axis.state() is State.OPERATION_ENABLED:
+    if await connected.axis.state() is State.OPERATION_ENABLED:
         raise NotAllowed(
-            "api-drive.commands-motion-axis-enabled", drive=member.drive.name, parameter=key
+            "api-drive.commands-motion-axis-enabled", drive=connected.drive.name, parameter=key
         )
 
 
@@ -275,59 +279,61 @@ async def _require_disabled(member: Member, key: str) -> None:
 
 
 @router.get("/procedures")
-async def list_procedures(member: TheMember) -> list[ProcedureInfo]:
+async def list_procedures(connected: TheDrive) -> list[ProcedureInfo]:
     """Named sequences of this family."""
-    return [convert.procedure(known) for known in member.drive.profile.procedures]
+    return [convert.procedure(known) for known in connected.drive.profile.procedures]
 
 
 @router.post("/procedures/{name}", status_code=202)
 async def run_procedure(
-    bench: TheBench, member: Controlled, name: str, request: ProcedureRequest
+    bench: TheBench, connected: Controlled, name: str, request: ProcedureRequest
 ) -> JobInfo:
     """Carry out a procedure."""
-    known = member.drive.profile.procedure(name)
+    known = connected.drive.profile.procedure(name)
     if known is None:
         raise NotFound(
             "api-drive.no-procedure",
-            drive=member.drive.name,
+            drive=connected.drive.name,
             value=name,
-            remedy=_choose(p.name for p in member.drive.profile.procedures),
+            remedy=_choose(p.name for p in connected.drive.profile.procedures),
         )
-    bench.motion.require_idle(member)
+    bench.motion.require_idle(connected)
     job = bench.jobs.start(
         "procedure",
-        text("work.of-drive", title=known.title, drive=member.drive.name),
-        lambda progress: procedures.run_procedure(member.axis, known, request.confirmed, progress),
-        drive=member.drive.id,
+        text("work.of-drive", title=known.title, drive=connected.drive.name),
+        lambda progress: procedures.run_procedure(
+            connected.axis, known, request.confirmed, progress
+        ),
+        drive=connected.drive.id,
         motion=True,
     )
-    bench.journal.add(f"{member.drive.name}: {known.title}", drive=member.drive.id)
+    bench.journal.add(f"{connected.drive.name}: {known.title}", drive=connected.drive.id)
     return convert.job(job)
 
 
 @router.post("/jobs/read_all", status_code=202)
-async def read_all(bench: TheBench, member: TheMember, request: ReadAllRequest) -> JobInfo:
+async def read_all(bench: TheBench, connected: TheDrive, request: ReadAllRequest) -> JobInfo:
     """Read parameters; values go out over the websocket as they arrive."""
     for key in request.keys or []:
-        _require_known(member, key)
+        _require_known(connected, key)
     job = bench.jobs.start(
         "read_all",
-        text("api-drive.read", member_drive=member.drive.name),
-        lambda progress: parameters.read_all(member.drive, request.keys, progress),
-        drive=member.drive.id,
+        text("api-drive.read", member_drive=connected.drive.name),
+        lambda progress: parameters.read_all(connected.drive, request.keys, progress),
+        drive=connected.drive.id,
     )
     return convert.job(job)
 
 
 @router.post("/jobs/load_set", status_code=202)
-async def load_set(bench: TheBench, member: Controlled, request: LoadSetRequest) -> JobInfo:
+async def load_set(bench: TheBench, connected: Controlled, request: LoadSetRequest) -> JobInfo:
     """Write chosen rows of a parameter set, each read back."""
     content = await bench.records.store.call(bench.sets.load, request.file, request.version)
     job = bench.jobs.start(
         "load_set",
-        text("api-drive.load", file=request.file, member_drive=member.drive.name),
+        text("api-drive.load", file=request.file, member_drive=connected.drive.name),
         lambda progress: parameters.load_set(
-            member.drive,
+            connected.drive,
             content,
             request.keys,
             progress,
@@ -335,53 +341,59 @@ async def load_set(bench: TheBench, member: Controlled, request: LoadSetRequest)
             accept_other_identity=request.accept_other_identity,
             accept_motor_individual=request.accept_motor_individual,
         ),
-        drive=member.drive.id,
+        drive=connected.drive.id,
         # Nothing may move while its settings change; and a set is not left half written.
         motion=True,
         stoppable=False,
     )
     which = f" version {request.version}" if request.version else ""
-    bench.journal.add(f"{member.drive.name}: load {request.file}{which}", drive=member.drive.id)
+    bench.journal.add(
+        f"{connected.drive.name}: load {request.file}{which}", drive=connected.drive.id
+    )
     return convert.job(job)
 
 
 @router.post("/jobs/move", status_code=202)
-async def start_move(bench: TheBench, member: Controlled, request: MoveRequest) -> JobInfo:
+async def start_move(bench: TheBench, connected: Controlled, request: MoveRequest) -> JobInfo:
     """One move in a profile mode."""
-    unit = await convert_motion.unit_of(bench, member, request.unit)
+    unit = await convert_motion.unit_of(bench, connected, request.unit)
     settings = convert_motion.move_settings(request, unit)
     job = bench.jobs.start(
         "move",
-        text("api-drive.move", member_drive=member.drive.name, mode=request.mode),
-        lambda progress: move.move(member.axis, settings, progress),
-        drive=member.drive.id,
+        text("api-drive.move", member_drive=connected.drive.name, mode=request.mode),
+        lambda progress: move.move(connected.axis, settings, progress),
+        drive=connected.drive.id,
         motion=True,
     )
     return convert.job(job)
 
 
 @router.post("/jobs/sequence", status_code=202)
-async def start_sequence(bench: TheBench, member: Controlled, request: SequenceRequest) -> JobInfo:
+async def start_sequence(
+    bench: TheBench, connected: Controlled, request: SequenceRequest
+) -> JobInfo:
     """Back and forth between two positions."""
-    unit = await convert_motion.unit_of(bench, member, request.unit)
+    unit = await convert_motion.unit_of(bench, connected, request.unit)
     settings = convert_motion.sequence_settings(request, unit)
     job = bench.jobs.start(
         "sequence",
-        text("api-drive.back-forth", member_drive=member.drive.name),
-        lambda progress: move.sequence(member.axis, settings, progress),
-        drive=member.drive.id,
+        text("api-drive.back-forth", member_drive=connected.drive.name),
+        lambda progress: move.sequence(connected.axis, settings, progress),
+        drive=connected.drive.id,
         motion=True,
     )
     return convert.job(job)
 
 
 @router.post("/jobs/generate", status_code=202)
-async def start_generator(bench: TheBench, member: Controlled, request: GenerateRequest) -> JobInfo:
+async def start_generator(
+    bench: TheBench, connected: Controlled, request: GenerateRequest
+) -> JobInfo:
     """Play a test signal in a cyclic mode, one value per cycle."""
-    session = member.axis.session
+    session = connected.axis.session
     if session is None or not session.running:
-        raise NotAllowed("api-drive.cyclic-exchange-not-run", drive=member.drive.name)
-    unit = await convert_motion.unit_of(bench, member, request.unit)
+        raise NotAllowed("api-drive.cyclic-exchange-not-run", drive=connected.drive.name)
+    unit = await convert_motion.unit_of(bench, connected, request.unit)
     settings = convert_motion.generator_settings(request, unit)
     job = bench.jobs.start(
         "generate",
@@ -389,41 +401,41 @@ async def start_generator(bench: TheBench, member: Controlled, request: Generate
             "api-drive.detail",
             shape=request.shape,
             mode=request.mode,
-            member_drive=member.drive.name,
+            member_drive=connected.drive.name,
         ),
-        lambda progress: cyclic_motion.generate(member.axis, session, settings, progress),
-        drive=member.drive.id,
+        lambda progress: cyclic_motion.generate(connected.axis, session, settings, progress),
+        drive=connected.drive.id,
         motion=True,
     )
     return convert.job(job)
 
 
 @router.get("/homing-methods")
-async def homing_methods(member: TheMember) -> list[HomingMethodInfo]:
+async def homing_methods(connected: TheDrive) -> list[HomingMethodInfo]:
     """Homing methods of this family."""
     return [
         HomingMethodInfo(**known.model_dump(exclude={"parameters"}))
-        for known in member.drive.profile.homing_methods
+        for known in connected.drive.profile.homing_methods
     ]
 
 
 @router.post("/jobs/home", status_code=202)
-async def start_homing(bench: TheBench, member: Controlled, request: HomeRequest) -> JobInfo:
+async def start_homing(bench: TheBench, connected: Controlled, request: HomeRequest) -> JobInfo:
     """Home the axis."""
-    unit = await convert_motion.unit_of(bench, member, request.unit)
+    unit = await convert_motion.unit_of(bench, connected, request.unit)
     settings = convert_motion.homing_settings(request, unit)
-    if request.method not in {m.method for m in member.drive.profile.homing_methods}:
+    if request.method not in {m.method for m in connected.drive.profile.homing_methods}:
         raise NotAllowed(
             "api-drive.no-homing-method",
-            drive=member.drive.name,
+            drive=connected.drive.name,
             value=request.method,
-            remedy=_choose(str(m.method) for m in member.drive.profile.homing_methods),
+            remedy=_choose(str(m.method) for m in connected.drive.profile.homing_methods),
         )
     job = bench.jobs.start(
         "home",
-        text("api-drive.home-method", member_drive=member.drive.name, method=request.method),
-        lambda progress: homing.home(member.axis, settings, progress),
-        drive=member.drive.id,
+        text("api-drive.home-method", member_drive=connected.drive.name, method=request.method),
+        lambda progress: homing.home(connected.axis, settings, progress),
+        drive=connected.drive.id,
         motion=True,
     )
     return convert.job(job)

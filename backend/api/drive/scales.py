@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from backend.api import convert
-from backend.api.context import Controlled, TheBench, TheMember
+from backend.api.context import Controlled, TheBench, TheDrive
 from backend.api.drive.models_scales import (
     ScaleInfo,
     ScalesInfo,
@@ -22,7 +22,7 @@ from backend.scales.scale import Scale, what_to_do
 from backend.scales.taught import Taught
 from backend.scales.units import AxisUnits
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.station.measuring import EXCHANGE_ENDS_S, exchange_for
 from backend.tools.moves.small_move import SmallMoveSettings, longest_allowed, small_move
 from backend.work.jobs import JobResult, Progress
@@ -34,78 +34,82 @@ _UNITS = {"position": "rev", "velocity": "rpm", "acceleration": "rpm/s"}
 
 
 @router.get("/scales")
-async def read_scales(member: TheMember) -> ScalesInfo:
+async def read_scales(connected: TheDrive) -> ScalesInfo:
     """The scales, read from the drive now."""
-    member.axis.forget_scales()
-    return _info(member, await member.axis.units())
+    connected.axis.forget_scales()
+    return _info(connected, await connected.axis.units())
 
 
 @router.put("/scales")
-async def state_scales(bench: TheBench, member: Controlled, request: ScalesUpdate) -> ScalesInfo:
+async def state_scales(bench: TheBench, connected: Controlled, request: ScalesUpdate) -> ScalesInfo:
     """Scales from a data sheet, stated by a person. Nothing is written to the drive."""
     taught = await teaching.stated(
-        member.axis, request.counts_per_rev, request.raw_per_rpm, request.raw_per_rpm_s
+        connected.axis, request.counts_per_rev, request.raw_per_rpm, request.raw_per_rpm_s
     )
-    return await _keep(bench, member, taught)
+    return await _keep(bench, connected, taught)
 
 
 @router.post("/scales/confirm")
-async def confirm_scales(bench: TheBench, member: Controlled, request: TurnedUpdate) -> ScalesInfo:
+async def confirm_scales(
+    bench: TheBench, connected: Controlled, request: TurnedUpdate
+) -> ScalesInfo:
     """How far the shaft turned in the last small move: the resolution, and the unit of 606Ch."""
-    return await _keep(bench, member, await teaching.confirmed(member.axis, request.turned_rev))
+    return await _keep(
+        bench, connected, await teaching.confirmed(connected.axis, request.turned_rev)
+    )
 
 
 @router.delete("/scales")
-async def forget_taught(bench: TheBench, member: Controlled) -> ScalesInfo:
+async def forget_taught(bench: TheBench, connected: Controlled) -> ScalesInfo:
     """Forget what a person has said; the drive, its file and its manual count again."""
-    return await _keep(bench, member, None)
+    return await _keep(bench, connected, None)
 
 
 @router.post("/jobs/small_move", status_code=202)
 async def start_small_move(
-    bench: TheBench, member: Controlled, request: SmallMoveRequest
+    bench: TheBench, connected: Controlled, request: SmallMoveRequest
 ) -> JobInfo:
     """Move by some increments, slowly and with little torque, to see how far the shaft turns."""
-    exchange = await exchange_for(bench, member, request.cycle_ms / 1e3)
+    exchange = await exchange_for(bench, connected, request.cycle_ms / 1e3)
     session = exchange.session
     settings = SmallMoveSettings(request.increments, request.torque_limit)
 
     async def work(progress: Progress) -> JobResult:
         exchange.taken = True
         try:
-            return await small_move(member.axis, session, settings, progress)
+            return await small_move(connected.axis, session, settings, progress)
         finally:
-            await shielded(exchange.end, EXCHANGE_ENDS_S, member.drive.name)
+            await shielded(exchange.end, EXCHANGE_ENDS_S, connected.drive.name)
 
     try:
         job = bench.jobs.start(
             "small_move",
-            text("api-drive.small-move", increments=request.increments, drive=member.drive.name),
+            text("api-drive.small-move", increments=request.increments, drive=connected.drive.name),
             work,
-            drive=member.drive.id,
+            drive=connected.drive.id,
             motion=True,
         )
     except DriveError:
         await exchange.end()
         raise
     exchange.ends_with(job)
-    said = f"{member.drive.name}: small move by {request.increments} increments"
-    bench.journal.add(said, drive=member.drive.id)
+    said = f"{connected.drive.name}: small move by {request.increments} increments"
+    bench.journal.add(said, drive=connected.drive.id)
     return convert.job(job)
 
 
-async def _keep(bench: Bench, member: Member, taught: Taught | None) -> ScalesInfo:
-    drive, store = member.drive, bench.axis_records
+async def _keep(bench: Bench, connected: ConnectedDrive, taught: Taught | None) -> ScalesInfo:
+    drive, store = connected.drive, bench.axis_records
     old = store.get(drive.id)
     note_before(scales=None if old.scales is None else old.scales.model_dump())
-    with bench.motion.keeping_still(member):
+    with bench.motion.keeping_still(connected):
         store.put(drive.id, old.model_copy(update={"scales": taught}))
-        member.axis.teach(taught)
-        units = await member.axis.units()
+        connected.axis.teach(taught)
+        units = await connected.axis.units()
     said = "; ".join(_said(scale) for scale in units.scales.all)
     bench.journal.add(f"{drive.name}: scales: {said}", drive=drive.id)
     bench.drives_changed()
-    return _info(member, units)
+    return _info(connected, units)
 
 
 def _said(scale: Scale) -> str:
@@ -113,15 +117,15 @@ def _said(scale: Scale) -> str:
     return f"{scale.quantity.value} {factor} per {_UNITS[scale.quantity]} ({scale.origin.value})"
 
 
-def _info(member: Member, units: AxisUnits) -> ScalesInfo:
-    axis, scales = member.axis, units.scales
+def _info(connected: ConnectedDrive, units: AxisUnits) -> ScalesInfo:
+    axis, scales = connected.axis, units.scales
     moves = axis.small_moves
     return ScalesInfo(
         certain=scales.position.certain and scales.velocity.certain,
         scales=[_one(scale, units) for scale in scales.all],
         taught=any(scale.origin in ("user", "measured") for scale in scales.all),
         kept=axis.taught is not None,
-        cyclic=any(port.link.cyclic is not None for port in member.drive.ports),
+        cyclic=any(port.link.cyclic is not None for port in connected.drive.ports),
         small_moves=None
         if moves is None
         else SmallMovesInfo(
@@ -140,7 +144,7 @@ def _one(scale: Scale, units: AxisUnits) -> ScaleInfo:
         is_time=is_time,
         origin=scale.origin,
         source=scale.source,
-        doubt=scale.doubt,
+        uncertainty=scale.uncertainty,
         why=scale.why,
         remedy="" if scale.certain else what_to_do(scale),
     )

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Depends, Request
 
 from backend.api import convert
-from backend.api.context import Connection, Controlled, TheBench, TheMember
+from backend.api.context import Connection, Controlled, TheBench, TheDrive
 from backend.api.drive.models_functions import (
     ForcingInfo,
     ForcingStart,
@@ -24,7 +24,7 @@ from backend.drive import terminals as io_functions
 from backend.drive.catalog import functions_of
 from backend.drive.terminals import ProbeSettings, TerminalState
 from backend.functions.forcing import ForcingSession, ForcingSessions
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from profiles.functions import Forcing, TerminalFacts
 
 router = APIRouter(prefix="/drives/{drive_id}/io")
@@ -43,17 +43,17 @@ TheSessions = Annotated[ForcingSessions, Depends(sessions_of)]
 
 
 @router.get("")
-async def terminals(member: TheMember, sessions: TheSessions) -> IoInfo:
+async def terminals(connected: TheDrive, sessions: TheSessions) -> IoInfo:
     """All terminals with state, function and polarity, read now."""
-    states = await io_functions.read_terminals(member.drive)
-    facts = functions_of(member.drive.profile).terminals
+    states = await io_functions.read_terminals(connected.drive)
+    facts = functions_of(connected.drive.profile).terminals
     return IoInfo(
         time=convert.moment(time.time()),
         terminals=[_terminal(state, facts) for state in states],
         forcing=[
-            _forcing(spec, sessions.get(member.drive.id, spec.name))
+            _forcing(spec, sessions.get(connected.drive.id, spec.name))
             for spec in facts.forcing
-            if not member.drive.unreachable_why(member.drive.parameter(spec.value.key))
+            if not connected.drive.unreachable_why(connected.drive.parameter(spec.value.key))
         ],
         notes=facts.notes,
     )
@@ -100,7 +100,7 @@ def _forcing(spec: Forcing, session: ForcingSession | None) -> ForcingInfo:
 @router.post("/forcing/{name}")
 async def start_forcing(
     bench: TheBench,
-    member: Controlled,
+    connected: Controlled,
     sessions: TheSessions,
     name: Kind,
     request: ForcingStart,
@@ -108,20 +108,26 @@ async def start_forcing(
 ) -> ForcingInfo:
     """Begin to overrule terminals; it ends when nobody renews it for five seconds."""
     session = await sessions.start(
-        member.axis, name, confirmed=request.confirmed, connection=connection
+        connected.axis, name, confirmed=request.confirmed, connection=connection
     )
     bench.journal.add(
-        f"{member.drive.name}: {session.spec.title}: begun", level="warning", drive=member.drive.id
+        f"{connected.drive.name}: {session.spec.title}: begun",
+        level="warning",
+        drive=connected.drive.id,
     )
     return _forcing(session.spec, session)
 
 
 @router.put("/forcing/{name}")
 async def overrule(
-    bench: TheBench, member: Controlled, sessions: TheSessions, name: Kind, request: ForcingValues
+    bench: TheBench,
+    connected: Controlled,
+    sessions: TheSessions,
+    name: Kind,
+    request: ForcingValues,
 ) -> ForcingInfo:
     """Overrule or release terminals; also the sign of life of the page."""
-    session = _running(member, sessions, name)
+    session = _running(connected, sessions, name)
     session.renew()
     if request.values:
         await session.set(request.values)
@@ -131,45 +137,49 @@ async def overrule(
             for n, v in request.values.items()
         )
         bench.journal.add(
-            f"{member.drive.name}: {session.spec.title}: {told}",
+            f"{connected.drive.name}: {session.spec.title}: {told}",
             level="warning",
-            drive=member.drive.id,
+            drive=connected.drive.id,
         )
     return _forcing(session.spec, session)
 
 
 @router.delete("/forcing/{name}")
 async def end_forcing(
-    bench: TheBench, member: TheMember, sessions: TheSessions, name: Kind
+    bench: TheBench, connected: TheDrive, sessions: TheSessions, name: Kind
 ) -> ForcingInfo:
     """Release everything; everybody may."""
-    session = _running(member, sessions, name)
-    await sessions.end(member.drive.id, name)
-    bench.journal.add(f"{member.drive.name}: {session.spec.title}: ended", drive=member.drive.id)
+    session = _running(connected, sessions, name)
+    await sessions.end(connected.drive.id, name)
+    bench.journal.add(
+        f"{connected.drive.name}: {session.spec.title}: ended", drive=connected.drive.id
+    )
     return _forcing(session.spec, None)
 
 
-def _running(member: Member, sessions: ForcingSessions, name: str) -> ForcingSession:
-    session = sessions.get(member.drive.id, name)
+def _running(connected: ConnectedDrive, sessions: ForcingSessions, name: str) -> ForcingSession:
+    session = sessions.get(connected.drive.id, name)
     if session is None:
-        raise NotFound("api-drive.no-terminals-overruled-like", drive=member.drive.name, value=name)
+        raise NotFound(
+            "api-drive.no-terminals-overruled-like", drive=connected.drive.name, value=name
+        )
     return session
 
 
 @router.put("/probes/{number}")
 async def set_probe(
-    bench: TheBench, member: Controlled, number: int, request: ProbeRequest
+    bench: TheBench, connected: Controlled, number: int, request: ProbeRequest
 ) -> ParameterValue:
     """Set up a touch probe; returns 60B8h as read back."""
     reading = await io_functions.set_probe(
-        member.drive,
+        connected.drive,
         number,
         ProbeSettings(
             request.on, request.continuous, request.rising, request.falling, request.source
         ),
     )
     bench.journal.add(
-        f"{member.drive.name}: touch probe {number} {'on' if request.on else 'off'}",
-        drive=member.drive.id,
+        f"{connected.drive.name}: touch probe {number} {'on' if request.on else 'off'}",
+        drive=connected.drive.id,
     )
-    return convert.reading(member.drive, reading.key)
+    return convert.reading(connected.drive, reading.key)

@@ -11,7 +11,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
 
-from backend.api.context import TheBench, TheMember
+from backend.api.context import TheBench, TheDrive
 from backend.api.errors import NotFound
 from backend.api.handover.models import (
     HandedOverInfo,
@@ -69,13 +69,13 @@ async def _set(bench: Bench, drive: Drive, file: str, version: int | None) -> Pa
 
 @router.post("/drives/{drive_id}/handover", status_code=201)
 async def export_handover(
-    bench: TheBench, member: TheMember, request: HandoverRequest
+    bench: TheBench, connected: TheDrive, request: HandoverRequest
 ) -> HandoverResult:
     """Make the files for the machine's controller and note it for the report.
 
     Nothing is written to the drive.
     """
-    drive = member.drive
+    drive = connected.drive
     content = await _set(bench, drive, request.set_file, request.version)
     axis, files = await asyncio.to_thread(_made, content, drive.profile, request)
     name = next(iter(files))
@@ -129,7 +129,7 @@ def _made(
 )
 async def compare_handover(
     bench: TheBench,
-    member: TheMember,
+    connected: TheDrive,
     request: Request,
     file: Annotated[str, Query(max_length=200, description="name of the controller's list")],
     set_file: Annotated[str | None, Query(max_length=200, description="our set")] = None,
@@ -137,7 +137,7 @@ async def compare_handover(
     slave: Annotated[int | None, Query(ge=1, le=65535, description="of several")] = None,
 ) -> HandoverComparison:
     """What the controller will write: drive now, our set and its list. Nothing is changed."""
-    drive = member.drive
+    drive = connected.drive
     data = bytearray()
     async for chunk in request.stream():
         data += chunk
@@ -163,9 +163,9 @@ async def compare_handover(
 
 
 @router.get("/drives/{drive_id}/handovers")
-async def list_handovers(bench: TheBench, member: TheMember) -> list[HandedOverInfo]:
+async def list_handovers(bench: TheBench, connected: TheDrive) -> list[HandedOverInfo]:
     """Earlier hand-overs of a drive, newest first."""
-    made = await asyncio.to_thread(handover_log(bench).read, member.drive.id)
+    made = await asyncio.to_thread(handover_log(bench).read, connected.drive.id)
     found = [
         HandedOverInfo(
             number=number, time=each.time, person=each.person, format=each.format,
@@ -177,9 +177,9 @@ async def list_handovers(bench: TheBench, member: TheMember) -> list[HandedOverI
 
 
 @router.get("/drives/{drive_id}/handovers/{number}/changes")
-async def changes_since(bench: TheBench, member: TheMember, number: int) -> HandoverChanges:
+async def changes_since(bench: TheBench, connected: TheDrive, number: int) -> HandoverChanges:
     """What the drive holds other than it was handed over; it is read now."""
-    drive = member.drive
+    drive = connected.drive
     made = await asyncio.to_thread(handover_log(bench).read, drive.id)
     if not 1 <= number <= len(made):
         raise NotFound("api-handover.no-hand-over", value=number, drive_name=drive.name)

@@ -8,7 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 from pydantic import TypeAdapter
 
-from backend.api.context import Me, TheBench, TheMember
+from backend.api.context import Me, TheBench, TheDrive
 from backend.api.errors import message_of as as_info
 from backend.api.health.kept import records_of
 from backend.api.health.models import (
@@ -46,30 +46,30 @@ async def health_trend(
 
 
 @router.get("/drives/{drive_id}/health")
-async def read_health(bench: TheBench, member: TheMember) -> AxisHealth:
+async def read_health(bench: TheBench, connected: TheDrive) -> AxisHealth:
     """Baseline, comparison and rounds of one axis."""
-    axis = axis_of(member.drive, bench.records.station)
+    axis = axis_of(connected.drive, bench.records.station)
     return info_of(await bench.records.store.call(records_of(bench).condition, axis))
 
 
 @router.post("/drives/{drive_id}/health/baseline", status_code=201)
 async def sign_baseline(
-    bench: TheBench, member: TheMember, me: Me, request: BaselineRequest
+    bench: TheBench, connected: TheDrive, me: Me, request: BaselineRequest
 ) -> AxisHealth:
     """Sign rounds as the baseline of the axis. The one before is kept, and counts no longer.
 
     Who is logged in signs by that name; ``person`` counts where the page is used without accounts.
     """
-    axis = axis_of(member.drive, bench.records.station)
+    axis = axis_of(connected.drive, bench.records.station)
     person = request.person if me.kind == "local" else me.person
     records = records_of(bench)
     signed = await bench.records.store.call(
         records.sign, axis.key, request.runs, person, request.notes
     )
     bench.journal.add(
-        f"{member.drive.name}: health baseline {signed.id} signed by {signed.person}, "
+        f"{connected.drive.name}: health baseline {signed.id} signed by {signed.person}, "
         f"SHA-256 {signed.sha256}",
-        drive=member.drive.id,
+        drive=connected.drive.id,
     )
     return info_of(await bench.records.store.call(records.condition, axis))
 

@@ -120,8 +120,8 @@ class Connection:
         """Release everything that lived by this connection; a jog ends at once."""
         self.release(None, "the page's connection closed")
         for drive in self.watched:
-            if (member := self._bench.members.get(drive)) is not None:
-                member.monitor.watchers.discard(self.id)
+            if (connected := self._bench.connected_drives.get(drive)) is not None:
+                connected.monitor.watchers.discard(self.id)
         self.watched = set()
         for task in (*self._polls.values(), *self._stops):
             task.cancel()
@@ -236,8 +236,8 @@ class Connection:
                 self.send(Pong(n=request.n))
 
     async def _stop(self, request: StopAll) -> None:
-        drives = [request.drive] if request.drive else list(self._bench.members)
-        known = [drive for drive in drives if drive in self._bench.members]
+        drives = [request.drive] if request.drive else list(self._bench.connected_drives)
+        known = [drive for drive in drives if drive in self._bench.connected_drives]
         problems = await self._bench.motion.stop(known)
         self._bench.journal.add(text("station.stop-pressed"), level="warning", drive=request.drive)
         failed = {drive: why for drive, why in problems.items() if why is not None}
@@ -256,7 +256,7 @@ class Connection:
         self.send(StopReached(result=stop_result(self._bench, drives, found)))
 
     def _lease(self, request: LeaseTake) -> None:
-        self._bench.member(request.drive)
+        self._bench.connected(request.drive)
         if request.take:
             self._bench.leases.take(request.drive, self.id, self.identity.person)
             return
@@ -265,17 +265,17 @@ class Connection:
 
     def _watch(self, drives: set[str]) -> None:
         for drive in drives | self.watched:
-            if (member := self._bench.members.get(drive)) is None:
+            if (connected := self._bench.connected_drives.get(drive)) is None:
                 continue
             # A drive that was taken off the bench and put back is another one of the same name.
-            watchers = member.monitor.watchers
+            watchers = connected.monitor.watchers
             if (self.id in watchers) is not (drive in drives):
                 watchers ^= {self.id}
-                member.monitor.hurry()
-        self.watched = {drive for drive in drives if drive in self._bench.members}
+                connected.monitor.hurry()
+        self.watched = {drive for drive in drives if drive in self._bench.connected_drives}
 
     def _watch_values(self, request: WatchValues) -> None:
-        drive = self._bench.member(request.drive).drive
+        drive = self._bench.connected(request.drive).drive
         for key in request.keys:
             drive.parameter(key)
         if (old := self._polls.pop(request.drive, None)) is not None:
@@ -286,8 +286,8 @@ class Connection:
             )
 
     async def _poll(self, request: WatchValues) -> None:
-        while (member := self._bench.members.get(request.drive)) is not None:
+        while (connected := self._bench.connected_drives.get(request.drive)) is not None:
             # A lost link is told by the monitor; polling goes on until the drive is back.
             with contextlib.suppress(DriveError):
-                await member.drive.read_many(request.keys)
+                await connected.drive.read_many(request.keys)
             await asyncio.sleep(request.period_s)

@@ -43,7 +43,7 @@ class PeopleControl:
             NotAllowed, Forbidden, Busy: it is not to be had now.
         """
         leases, drive = self._bench.leases, request.drive
-        self._bench.member(drive)
+        self._bench.connected(drive)
         match request:
             case LeaseAsk():
                 leases.ask(drive, page.id, identity.person)

@@ -10,7 +10,7 @@ from backend.api.drive.convert_motion import jog_settings, unit_of
 from backend.api.errors import problem_of
 from backend.api.live.messages import JogEnded, JogGap, JogRenew, JogStart
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.tools.jog.cyclic import jog_cyclic
 from backend.tools.jog.hold import Hold
 from backend.tools.jog.run import jog
@@ -47,7 +47,7 @@ class Jogs:
         Raises:
             DriveError: the axis may not move, or somebody else controls it.
         """
-        bench, member = self._bench, self._bench.member(request.drive)
+        bench, connected = self._bench, self._bench.connected(request.drive)
         held_before = bench.leases.holder(request.drive) is not None
         bench.leases.take(request.drive, self._connection, person)
 
@@ -58,8 +58,8 @@ class Jogs:
         try:
             job = bench.jobs.start(
                 "jog",
-                text("api-live.jog", member_drive=member.drive.name),
-                lambda progress: _jog_work(bench, member, request, hold, progress),
+                text("api-live.jog", member_drive=connected.drive.name),
+                lambda progress: _jog_work(bench, connected, request, hold, progress),
                 drive=request.drive,
                 motion=True,
             )
@@ -68,7 +68,7 @@ class Jogs:
                 bench.leases.give(request.drive, self._connection)
             raise
         self._holds[request.drive] = hold
-        member.monitor.hurry()
+        connected.monitor.hurry()
 
         def ended(_task: object) -> None:
             if self._holds.get(request.drive) is hold:
@@ -85,11 +85,11 @@ class Jogs:
 
 
 async def _jog_work(
-    bench: Bench, member: Member, request: JogStart, hold: Hold, progress: Progress
+    bench: Bench, connected: ConnectedDrive, request: JogStart, hold: Hold, progress: Progress
 ) -> JobResult:
     """Through the cyclic exchange where it runs, else as a moving target."""
-    axis = member.axis
-    settings = jog_settings(request, await unit_of(bench, member, request.unit))
+    axis = connected.axis
+    settings = jog_settings(request, await unit_of(bench, connected, request.unit))
     if axis.session is not None and axis.session.running:
         return await jog_cyclic(axis, axis.session, settings, hold, progress)
     return await jog(axis, settings, hold, progress)

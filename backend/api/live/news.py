@@ -13,25 +13,27 @@ from backend.work.jobs import Job
 
 def state(bench: Bench, drive: str, snapshot: Snapshot) -> BaseModel | None:
     """An axis, unless its drive has left the bench."""
-    member = bench.members.get(drive)
-    if member is None:
+    connected = bench.connected_drives.get(drive)
+    if connected is None:
         return None
-    return StateChanged(state=convert.axis_state(bench, member, snapshot))
+    return StateChanged(state=convert.axis_state(bench, connected, snapshot))
 
 
 def values(bench: Bench, drive: str, keys: frozenset[str]) -> BaseModel | None:
     """What was read of these parameters, unless the drive has left the bench."""
-    member = bench.members.get(drive)
-    if member is None or not keys:
+    connected = bench.connected_drives.get(drive)
+    if connected is None or not keys:
         return None
-    rows = convert.readings(member.drive, sorted(keys))
+    rows = convert.readings(connected.drive, sorted(keys))
     return ValuesChanged.model_construct(drive=drive, values=rows)
 
 
 def drive_list(bench: Bench, connection: str | None) -> BaseModel:
     """The drives as the holder of this connection sees them; as a stranger without one."""
-    members = bench.members.values()
-    return DrivesChanged(drives=[convert.drive_summary(bench, m, connection) for m in members])
+    connected_drives = bench.connected_drives.values()
+    return DrivesChanged(
+        drives=[convert.drive_summary(bench, m, connection) for m in connected_drives]
+    )
 
 
 def job_state(job: Job) -> BaseModel:

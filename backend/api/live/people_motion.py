@@ -45,17 +45,17 @@ class PeopleMotions:
 
         Whoever controls or moves the axis by now looks after it from here on.
         """
-        for member in self._bench.members.values():
-            if member.axis.enabled_by != page.id:
+        for connected in self._bench.connected_drives.values():
+            if connected.axis.enabled_by != page.id:
                 continue
-            drive = member.drive.id
+            drive = connected.drive.id
             holder, job = self._bench.leases.holder(drive), self._bench.jobs.moving(drive)
             actor = None if job is None else job.actor
             others = {each.connection for each in (holder, actor) if each is not None}
             heir = next((each for each in others if each not in (None, page.id)), None)
-            member.axis.enabled_by = heir
+            connected.axis.enabled_by = heir
             if heir is None:
-                line = text("api-live.loses-power", drive=member.drive.name, what=what)
+                line = text("api-live.loses-power", drive=connected.drive.name, what=what)
                 self._bench.journal.add(line, level="warning", drive=drive)
                 self._spawn(self._bench.motion.let_go(drive))
 
@@ -99,7 +99,7 @@ class PeopleMotions:
             self._stop({job.drive}, "the enabling button is not held")
 
     def _stop(self, drives: set[str], why: str) -> None:
-        known = [drive for drive in drives if drive in self._bench.members]
+        known = [drive for drive in drives if drive in self._bench.connected_drives]
         if known:
             for drive in known:
                 line = text("api-live.stopped-why", why=why)
@@ -107,8 +107,8 @@ class PeopleMotions:
             self._spawn(self._bench.motion.stop(known))
 
     def _is_enabled(self, drive: str) -> bool:
-        member = self._bench.members.get(drive)
-        snapshot = None if member is None else member.monitor.snapshot
+        connected = self._bench.connected_drives.get(drive)
+        snapshot = None if connected is None else connected.monitor.snapshot
         return snapshot is not None and snapshot.state is State.OPERATION_ENABLED
 
     def _spawn(self, work: Coroutine[object, object, object]) -> None:

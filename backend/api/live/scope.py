@@ -158,7 +158,7 @@ class ScopeStreams:
         try:
             for drive, numbers in columns.items():
                 keys = [request.channels[n].key for n in numbers]
-                self._bench.member(drive)
+                self._bench.connected(drive)
                 for stream, places in self._bench.scope.subscribe(drive, keys, request.period_s):
                     streams.append((stream, tuple(numbers[place] for place in places)))
         except DriveError:
@@ -171,14 +171,14 @@ class ScopeStreams:
         """What the streams depend on: which axis object answers, and what its bus carries."""
         found: list[object] = []
         for channel in request.channels:
-            member = self._bench.members.get(channel.drive)
-            session = member.axis.session if member is not None else None
+            connected = self._bench.connected_drives.get(channel.drive)
+            session = connected.axis.session if connected is not None else None
             carried = (
-                member is not None
+                connected is not None
                 and session is not None
-                and session.carries(member.drive, channel.key)
+                and session.carries(connected.drive, channel.key)
             )
-            found.append((id(member), id(session) if carried else 0))
+            found.append((id(connected), id(session) if carried else 0))
         return found
 
     async def _renew(self) -> None:
@@ -198,7 +198,7 @@ class ScopeStreams:
         units = {drive: await self._units(drive) for drive in {c.drive for c in request.channels}}
         result = []
         for number, channel in enumerate(request.channels):
-            drive = self._bench.member(channel.drive).drive
+            drive = self._bench.connected(channel.drive).drive
             parameter = drive.parameter(channel.key)
             known = units[channel.drive]
             unit, factor = axis_scale(known, drive, parameter) if known else ("", None)
@@ -220,7 +220,7 @@ class ScopeStreams:
         """None where the gearing cannot be read: then the drive's own unit is shown."""
         with contextlib.suppress(DriveError, TimeoutError):
             async with asyncio.timeout(UNITS_TIMEOUT_S):
-                return await self._bench.member(drive).axis.units()
+                return await self._bench.connected(drive).axis.units()
         return None
 
     # --- samples ----------------------------------------------------------------------

@@ -34,8 +34,8 @@ class PeopleRecord:
     ) -> None:
         """``text`` is for the log; the audit keeps the rest."""
         self._bench.journal.add(text, level=level, drive=drive, person=person or "")
-        member = self._bench.members.get(drive) if drive else None
-        axis = member.drive.name if member else ""
+        connected = self._bench.connected_drives.get(drive) if drive else None
+        axis = connected.drive.name if connected else ""
         fact = Fact(
             kind, action, axis=axis, target=target, old=old, new=new, outcome=outcome, person=person
         )

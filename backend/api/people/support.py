@@ -146,7 +146,7 @@ async def grant(
     for right in body.rights:
         require_right(people, me, right, body.drive)
     if body.drive is not None:
-        live.bench.member(body.drive)
+        live.bench.connected(body.drive)
     rights = f"{', '.join(sorted(body.rights))} for {body.minutes:g} min"
     granted = people.support.grant(
         invitation_id, me.person, frozenset(body.rights), body.minutes * 60.0, body.drive

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 
 from fastapi import APIRouter, Response
 
-from backend.api.context import TheBench, TheMember
+from backend.api.context import TheBench, TheDrive
 from backend.api.disposition import disposition
 from backend.api.errors import NotFound
 from backend.api.handover.routes import handover_log
@@ -28,7 +28,7 @@ from backend.report.gather import (
 )
 from backend.report.store import Format, ReportStore, render
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.store.database import DatabaseFailed
 from drivers.errors import NotAllowed
 
@@ -41,33 +41,33 @@ def _store(bench: Bench) -> ReportStore:
 
 
 @router.post("/drives/{drive_id}/reports", status_code=201)
-async def make_report(bench: TheBench, member: TheMember, request: ReportRequest) -> ReportInfo:
+async def make_report(bench: TheBench, connected: TheDrive, request: ReportRequest) -> ReportInfo:
     """Evaluate the measurements of an axis anew and write its report. Nothing moves."""
-    changes = change_log(bench).read(member.drive.id)
+    changes = change_log(bench).read(connected.drive.id)
     first = changes[0].time if changes else None
-    chosen = await asyncio.to_thread(_chosen, bench, member, request.measurements, first)
+    chosen = await asyncio.to_thread(_chosen, bench, connected, request.measurements, first)
     facts = await live_facts(
-        bench, member, changes, About(request.person, request.machine, request.notes)
+        bench, connected, changes, About(request.person, request.machine, request.notes)
     )
     measured, unusable = await asyncio.to_thread(measured_from, bench.measurements, chosen)
-    made = await asyncio.to_thread(handover_log(bench).read, member.drive.id)
-    handed = await handed_over_facts(member.drive, made)
+    made = await asyncio.to_thread(handover_log(bench).read, connected.drive.id)
+    handed = await handed_over_facts(connected.drive, made)
     whole = replace(facts, measured=measured, unusable=unusable, handed_over=handed)
     try:
-        axis = axis_of(member.drive, bench.records.station)
+        axis = axis_of(connected.drive, bench.records.station)
         condition = await bench.records.store.call(records_of(bench).condition, axis)
         whole = replace(whole, condition=condition)
     except DatabaseFailed as error:
         # All else of the report is in files: it is made without the database, and names that.
         whole = replace(whole, trouble=(*whole.trouble, error.message))
     data = await asyncio.to_thread(render, whole, request.language, request.format)
-    file = await asyncio.to_thread(_store(bench).save, member.drive.name, request.format, data)
-    bench.journal.add(f"{member.drive.name}: report {file}", drive=member.drive.id)
+    file = await asyncio.to_thread(_store(bench).save, connected.drive.name, request.format, data)
+    bench.journal.add(f"{connected.drive.name}: report {file}", drive=connected.drive.id)
     return _info(bench, file)
 
 
 def _chosen(
-    bench: Bench, member: Member, asked: list[str] | None, first: datetime | None
+    bench: Bench, connected: ConnectedDrive, asked: list[str] | None, first: datetime | None
 ) -> list[tuple[str, str]]:
     """Files of the report, each with the one it is compared with.
 
@@ -82,10 +82,10 @@ def _chosen(
             if asked is not None:
                 raise
             continue
-        if belongs(head, member.drive):
+        if belongs(head, connected.drive):
             heads[name] = head
         elif asked is not None:
-            raise NotAllowed("api-report.not-measured", drive=member.drive.name, value=name)
+            raise NotAllowed("api-report.not-measured", drive=connected.drive.name, value=name)
     if asked is None or len({kind_of(head) for head in heads.values()}) == len(heads):
         return choose(heads, first)
     # Chosen by hand: of two of a kind the older one is what the newer is compared with.

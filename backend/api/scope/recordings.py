@@ -128,8 +128,8 @@ def _axis(axis: dict[str, Any]) -> RecordedAxis:
 
 def _running(recordings: Recordings, recorder: Recorder) -> RecordingInfo:
     settings, written = recorder.settings, recorder.written()
-    members = recordings.bench.members
-    known = [c for c in settings.channels if c[0] in members]
+    connected_drives = recordings.bench.connected_drives
+    known = [c for c in settings.channels if c[0] in connected_drives]
     streams = describe_streams(recordings.bench, [(False, known)])
     synchronous = recorder.synchronous()
     duration = 0.0

@@ -128,7 +128,7 @@ _API: dict[str, Need] = {
     # Settings that can start a motion at once: with the right to move, not with that to write.
     "PUT /drives/{drive_id}/motion-settings/{key}": _MOTION,
     "POST /drives/{drive_id}/jobs/put-back": _PARAMETERS,
-    "DELETE /drives/{drive_id}/owed": _PARAMETERS,
+    "DELETE /drives/{drive_id}/pending-restores": _PARAMETERS,
     "GET /drives/{drive_id}/procedures": _LOOK,
     "POST /drives/{drive_id}/procedures/{name}": _MOTION,
     "GET /drives/{drive_id}/homing-methods": _LOOK,

@@ -8,14 +8,14 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 
 from backend.api import convert
-from backend.api.context import Controlled, TheBench, TheMember
+from backend.api.context import Controlled, TheBench, TheDrive
 from backend.api.errors import NotFound
 from backend.api.library import convert as convert_library
 from backend.api.library.models import StoredSet, ThreeWay
 from backend.api.sets.models import Diff, SaveSetRequest
 from backend.drive.drive import Drive
 from backend.drive.readings import Reading
-from backend.library.identity import doubts
+from backend.library.identity import differences
 from backend.library.three_way import three_way as compare_three
 from backend.parameters import set_file as parameter_set
 from backend.parameters.set_file import MAX_BYTES, BadSet, ParameterSet, Row
@@ -46,10 +46,10 @@ async def list_sets(bench: TheBench) -> list[StoredSet]:
 
 
 @router.post("/drives/{drive_id}/sets", status_code=201)
-async def save_set(bench: TheBench, member: Controlled, request: SaveSetRequest) -> StoredSet:
+async def save_set(bench: TheBench, connected: Controlled, request: SaveSetRequest) -> StoredSet:
     """Read the drive's settings and store them; ``overwrite`` makes a new version."""
     name = await parameters.save_set(
-        member.drive,
+        connected.drive,
         bench.sets,
         request.file,
         author=request.author or acting_person(),
@@ -59,9 +59,9 @@ async def save_set(bench: TheBench, member: Controlled, request: SaveSetRequest)
     )
     missing = parameters.without((await _parsed(bench, name, None)).not_read)
     bench.journal.add(
-        f"{member.drive.name}: saved {name}{missing}",
+        f"{connected.drive.name}: saved {name}{missing}",
         level="warning" if missing else "info",
-        drive=member.drive.id,
+        drive=connected.drive.id,
     )
     return await _info(bench, name)
 
@@ -115,7 +115,7 @@ async def delete_set(bench: TheBench, file: str) -> Response:
 @router.get("/drives/{drive_id}/diff")
 async def diff(
     bench: TheBench,
-    member: TheMember,
+    connected: TheDrive,
     file: Annotated[str | None, Query()] = None,
     version: Annotated[int | None, Query(ge=1, description="of the file")] = None,
     against: Annotated[str | None, Query(pattern=r"^(defaults|drive:.+)$")] = None,
@@ -124,7 +124,7 @@ async def diff(
 
     The drive's values are read now.
     """
-    drive = member.drive
+    drive = connected.drive
     if (file is None) == (against is None):
         raise OutOfRange("api-sets.give-either-file-against")
     if file is not None:
@@ -135,7 +135,7 @@ async def diff(
         warnings = []
         rows, label, same_profile, same_serial = _defaults(drive), "defaults", True, None
     else:
-        other = bench.member((against or "").removeprefix("drive:")).drive
+        other = bench.connected((against or "").removeprefix("drive:")).drive
         warnings = []
         rows, label = await _of_drive(other), other.name
         same_profile, same_serial = other.profile.drive == drive.profile.drive, False
@@ -156,14 +156,14 @@ async def diff(
 @router.get("/drives/{drive_id}/three-way")
 async def three_way(
     bench: TheBench,
-    member: TheMember,
+    connected: TheDrive,
     base: Annotated[str, Query(description="set that both sides come from")],
     theirs: Annotated[str, Query(description="set whose changes are to be taken over")],
     base_version: Annotated[int | None, Query(ge=1)] = None,
     theirs_version: Annotated[int | None, Query(ge=1)] = None,
 ) -> ThreeWay:
     """What changed since a common base, in another set and in the drive, which is read now."""
-    drive = member.drive
+    drive = connected.drive
     before = await _parsed(bench, base, base_version)
     content = await _parsed(bench, theirs, theirs_version)
     same_profile, same_serial, warnings = _identity(content, drive)
@@ -192,12 +192,12 @@ _OTHER_FAMILY = "of another drive family: nothing of it can be written here"
 def _identity(content: ParameterSet, drive: Drive) -> tuple[bool, bool | None, list[str]]:
     """Same family; same drive, None where that cannot be told; and what to warn of."""
     same_profile = content.profile == drive.profile.drive
-    differing = doubts(content, drive)
+    differing = differences(content, drive)
     serial = drive.found.serial if drive.found else None
     known = content.serial is not None and serial is not None
     same_drive = False if any(d.other_drive for d in differing) else (True if known else None)
     warnings = [] if same_profile else [_OTHER_FAMILY]
-    return same_profile, same_drive, warnings + [str(doubt) for doubt in differing]
+    return same_profile, same_drive, warnings + [str(difference) for difference in differing]
 
 
 def _defaults(drive: Drive) -> list[Row]:

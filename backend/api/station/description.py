@@ -8,7 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Query, Request, Response
 
 from backend.api import convert
-from backend.api.context import TheBench, TheMember
+from backend.api.context import TheBench, TheDrive
 from backend.api.errors import NotFound
 from backend.api.models import JobInfo
 from backend.api.station.models import ProfileMatch
@@ -196,7 +196,7 @@ async def search_line_settings(bench: TheBench, request: LineSearchRequest) -> J
 
 
 @router.get("/drives/{drive_id}/missing-ports")
-async def drive_missing_ports(member: TheMember) -> list[MissingPort]:
+async def drive_missing_ports(connected: TheDrive) -> list[MissingPort]:
     """Ports over which a drive could be reached as well, and what only they reach."""
     return [
         MissingPort(
@@ -205,5 +205,5 @@ async def drive_missing_ports(member: TheMember) -> list[MissingPort]:
             groups=list(port.groups),
             wiring=port.wiring,
         )
-        for port in missing_ports(member.drive)
+        for port in missing_ports(connected.drive)
     ]

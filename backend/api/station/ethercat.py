@@ -24,7 +24,7 @@ from backend.api.station.models_ethercat import (
 )
 from backend.drive.identity import confirm_identity
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.work.jobs import JobResult, Progress
 from drivers.adapters import require_interface
 from drivers.cia402 import State
@@ -106,9 +106,9 @@ async def clear_counters(
 ) -> Response:
     """Set the port error counters of one station or of all to zero."""
     link = _link(bench, request.url)
-    for member in _members(bench, link):
-        if request.station in (None, _station_of(member, link)):
-            bench.leases.require(member.drive.id, connection)
+    for connected in _members(bench, link):
+        if request.station in (None, _station_of(connected, link)):
+            bench.leases.require(connected.drive.id, connection)
     seen = (await link.survey()).stations
     chosen = [s.station for s in seen if request.station in (None, s.station) and not s.lost]
     if request.station is not None and not chosen:
@@ -127,9 +127,9 @@ async def write_alias(
     link = _link(bench, request.url)
     _require_calm(bench, link, connection)
     _require_confirmed(request.confirmed, _ALIAS_WARNING)
-    for member in _members(bench, link):
-        if _station_of(member, link) == request.station:
-            await confirm_identity(member.drive)
+    for connected in _members(bench, link):
+        if _station_of(connected, link) == request.station:
+            await confirm_identity(connected.drive)
     await link.set_alias(request.station, request.alias)
     bench.journal.add(
         f"{request.url}: alias {request.alias} written to station {request.station};"
@@ -143,7 +143,7 @@ async def write_alias(
 )  # fmt: skip
 async def load_firmware(
     bench: TheBench,
-    member: Controlled,
+    connected: Controlled,
     request: Request,
     file: Annotated[str, Query(min_length=1, max_length=100, description="name for the drive")],
     password: Annotated[int, Query(ge=0, le=0xFFFFFFFF)] = 0,
@@ -157,35 +157,35 @@ async def load_firmware(
 
     The job cannot be cancelled: a download that breaks off may leave the drive without firmware.
     """
-    link, station = _firmware_port(member)
+    link, station = _firmware_port(connected)
     _require_calm(bench, link, connection)
     _require_confirmed(confirmed, _FIRMWARE_WARNING)
     data = await _body(request, file)
-    await _require_loadable(member, link, station)
+    await _require_loadable(connected, link, station)
 
     async def work(progress: Progress) -> JobResult:
         def load(tell: Callable[[float, Text], None]) -> Coroutine[None, None, str]:
             return link.load_firmware(station, file, data, tell, password=password, where=state)
 
         where = await _to_the_end(load, progress)
-        bench.journal.add(f"{member.drive.name}: {file} loaded", drive=member.drive.id)
+        bench.journal.add(f"{connected.drive.name}: {file} loaded", drive=connected.drive.id)
         return {"bytes": len(data), "file": file, "state": where}
 
-    title = text("api-station.load-firmware", file=file, drive=member.drive.name)
+    title = text("api-station.load-firmware", file=file, drive=connected.drive.name)
     job = bench.jobs.start(
-        "firmware", title, work, drive=member.drive.id, motion=True, stoppable=False
+        "firmware", title, work, drive=connected.drive.id, motion=True, stoppable=False
     )
-    bench.journal.add(title.words(), level="warning", drive=member.drive.id)
+    bench.journal.add(title.words(), level="warning", drive=connected.drive.id)
     return convert.job(job)
 
 
-async def _require_loadable(member: Member, link: EthercatLink, station: int) -> None:
+async def _require_loadable(connected: ConnectedDrive, link: EthercatLink, station: int) -> None:
     """The drive is the one that was connected, and not enabled.
 
     A drive without valid firmware stays in INIT or BOOT: it cannot be enabled, and only its
     EEPROM tells which it is.
     """
-    drive = member.drive
+    drive = connected.drive
     seen = next((s for s in (await link.survey()).stations if s.station == station), None)
     if seen is not None and seen.al & 0x0F in (AlState.INIT, AlState.BOOT):
         known = drive.found
@@ -197,7 +197,7 @@ async def _require_loadable(member: Member, link: EthercatLink, station: int) ->
             )
         return
     await confirm_identity(drive)
-    if await member.axis.state() in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
+    if await connected.axis.state() in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
         raise NotAllowed("api-station.enabled", drive=drive.name)
 
 
@@ -246,12 +246,12 @@ def _link(bench: Bench, url: str) -> EthercatLink:
     return link
 
 
-def _members(bench: Bench, link: EthercatLink) -> list[Member]:
-    return [m for m in bench.members.values() if _station_of(m, link) is not None]
+def _members(bench: Bench, link: EthercatLink) -> list[ConnectedDrive]:
+    return [m for m in bench.connected_drives.values() if _station_of(m, link) is not None]
 
 
-def _station_of(member: Member, link: EthercatLink) -> int | None:
-    return next((port.station for port in member.drive.ports if port.link is link), None)
+def _station_of(connected: ConnectedDrive, link: EthercatLink) -> int | None:
+    return next((port.station for port in connected.drive.ports if port.link is link), None)
 
 
 def _require_calm(bench: Bench, link: EthercatLink, connection: str | None) -> None:
@@ -260,9 +260,9 @@ def _require_calm(bench: Bench, link: EthercatLink, connection: str | None) -> N
     What follows keeps the wire busy or resets a drive; neither may happen under a neighbour's
     motion.
     """
-    for member in _members(bench, link):
-        bench.leases.require(member.drive.id, connection)
-        bench.motion.require_idle(member)
+    for connected in _members(bench, link):
+        bench.leases.require(connected.drive.id, connection)
+        bench.motion.require_idle(connected)
 
 
 def _require_confirmed(confirmed: bool, warning: str) -> None:
@@ -270,27 +270,27 @@ def _require_confirmed(confirmed: bool, warning: str) -> None:
         raise NotAllowed(warning, remedy="send it again with confirmed=true if all that is so")
 
 
-def _firmware_port(member: Member) -> tuple[EthercatLink, int]:
-    for port in member.drive.ports:
+def _firmware_port(connected: ConnectedDrive) -> tuple[EthercatLink, int]:
+    for port in connected.drive.ports:
         link = segment_of(port.link)
         if link is not None and port.spec is not None and port.spec.foe:
             return link, port.station
-    raise NotAllowed("api-station.profile-not-say-takes", drive=member.drive.name)
+    raise NotAllowed("api-station.profile-not-say-takes", drive=connected.drive.name)
 
 
 def _station(
     bench: Bench, url: str, seen: SurveyedStation, survey: Survey, *, clocks: bool
 ) -> SegmentStation:
-    member = next(
+    connected = next(
         (
             m
-            for m in bench.members.values()
+            for m in bench.connected_drives.values()
             for port in m.drive.ports
             if bench.buses.url_of(port) == url and port.station == seen.station
         ),
         None,
     )
-    spec = member.drive.profile.link("ethercat") if member else None
+    spec = connected.drive.profile.link("ethercat") if connected else None
     own = [f for f in survey.findings if f.station == seen.station]
     why = seen.al_text
     # SOEM takes the first slave with a distributed clock; nobody writes its own deviation.
@@ -301,7 +301,7 @@ def _station(
     return SegmentStation(
         station=seen.station,
         name=seen.name,
-        drive=member.drive.id if member else None,
+        drive=connected.drive.id if connected else None,
         vendor_id=seen.vendor_id,
         product_code=seen.product_code,
         revision=seen.revision,

@@ -186,7 +186,7 @@ class Lease(Message):
     )
 
 
-class OwedValue(Message):
+class PendingRestoreValue(Message):
     """A parameter that a motion changed and could not put back, as the link was lost."""
 
     key: str
@@ -212,7 +212,9 @@ class DriveSummary(Message):
     identity_warning: str = Field(description="non-empty when another drive answers here")
     unsaved: int = Field(description="parameters in the drive but not in its memory")
     pending: int = Field(description="parameters waiting for write-settings, enable or power-off")
-    owed: list[OwedValue] = Field(description="what a motion could not put back")
+    pending_restores: list[PendingRestoreValue] = Field(
+        description="what a motion could not put back"
+    )
     lease: Lease
     quality: Quality
 

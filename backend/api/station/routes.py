@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Response
 
 import backend
 from backend.api import convert
-from backend.api.context import Connection, Controlled, Me, TheBench, TheMember, ThePeople
+from backend.api.context import Connection, Controlled, Me, TheBench, TheDrive, ThePeople
 from backend.api.drive.convert_stop import stop_result
 from backend.api.drive.models_axis import StopRequest, StopResult
 from backend.api.errors import NotFound
@@ -31,7 +31,7 @@ from backend.audit import Fact
 from backend.audit.asked import note_before
 from backend.people.rights import Right
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.station.second_port import require_same_drive
 from backend.work.jobs import Job, JobResult, Progress
 from drivers.link import Found
@@ -112,9 +112,9 @@ async def stop_cyclic(
 
 def _require_bus(bench: Bench, url: str, connection: str | None) -> None:
     """Control of every drive of a bus."""
-    for member in bench.members.values():
-        if any(bench.buses.url_of(port) == url for port in member.drive.ports):
-            bench.leases.require(member.drive.id, connection)
+    for connected in bench.connected_drives.values():
+        if any(bench.buses.url_of(port) == url for port in connected.drive.ports):
+            bench.leases.require(connected.drive.id, connection)
 
 
 @router.delete("/buses", status_code=204)
@@ -143,7 +143,7 @@ async def scan(bench: TheBench, request: ScanRequest, connection: Connection = N
 @router.get("/drives")
 async def drives(bench: TheBench, connection: Connection = None) -> list[DriveSummary]:
     """Drives of the bench."""
-    return [convert.drive_summary(bench, m, connection) for m in bench.members.values()]
+    return [convert.drive_summary(bench, m, connection) for m in bench.connected_drives.values()]
 
 
 @router.post("/drives", status_code=201)
@@ -154,56 +154,58 @@ async def connect(
     _require_bus(bench, request.url, connection)
     seen = await bench.buses.scan(request.url, [request.station], lambda _fraction, _step: None)
     found = next((f for f in seen if f.station == request.station), None)
-    member = await bench.connect(
+    connected = await bench.connect(
         request.url, request.station, request.profile, request.name, found=found
     )
-    _tell_connected(bench, member, request.url, request.station)
-    await member.monitor.refresh()
-    return convert.drive_summary(bench, member)
+    _tell_connected(bench, connected, request.url, request.station)
+    await connected.monitor.refresh()
+    return convert.drive_summary(bench, connected)
 
 
-def _tell_connected(bench: Bench, member: Member, url: str, station: int) -> None:
-    where = f"{member.drive.profile.drive}, {url}, station {station}"
-    bench.audit.add(Fact("station", "connected", member.drive.name, where))
+def _tell_connected(bench: Bench, connected: ConnectedDrive, url: str, station: int) -> None:
+    where = f"{connected.drive.profile.drive}, {url}, station {station}"
+    bench.audit.add(Fact("station", "connected", connected.drive.name, where))
 
 
 @router.get("/drives/{drive_id}")
-async def drive(bench: TheBench, member: TheMember, connection: Connection = None) -> DriveSummary:
+async def drive(
+    bench: TheBench, connected: TheDrive, connection: Connection = None
+) -> DriveSummary:
     """One drive."""
-    return convert.drive_summary(bench, member, connection)
+    return convert.drive_summary(bench, connected, connection)
 
 
 @router.patch("/drives/{drive_id}")
 async def update_drive(
-    bench: TheBench, member: Controlled, change: DriveUpdate, connection: Connection = None
+    bench: TheBench, connected: Controlled, change: DriveUpdate, connection: Connection = None
 ) -> DriveSummary:
     """Change name or notes, or accept an exchanged drive."""
-    note_before(name=member.drive.name, notes=member.drive.notes)
-    bench.rename(member.drive.id, change.name, change.notes)
+    note_before(name=connected.drive.name, notes=connected.drive.notes)
+    bench.rename(connected.drive.id, change.name, change.notes)
     if change.accept_identity:
-        await bench.accept_identity(member.drive.id)
-    return convert.drive_summary(bench, member, connection)
+        await bench.accept_identity(connected.drive.id)
+    return convert.drive_summary(bench, connected, connection)
 
 
 @router.post("/drives/{drive_id}/ports")
 async def add_port(
-    bench: TheBench, member: Controlled, request: PortRequest, connection: Connection = None
+    bench: TheBench, connected: Controlled, request: PortRequest, connection: Connection = None
 ) -> DriveSummary:
     """Connect a drive over a second bus; each parameter then goes the way that carries it.
 
     Refused where settings read there differ from the drive's, unless that is accepted.
     """
     check = None if request.accept_difference else require_same_drive
-    await bench.add_port(member.drive.id, request.url, request.station, check)
-    _tell_connected(bench, member, request.url, request.station)
-    return convert.drive_summary(bench, member, connection)
+    await bench.add_port(connected.drive.id, request.url, request.station, check)
+    _tell_connected(bench, connected, request.url, request.station)
+    return convert.drive_summary(bench, connected, connection)
 
 
 @router.delete("/drives/{drive_id}", status_code=204)
-async def remove_drive(bench: TheBench, member: Controlled) -> Response:
+async def remove_drive(bench: TheBench, connected: Controlled) -> Response:
     """Take a drive off the bench."""
-    await bench.remove(member.drive.id)
-    bench.audit.add(Fact("station", "taken off the bench", member.drive.name))
+    await bench.remove(connected.drive.id)
+    bench.audit.add(Fact("station", "taken off the bench", connected.drive.name))
     return Response(status_code=204)
 
 
@@ -248,8 +250,8 @@ async def stop(bench: TheBench, request: StopRequest | None = None) -> StopResul
     their ramps allow and what is done then.
     """
     request = request or StopRequest()
-    wanted = [request.drive] if request.drive is not None else list(bench.members)
-    known = [drive_id for drive_id in wanted if drive_id in bench.members]
+    wanted = [request.drive] if request.drive is not None else list(bench.connected_drives)
+    known = [drive_id for drive_id in wanted if drive_id in bench.connected_drives]
     await bench.motion.stop(known)
     bench.journal.add(text("station.stop-pressed"), level="warning", drive=request.drive)
     return stop_result(bench, wanted, await bench.motion.standstill(known))
@@ -262,6 +264,6 @@ async def log(bench: TheBench) -> list[LogEntry]:
 
 
 @router.get("/drives/{drive_id}/log")
-async def drive_log(bench: TheBench, member: TheMember) -> list[LogEntry]:
+async def drive_log(bench: TheBench, connected: TheDrive) -> list[LogEntry]:
     """The log of one drive, newest first."""
-    return [convert.log_entry(entry) for entry in bench.journal.entries(member.drive.id)]
+    return [convert.log_entry(entry) for entry in bench.journal.entries(connected.drive.id)]

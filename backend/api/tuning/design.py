@@ -16,7 +16,7 @@ from backend.analysis.loop.margins import closed_from_open, sensitivity
 from backend.analysis.loop.measured_plant import MeasuredPlant, measured_plant
 from backend.analysis.loop.notch import Notch, RealisedNotch
 from backend.analysis.signals.arrays import magnitude_db, phase_deg
-from backend.api.context import Controlled, TheBench, TheMember
+from backend.api.context import Controlled, TheBench, TheDrive
 from backend.api.errors import message_or_none, words_of
 from backend.api.tuning.measurements import change_log, measurement_head
 from backend.api.tuning.models import (
@@ -38,7 +38,7 @@ from backend.drive.drive import Drive
 from backend.library.measurements import BadMeasurement, unpack
 from backend.report.changes import Change
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.tools.autotune import candidates as tune_candidates
 from backend.tools.autotune import gains
 from backend.tools.autotune.axis_facts import read_facts
@@ -74,30 +74,30 @@ def _notches(wanted: Sequence[NotchShape | None]) -> list[Notch | None]:
     return [None if w is None else Notch(w.center_hz, w.width_hz, w.depth_db) for w in wanted]
 
 
-async def _note(bench: Bench, member: Member, what: str, before: dict[str, int]) -> Undo:
+async def _note(bench: Bench, connected: ConnectedDrive, what: str, before: dict[str, int]) -> Undo:
     """Keep a change for the report, with what the drive says now; returns the way back."""
-    after = {key: await member.drive.raw(key) for key in before}
-    change_log(bench).add(member.drive.id, Change(datetime.now(UTC), what, before, after))
+    after = {key: await connected.drive.raw(key) for key in before}
+    change_log(bench).add(connected.drive.id, Change(datetime.now(UTC), what, before, after))
     return Undo(before=before, after=after)
 
 
 @router.get("/drives/{drive_id}/notches")
-async def read_notches(member: TheMember) -> list[NotchSlotInfo]:
+async def read_notches(connected: TheDrive) -> list[NotchSlotInfo]:
     """All notches of the drive, read now."""
     return [
         NotchSlotInfo(
             slot=s.slot, enabled=s.enabled, notch=_shape(s.notch), realised=_realised(s.realised),
             raw=dict(s.raw), note=words_of(s.note), note_message=message_or_none(s.note),
         )
-        for s in await notch.read_notches(member.drive, meaning_of(member.drive))
+        for s in await notch.read_notches(connected.drive, meaning_of(connected.drive))
     ]  # fmt: skip
 
 
 @router.post("/drives/{drive_id}/notches/preview")
-async def preview_notches(member: TheMember, request: NotchPreviewRequest) -> NotchPreviewInfo:
+async def preview_notches(connected: TheDrive, request: NotchPreviewRequest) -> NotchPreviewInfo:
     """What the drive would make of these notches. Nothing is read or written."""
-    profile, name = member.drive.profile, member.drive.name
-    wanted, meaning = _notches(request.notches), meaning_of(member.drive)
+    profile, name = connected.drive.profile, connected.drive.name
+    wanted, meaning = _notches(request.notches), meaning_of(connected.drive)
     slots = [notch.encode(profile, name, n, w, None, meaning) for n, w in enumerate(wanted)]
     f = np.asarray(request.frequency_hz, dtype=np.float64)
     total = notch.combined(profile, [w for w in wanted if w is not None], f, meaning)
@@ -116,23 +116,23 @@ async def preview_notches(member: TheMember, request: NotchPreviewRequest) -> No
 
 
 @router.put("/drives/{drive_id}/notches")
-async def write_notches(bench: TheBench, member: Controlled, request: NotchWrite) -> Undo:
+async def write_notches(bench: TheBench, connected: Controlled, request: NotchWrite) -> Undo:
     """Write all notches and make them act; saving is another step."""
-    with bench.motion.keeping_still(member):
+    with bench.motion.keeping_still(connected):
         before = await notch.write_notches(
-            member.axis, _notches(request.notches), meaning_of(member.drive)
+            connected.axis, _notches(request.notches), meaning_of(connected.drive)
         )
-    undo = await _note(bench, member, "notches", before)
-    bench.journal.add(f"{member.drive.name}: notches written", drive=member.drive.id)
+    undo = await _note(bench, connected, "notches", before)
+    bench.journal.add(f"{connected.drive.name}: notches written", drive=connected.drive.id)
     return undo
 
 
 @router.get("/drives/{drive_id}/gains")
-async def read_gains(member: TheMember) -> GainInfo:
+async def read_gains(connected: TheDrive) -> GainInfo:
     """Loop gains, read now."""
-    facts = await read_facts(member.axis)
-    found = await gains.read_gains(member.axis, facts)
-    tables = member.drive.profile.stiffness
+    facts = await read_facts(connected.axis)
+    found = await gains.read_gains(connected.axis, facts)
+    tables = connected.drive.profile.stiffness
     return GainInfo(
         convention=found.convention, position_1_s=found.position_1_s, speed_hz=found.speed_hz,
         speed_nms=found.speed_nms, integral_hz=found.integral_hz, level=found.level,
@@ -144,22 +144,22 @@ async def read_gains(member: TheMember) -> GainInfo:
 
 
 @router.put("/drives/{drive_id}/gains")
-async def write_gains(bench: TheBench, member: Controlled, request: GainWrite) -> Undo:
+async def write_gains(bench: TheBench, connected: Controlled, request: GainWrite) -> Undo:
     """Write gains or a stiffness level and make them act; saving is another step."""
     if (request.gains is None) == (request.level is None):
-        raise OutOfRange("api-tuning.give-either-gains-level", drive=member.drive.name)
+        raise OutOfRange("api-tuning.give-either-gains-level", drive=connected.drive.name)
     if request.gains is not None:
         g = request.gains
         wanted = _gains(g.speed_bandwidth_hz, g.integral_hz, g.position_1_s, g.inertia_kgm2)
         raw = gains.plan_gains(
-            member.drive, wanted, g.inertia_kgm2, await gains.rotor_inertia(member.axis)
+            connected.drive, wanted, g.inertia_kgm2, await gains.rotor_inertia(connected.axis)
         )
     else:
-        raw = gains.plan_level(member.drive, request.level or 0)
-    with bench.motion.keeping_still(member):
-        before = await write_settings(member.axis, raw)
-    undo = await _note(bench, member, "gains", before)
-    bench.journal.add(f"{member.drive.name}: gains written", drive=member.drive.id)
+        raw = gains.plan_level(connected.drive, request.level or 0)
+    with bench.motion.keeping_still(connected):
+        before = await write_settings(connected.axis, raw)
+    undo = await _note(bench, connected, "gains", before)
+    bench.journal.add(f"{connected.drive.name}: gains written", drive=connected.drive.id)
     return undo
 
 
@@ -168,17 +168,17 @@ def _gains(speed_hz: float, integral_hz: float, position_1_s: float, inertia_kgm
 
 
 @router.post("/drives/{drive_id}/tune/undo")
-async def undo_tuning(bench: TheBench, member: Controlled, request: Undo) -> Undo:
+async def undo_tuning(bench: TheBench, connected: Controlled, request: Undo) -> Undo:
     """Put back what a change returned as `before`; returns what was there until now.
 
     With the change's `after` nothing is put back over what somebody else has written since.
     """
-    with bench.motion.keeping_still(member):
-        now = {key: await member.drive.raw(key) for key in request.before}
-        _require_untouched(member.drive, request, now)
-        await put_back(member.axis, request.before)
-    undo = await _note(bench, member, "undo", now)
-    bench.journal.add(f"{member.drive.name}: tuning taken back", drive=member.drive.id)
+    with bench.motion.keeping_still(connected):
+        now = {key: await connected.drive.raw(key) for key in request.before}
+        _require_untouched(connected.drive, request, now)
+        await put_back(connected.axis, request.before)
+    undo = await _note(bench, connected, "undo", now)
+    bench.journal.add(f"{connected.drive.name}: tuning taken back", drive=connected.drive.id)
     return undo
 
 
@@ -243,31 +243,31 @@ async def _plant(bench: Bench, name: str) -> tuple[MeasuredPlant, sweep_evaluati
 
 @router.post("/drives/{drive_id}/tune/candidates")
 async def candidates(
-    bench: TheBench, member: TheMember, request: CandidatesRequest
+    bench: TheBench, connected: TheDrive, request: CandidatesRequest
 ) -> CandidatesInfo:
     """Notch sets and gains for a stored response. Nothing is written."""
     plant, found = await _plant(bench, request.measurement)
-    facts = sweep_evaluation.completed(await read_facts(member.axis), found)
+    facts = sweep_evaluation.completed(await read_facts(connected.axis), found)
     load = request.load or tune_candidates.load_class(found)
     table = await asyncio.to_thread(
-        tune_candidates.candidates_for, member.drive, facts, plant, request.inertia_kgm2, load,
+        tune_candidates.candidates_for, connected.drive, facts, plant, request.inertia_kgm2, load,
         request.sample_rate_hz,
     )  # fmt: skip
     return CandidatesInfo(load=load, candidates=[tune_candidates.candidate_json(c) for c in table])
 
 
 @router.post("/drives/{drive_id}/tune/predict")
-async def predict(bench: TheBench, member: TheMember, request: PredictRequest) -> PredictionInfo:
+async def predict(bench: TheBench, connected: TheDrive, request: PredictRequest) -> PredictionInfo:
     """The speed loop that notches and gains would make of a stored response."""
     plant, found = await _plant(bench, request.measurement)
-    facts = sweep_evaluation.completed(await read_facts(member.axis), found)
+    facts = sweep_evaluation.completed(await read_facts(connected.axis), found)
     wanted = [n for n in _notches(request.notches) if n is not None]
     g, f = request.gains, plant.frequency_hz
     try:
-        filters = notch.combined(member.drive.profile, wanted, f, meaning_of(member.drive))
+        filters = notch.combined(connected.drive.profile, wanted, f, meaning_of(connected.drive))
     except ValueError as error:
-        raise OutOfRange(f"{member.drive.name}: {error}", drive=member.drive.name) from error
-    fixed = gains.loops_of(member.drive, facts).response(f) * filters
+        raise OutOfRange(f"{connected.drive.name}: {error}", drive=connected.drive.name) from error
+    fixed = gains.loops_of(connected.drive, facts).response(f) * filters
     opened = speed_loop(
         f, plant.response(), np.asarray(fixed),
         _gains(g.speed_bandwidth_hz, g.integral_hz, g.position_1_s, g.inertia_kgm2),

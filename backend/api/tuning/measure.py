@@ -11,7 +11,7 @@ import numpy.typing as npt
 from fastapi import APIRouter
 
 from backend.api import convert
-from backend.api.context import Controlled, TheBench, TheMember
+from backend.api.context import Controlled, TheBench, TheDrive
 from backend.api.health.kept import keep_health
 from backend.api.models import JobInfo
 from backend.api.report import routes as routes_report
@@ -31,7 +31,7 @@ from backend.axis.restoring import shielded
 from backend.library.measurements import MeasurementStore
 from backend.report.changes import Change
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.station.measuring import EXCHANGE_ENDS_S, exchange_for
 from backend.tools.autotune import run as autotune
 from backend.tools.autotune.apply import take_back
@@ -55,39 +55,44 @@ Measure = Callable[[CyclicSession, Progress, Keep], Awaitable[JobResult]]
 
 
 async def _start(
-    bench: Bench, member: Member, request: ToolSettings, kind: str, title: str, tool: Measure
+    bench: Bench,
+    connected: ConnectedDrive,
+    request: ToolSettings,
+    kind: str,
+    title: str,
+    tool: Measure,
 ) -> JobInfo:
     """Start a measurement as a job; raw data are stored before they are evaluated."""
-    bench.motion.require_idle(member)
-    exchange = await exchange_for(bench, member, request.cycle_ms / 1e3)
+    bench.motion.require_idle(connected)
+    exchange = await exchange_for(bench, connected, request.cycle_ms / 1e3)
     session = exchange.session
     files: list[str] = []
 
     def keep(
         name: str, arrays: dict[str, npt.NDArray[np.generic]], meta: dict[str, object]
     ) -> None:
-        files.append(bench.measurements.save(name, member.drive, arrays, meta))
+        files.append(bench.measurements.save(name, connected.drive, arrays, meta))
 
     async def work(progress: Progress) -> JobResult:
         exchange.taken = True
         limits = request.envelope
         try:
-            async with profile_speed.prepared(member.axis, session, limits, request.consent):
+            async with profile_speed.prepared(connected.axis, session, limits, request.consent):
                 result = await tool(session, progress, keep)
             await asyncio.to_thread(_conclude, bench.measurements, files, result)
             if isinstance(request, HealthSettings):
-                await keep_health(bench, member.drive, request, result, files)
+                await keep_health(bench, connected.drive, request, result, files)
         finally:
-            await shielded(exchange.end, EXCHANGE_ENDS_S, member.drive.name)
+            await shielded(exchange.end, EXCHANGE_ENDS_S, connected.drive.name)
         return result | {"measurements": files}
 
     try:
-        profile_speed.require_consent(session, member.drive, request.consent)
+        profile_speed.require_consent(session, connected.drive, request.consent)
         job = bench.jobs.start(
             kind,
-            text("work.of-drive", title=text(title), drive=member.drive.name),
+            text("work.of-drive", title=text(title), drive=connected.drive.name),
             work,
-            drive=member.drive.id,
+            drive=connected.drive.id,
             motion=True,
         )
     except DriveError:
@@ -95,7 +100,7 @@ async def _start(
         await exchange.end()
         raise
     exchange.ends_with(job)
-    bench.journal.add(f"{member.drive.name}: {text(title)}", drive=member.drive.id)
+    bench.journal.add(f"{connected.drive.name}: {text(title)}", drive=connected.drive.id)
     return convert.job(job)
 
 
@@ -134,9 +139,9 @@ def _sweep_settings(request: SweepRequest) -> sweep_evaluation.SweepSettings:
 
 
 @router.post("/drives/{drive_id}/tune/excitation")
-async def preview_excitation(member: TheMember, request: SweepRequest) -> ExcitationInfo:
+async def preview_excitation(connected: TheDrive, request: SweepRequest) -> ExcitationInfo:
     """What a frequency response would play. Nothing moves."""
-    found = await preview(member.axis, _sweep_settings(request), 1e3 / request.cycle_ms)
+    found = await preview(connected.axis, _sweep_settings(request), 1e3 / request.cycle_ms)
     return ExcitationInfo(
         unit=found.unit, time_s=found.time_s.tolist(), value=found.value.tolist(),
         frequency_hz=found.frequency_hz.tolist(), amplitude=found.amplitude.tolist(),
@@ -146,20 +151,20 @@ async def preview_excitation(member: TheMember, request: SweepRequest) -> Excita
 
 
 @router.post("/drives/{drive_id}/jobs/sweep", status_code=202)
-async def start_sweep(bench: TheBench, member: Controlled, request: SweepRequest) -> JobInfo:
+async def start_sweep(bench: TheBench, connected: Controlled, request: SweepRequest) -> JobInfo:
     """Measure a frequency response. The result has the form of ``servodeck sweep --out``."""
     settings = _sweep_settings(request)
 
     async def tool(session: CyclicSession, progress: Progress, keep: Keep) -> JobResult:
         return sweep_evaluation.as_json(
-            await sweep.sweep(member.axis, session, settings, progress, keep)
+            await sweep.sweep(connected.axis, session, settings, progress, keep)
         )
 
-    return await _start(bench, member, request, "sweep", "api-tuning.frequency-response", tool)
+    return await _start(bench, connected, request, "sweep", "api-tuning.frequency-response", tool)
 
 
 @router.post("/drives/{drive_id}/jobs/step", status_code=202)
-async def start_step(bench: TheBench, member: Controlled, request: StepRequest) -> JobInfo:
+async def start_step(bench: TheBench, connected: Controlled, request: StepRequest) -> JobInfo:
     """Step of speed, or a move, with its numbers."""
     settings = step_response.StepSettings(
         request.envelope, request.kind, request.size, request.hold_s, request.speed,
@@ -168,14 +173,16 @@ async def start_step(bench: TheBench, member: Controlled, request: StepRequest) 
 
     async def tool(session: CyclicSession, progress: Progress, keep: Keep) -> JobResult:
         return step_response.as_json(
-            await step_response.step_response(member.axis, session, settings, progress, keep)
+            await step_response.step_response(connected.axis, session, settings, progress, keep)
         )
 
-    return await _start(bench, member, request, "step", "api-tuning.step-response", tool)
+    return await _start(bench, connected, request, "step", "api-tuning.step-response", tool)
 
 
 @router.post("/drives/{drive_id}/jobs/autotune", status_code=202)
-async def start_autotune(bench: TheBench, member: Controlled, request: AutotuneRequest) -> JobInfo:
+async def start_autotune(
+    bench: TheBench, connected: Controlled, request: AutotuneRequest
+) -> JobInfo:
     """All steps from inertia to verification; `before` of the result undoes what was applied."""
     settings = autotune.AutotuneSettings(
         request.envelope, request.mark, request.load, request.loop, request.scheme,
@@ -183,21 +190,21 @@ async def start_autotune(bench: TheBench, member: Controlled, request: AutotuneR
     )  # fmt: skip
 
     async def tool(session: CyclicSession, progress: Progress, keep: Keep) -> JobResult:
-        found = await autotune.autotune(member.axis, session, settings, progress, keep)
+        found = await autotune.autotune(connected.axis, session, settings, progress, keep)
         try:
-            after = {key: await member.drive.raw(key) for key in found.before}
+            after = {key: await connected.drive.raw(key) for key in found.before}
         except BaseException:
             # Whoever cancels now has not seen a result: it is as if it had not been.
-            await take_back(member.axis, found.before)
+            await take_back(connected.axis, found.before)
             raise
         if found.before:
             change_log(bench).add(
-                member.drive.id,
+                connected.drive.id,
                 Change(found.written or datetime.now(UTC), "autotune", found.before, after),
             )
         return autotune.as_json(found) | {"after": after}
 
-    return await _start(bench, member, request, "autotune", "api-tuning.tune", tool)
+    return await _start(bench, connected, request, "autotune", "api-tuning.tune", tool)
 
 
 # --- tools with a descriptor ---------------------------------------------------------------
@@ -218,12 +225,12 @@ async def list_tools() -> list[ToolInfo]:
 def _add(tool: AnyTool) -> None:
     """The route that starts this tool."""
 
-    async def start(bench: TheBench, member: Controlled, request: ToolSettings) -> JobInfo:
+    async def start(bench: TheBench, connected: Controlled, request: ToolSettings) -> JobInfo:
         async def measure(session: CyclicSession, progress: Progress, keep: Keep) -> JobResult:
-            found = await tool.run(Run(member.axis, session, progress, keep), request)
+            found = await tool.run(Run(connected.axis, session, progress, keep), request)
             return dict(found.model_dump(mode="json"))
 
-        return await _start(bench, member, request, tool.kind, tool.text("title"), measure)
+        return await _start(bench, connected, request, tool.kind, tool.text("title"), measure)
 
     # The body is the tool's own settings, which the interface's description shows.
     start.__annotations__["request"] = tool.settings

@@ -132,7 +132,7 @@ class Designing:
 async def first_that_holds(
     trials: Trials, order: Sequence[Candidate], how: Designing
 ) -> tuple[Applied | None, Again | None]:
-    """The first of these that keeps its promise, also where its loop has to be seen twice.
+    """The first of these that meets its prediction, also where its loop has to be seen twice.
 
     Raises:
         DriveError: the drive has a fault, or the link is lost; nothing stays written.
@@ -156,7 +156,7 @@ async def again(
     """Where the verification contradicts the prediction: the plant from the loop, verified anew.
 
     Returns what is in force then, and nothing beside it where the prediction stands. Nothing is in
-    force where the same design did not keep its promise the second time.
+    force where the same design did not meet its prediction the second time.
 
     Raises:
         DriveError: the drive has a fault, or the link is lost; nothing stays written.
@@ -300,7 +300,7 @@ def _designed(
 async def _in_place_of(
     trials: Trials, first: Applied, second: Candidate, plant: MeasuredPlant, *, fall_back: bool
 ) -> Applied | None:
-    """The second one where it keeps the promise, else the first one again, which did; or nothing.
+    """The second one where it meets the prediction, else the first one again; or nothing.
 
     ``fall_back``: the first one may stay; not so where it is the second one.
     """

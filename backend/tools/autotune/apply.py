@@ -1,4 +1,4 @@
-"""Writing candidates one after another until one keeps its promise; all others are taken back."""
+"""Writing candidates one after another until one meets its prediction; all others are undone."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ async def first_kept(
     promised: Goals, tried: list[Text], progress: Progress, keep: Keep | None,
     softer: Softer | None = None, time_left: TimeLeft | None = None,
 ) -> Applied | None:  # fmt: skip
-    """The first candidate that keeps its promise stays written; ``tried`` says why others do not.
+    """The first candidate that meets its prediction stays; ``tried`` says why others do not.
 
     ``candidates`` are tried in their order; what is ``promised`` is what was asked for, which a
     more careful one may keep where it does not reach its own goals. One that only hums is tried
@@ -68,7 +68,7 @@ async def first_kept(
         raw = await plan(axis, candidate, check.inertia_kgm2, check.motor_inertia_kgm2)
         earlier = {key: await axis.drive.raw(key) for key in raw}
         # Noted for the next server: killed here, this one would leave what nobody has verified.
-        with axis.drive.owed.lent(earlier):
+        with axis.drive.pending_restores.borrowed(earlier):
             before = await write_settings(axis, raw)
             written = datetime.now(UTC)
             try:

@@ -50,7 +50,7 @@ class AxisFacts:
 
     ``rated_torque_nm`` is what 100 % of torque is; 1.0 stands in its place where it is unknown
     (``torque_known`` False), so that "Nm" then means "of rated torque".
-    ``interpolates`` is whether cyclic set-points are reached linearly (60C2h).
+    ``interpolates`` is whether cyclic setpoints are reached linearly (60C2h).
     """
 
     rated_torque_nm: float

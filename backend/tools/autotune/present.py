@@ -167,7 +167,7 @@ class Trials:
     async def _as_it_was_or(self, slower: Applied) -> Applied:
         """The prediction was wrong for a slower design, so it is no reason against what it had.
 
-        That is measured in turn, and stays where it keeps the promise; else the design is back.
+        That is measured in turn, and stays where it meets the prediction; else the design is back.
         """
         if not self._may_stay():
             return slower

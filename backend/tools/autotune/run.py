@@ -318,7 +318,7 @@ async def apply_and_verify(
     found: AutotuneResult, progress: Progress, keep: Keep | None,
     time_left: TimeLeft | None = None,
 ) -> AutotuneResult:  # fmt: skip
-    """The wanted candidate, then more careful ones, until one keeps its promise.
+    """The wanted candidate, then more careful ones, until one meets its prediction.
 
     What the axis has comes before designs that are slower than it.
 

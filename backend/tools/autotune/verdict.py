@@ -134,7 +134,7 @@ def in_words(missed: tuple[Missed, ...]) -> list[Text]:
 
 
 def misses(verdict: LoopVerdict, promised: Goals) -> tuple[Missed, ...]:
-    """What a verdict misses of a promise, with what a margin may be off by."""
+    """What a verdict misses of the goals, with what a margin may be off by."""
     return verdict.missed(promised, MARGIN_DEG, MARGIN_DB, MS_RATIO)
 
 

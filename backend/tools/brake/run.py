@@ -57,7 +57,7 @@ _DIRECTIONS: tuple[Literal[1, -1], ...] = (1, -1)
 
 @dataclass
 class _Catch:
-    """Rows of position, torque and set-point by their cycle, from before to after the motion."""
+    """Rows of position, torque and setpoint by their cycle, from before to after the motion."""
 
     names: tuple[str, str, str]
     blocks: list[bus.ScopeBlock] = field(default_factory=list)
@@ -278,7 +278,7 @@ def _placed(
 ) -> Trial:  # fmt: skip
     """Each sample with the part of the sequence that its cycle belongs to.
 
-    The first set-point that came back and is not the one before the motion tells where it began.
+    The first setpoint that came back and is not the one before the motion tells where it began.
     """
     cycles, values, valid = catch.rows()
     went = np.flatnonzero(valid & (values[:, 2] != raw[0]))

@@ -83,8 +83,8 @@ def evaluate(recording: Recording, settings: InertiaSettings, facts: AxisFacts) 
     return found
 
 
-def doubt_of(result: InertiaResult) -> float:
-    """Half the interval of the inertia as a share of it; what is not identified is all doubt."""
+def uncertainty_of(result: InertiaResult) -> float:
+    """Half the interval of the inertia as a share of it; infinite where it is not identified."""
     inertia = result.inertia_kgm2
     if not result.identifiable:
         return float("inf")

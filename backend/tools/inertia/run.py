@@ -19,12 +19,12 @@ from backend.tools.inertia.evaluation import (
     InertiaOutcome,
     InertiaSettings,
     answer_of,
-    doubt_of,
     evaluate,
     oscillation_hz,
     ratio_against,
     raw_of,
     reevaluate,
+    uncertainty_of,
 )
 from backend.tools.inertia.moves import Shape, first_look, identification_moves
 from backend.tools.inertia.probe import RoughFit
@@ -115,7 +115,7 @@ async def inertia(
         # Too short a travel leaves too little of a gentle move: the first answer stays.
         with contextlib.suppress(NotAllowed):
             calm = await asyncio.to_thread(evaluate, again, settings, facts)
-            if doubt_of(calm) < doubt_of(result):
+            if uncertainty_of(calm) < uncertainty_of(result):
                 recording, result = again, calm
         await back_to(home)
     if keep is not None:

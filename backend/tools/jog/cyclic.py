@@ -1,4 +1,4 @@
-"""Motion with one set-point per cycle: jog, and the signal generator for CSP, CSV and CST.
+"""Motion with one setpoint per cycle: jog, and the signal generator for CSP, CSV and CST.
 
 A trajectory is computed beforehand and checked against the envelope; the loop plays it, watches
 the envelope every cycle, and brakes by itself when the renewals stop.
@@ -235,7 +235,7 @@ async def jog_cyclic(
 def _run_up_from(
     begin: int, travel_rev: float, settings: JogSettings, units: AxisUnits, cycle_s: float
 ) -> npt.NDArray[np.int64]:
-    """Raw positions of a jog over ``travel_rev`` from the set-point ``begin``."""
+    """Raw positions of a jog over ``travel_rev`` from the setpoint ``begin``."""
     speed, slope = settings.speed_rpm / 60.0, settings.acceleration_rpm_s / 60.0
     travel = settings.direction * run_up(travel_rev, speed, slope, cycle_s)
     return begin + np.round(travel * units.position_raw(1.0)).astype(np.int64)

@@ -1,8 +1,8 @@
 """Which row of a sequence each recorded sample belongs to, whatever was lost on the way.
 
-A sample repeats the set-point that went out beside it. Where cycles are missing between two runs
+A sample repeats the setpoint that went out beside it. Where cycles are missing between two runs
 of samples, the loop skipped them (the sequence then went on later), or the samples were lost (it
-went on meanwhile), or some of each; and what is lost may be the beginning. The set-points tell.
+went on meanwhile), or some of each; and what is lost may be the beginning. The setpoints tell.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Run: TypeAlias = tuple[int, FloatArray, BoolArray]
 _IntArray = npt.NDArray[np.int64]
 #: Rows of a run that are compared: enough to tell one place of a sequence from another.
 _COMPARED = 400
-#: Moved set-points that must agree before a place is believed, where a sequence has as many.
+#: Moved setpoints that must agree before a place is believed, where a sequence has as many.
 _SURE = 15
 
 
@@ -31,8 +31,8 @@ def aligned(
 ) -> tuple[FloatArray, BoolArray]:
     """Rows [n, k] of the recording, row i belonging to row i of ``sent`` [n, m].
 
-    The last m columns of each run repeat the set-points that went out. Rows beside a gap, rows
-    that were lost and rows whose set-points differ are not valid. Where the set-points stand
+    The last m columns of each run repeat the setpoints that went out. Rows beside a gap, rows
+    that were lost and rows whose setpoints differ are not valid. Where the setpoints stand
     still over a gap and cannot tell, the loop is taken to have skipped the cycles, which is what
     happens on a computer that is busy. With ``ended_early`` the rows end where the sequence was
     broken off.
@@ -65,7 +65,7 @@ def aligned(
         low, high = low + len(samples), high + len(samples)
     last = np.flatnonzero(valid)
     if last.size < 0.5 * (0 if ended_early else len(sent)) or not last.size:
-        raise LinkLost("measuring.set-points-not-come", drive=drive)
+        raise LinkLost("measuring.setpoints-not-come", drive=drive)
     count = int(last[-1]) + 1 if ended_early else len(sent)
     return table[:count], valid[:count]
 
@@ -78,9 +78,9 @@ def _keys(parts: list[FloatArray]) -> list[_IntArray]:
 
 def _places(sent: _IntArray, echo: _IntArray, low: int, high: int) -> tuple[int, int, int]:
     """First and last row from ``low`` to ``high`` that the first of ``echo`` may belong to, and
-    how many moved set-points agree there.
+    how many moved setpoints agree there.
 
-    Every set-point that moved and agrees speaks for a place; every one that differs, and every
+    Every setpoint that moved and agrees speaks for a place; every one that differs, and every
     one that moved before the sequence began or after it ended, speaks against it.
     """
     moved = np.diff(echo, prepend=echo[:1]) != 0
@@ -95,7 +95,7 @@ def _places(sent: _IntArray, echo: _IntArray, low: int, high: int) -> tuple[int,
 def _score(
     sent: _IntArray, echo: _IntArray, moved: BoolArray, places: _IntArray
 ) -> tuple[_IntArray, _IntArray]:
-    """Moved set-points that agree at each place, and those less what speaks against it."""
+    """Moved setpoints that agree at each place, and those less what speaks against it."""
     hits = np.zeros(len(places), dtype=np.int64)
     against = np.zeros(len(places), dtype=np.int64)
     for offset, (value, moves) in enumerate(zip(echo, moved, strict=True)):

@@ -1,6 +1,6 @@
 """Play a precomputed excitation cycle by cycle and keep every sample of it, or fail.
 
-The recording is aligned with what was sent by the set-points that come back with each sample,
+The recording is aligned with what was sent by the setpoints that come back with each sample,
 so lost blocks cannot shift it. A cycle that was lost or late is marked and never evaluated; it
 holds what lies between its neighbours, since filters and extremes run over it.
 """
@@ -37,9 +37,9 @@ from drivers.texts.message import Text
 
 _RENEW_S = 0.03
 _STATE_TIMEOUT_S = 5.0
-#: Samples arrive in bunches; this long after the last set-point all of them have come.
+#: Samples arrive in bunches; this long after the last setpoint all of them have come.
 _TAIL_S = 1.0
-#: Cycles that are kept from before the motion: its first set-point goes out in the next one.
+#: Cycles that are kept from before the motion: its first setpoint goes out in the next one.
 _RUN_IN = 8
 _ROLES = ("position_actual", "velocity_actual", "torque_actual", "status_word")
 _TARGET_OF = {
@@ -346,7 +346,7 @@ async def _drive_through(
         if arrived > heard:
             # A bus may be slow where a busy computer simulates it; one that is silent is gone.
             heard, deadline = arrived, time.monotonic() + _TAIL_S
-        # Some bunches beyond the end: the first samples may be older than the first set-point.
+        # Some bunches beyond the end: the first samples may be older than the first setpoint.
         if arrived * period_s > count * period_s + 0.15:
             # What happened since the last look, in the tail, is no better than before it.
             raise_if_ended(axis, session)

@@ -14,14 +14,14 @@ _STANDS_S = 0.5
 
 
 async def settle(axis: Axis, *, asked: bool) -> JobResult:
-    """Put back what is owed to the drive of a standing axis.
+    """Restore the pending values of a standing axis' drive.
 
     Where nobody ``asked``, only values that are still what a tool left there: what has changed
     since may be meant. Returns ``back`` (raw values by key) and ``left`` (why the others are not).
 
     Raises:
         NotAllowed: the axis is enabled or moves, or another drive answers here.
-        RestoreFailed: naming what could not be put back; it stays owed.
+        RestoreFailed: naming what could not be restored; it stays pending.
     """
     drive = axis.drive
     if await axis.state() is State.OPERATION_ENABLED or not await axis.standstill(_STANDS_S):
@@ -29,14 +29,14 @@ async def settle(axis: Axis, *, asked: bool) -> JobResult:
     await confirm_identity(drive)
     back: dict[str, Raw] = {}
     left: dict[str, str] = {}
-    for debt in drive.owed.debts:
-        now = (await drive.read(debt.key)).raw
-        if now == debt.raw and not debt.unapplied:
+    for entry in drive.pending_restores.entries:
+        now = (await drive.read(entry.key)).raw
+        if now == entry.raw and not entry.unapplied:
             continue
-        if asked or now == debt.raw or now in debt.left:
-            back[debt.key] = debt.raw
+        if asked or now == entry.raw or now in entry.left:
+            back[entry.key] = entry.raw
         else:
-            left[debt.key] = f"{now} now, which no measurement left there"
+            left[entry.key] = f"{now} now, which no measurement left there"
     with axis.granted("put back what a motion left"):
         await put_back_in_time(axis, back)
     return {"back": dict(back), "left": dict(left)}

@@ -67,7 +67,7 @@ async def put_back(axis: Axis, before: Mapping[str, Raw]) -> None:
     drive = axis.drive
     failed: list[str] = []
     left = dict(before)
-    changed = drive.owed.unapplied
+    changed = drive.pending_restores.unapplied
     try:
         for key, raw in before.items():
             try:
@@ -76,21 +76,23 @@ async def put_back(axis: Axis, before: Mapping[str, Raw]) -> None:
                     changed = True
                 del left[key]
             except DriveError as error:
-                failed.append(f"{key} (was {drive.owed.original(key, raw)}): {error.message}")
+                failed.append(
+                    f"{key} (was {drive.pending_restores.original(key, raw)}): {error.message}"
+                )
     finally:
         # When this is cut off in the middle, too, it is known what is missing.
-        drive.owed.add(left)
+        drive.pending_restores.add(left)
     back = {key: raw for key, raw in before.items() if key not in left}
     if changed or drive.pending:
         try:
             await make_effective(axis)
         except BaseException as error:
-            drive.owed.add(back, unapplied=True)
+            drive.pending_restores.add(back, unapplied=True)
             back = {}
             if not isinstance(error, DriveError):
                 raise
             failed.append(f"write settings: {error.message}")
-    drive.owed.settle(back)
+    drive.pending_restores.settle(back)
     if failed:
         raise RestoreFailed("measuring.not-restored", drive=drive.name, failed="; ".join(failed))
 
@@ -105,7 +107,7 @@ async def put_back_in_time(axis: Axis, before: Mapping[str, Raw]) -> None:
     try:
         await shielded(lambda: put_back(axis, before), CLEANUP_TIMEOUT_S, drive.name)
     except LinkTimeout as error:
-        owed = {debt.key: debt.raw for debt in drive.owed.debts}
+        owed = {entry.key: entry.raw for entry in drive.pending_restores.entries}
         left = ", ".join(f"{key} (was {owed[key]})" for key in before if key in owed)
         raise RestoreFailed(
             "measuring.not-restored-2",
@@ -121,7 +123,7 @@ async def put_back_in_time(axis: Axis, before: Mapping[str, Raw]) -> None:
 async def temporary(axis: Axis, values: Mapping[str, int]) -> AsyncIterator[dict[str, int]]:
     """These raw values act inside the block; yields what is put back afterwards."""
     drive = axis.drive
-    with drive.owed.lent({key: await drive.raw(key) for key in values}):
+    with drive.pending_restores.borrowed({key: await drive.raw(key) for key in values}):
         before = await write_settings(axis, values)
         try:
             yield before
@@ -131,7 +133,7 @@ async def temporary(axis: Axis, values: Mapping[str, int]) -> AsyncIterator[dict
 
 @asynccontextmanager
 async def stopping_hard(axis: Axis, speed_rpm: float) -> AsyncIterator[None]:
-    """Inside the block a quick stop brakes from this speed as fast as set-points are ramped down.
+    """Inside the block a quick stop brakes from this speed as fast as setpoints are ramped down.
 
     Raises:
         ScaleUnknown: what a speed is, is not certain: nothing may move.

@@ -214,7 +214,7 @@ async def _dwell(axis: Axis, dwell_s: float, watch: _Watch) -> None:
 
 
 async def _to(axis: Axis, target: int, watch: _Watch, progress: Progress | None) -> None:
-    """Set-point handshake (CiA 402-2 clause 10.3.3), then wait for target reached."""
+    """Setpoint handshake (CiA 402-2 clause 10.3.3), then wait for target reached."""
     drive, units = axis.drive, await axis.units()
     start, envelope = watch.start, watch.envelope
     _require_reachable(axis, units, target, start, envelope)
@@ -248,7 +248,7 @@ async def _to(axis: Axis, target: int, watch: _Watch, progress: Progress | None)
 
 
 async def _acknowledged(axis: Axis) -> None:
-    """Give the drive time to take the set-point (CiA 402: bit 12).
+    """Give the drive time to take the setpoint (CiA 402: bit 12).
 
     Families print the acknowledge in different bits (004:3765 has it in 13), so its absence
     is no error here; whether the axis arrives is judged afterwards.

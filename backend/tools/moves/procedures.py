@@ -92,7 +92,7 @@ async def _carry_out(
             progress(number / len(procedure.steps), prose(words[number]))
             try:
                 if rest_s := _rest_from(procedure.steps, number):
-                    await left_alone.enter_async_context(drive.rest.alone(rest_s))
+                    await left_alone.enter_async_context(drive.exclusive.alone(rest_s))
                 await _step(axis, step)
             except DriveError as error:
                 left = len(procedure.steps) - number - 1

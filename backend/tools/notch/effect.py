@@ -86,7 +86,7 @@ async def measure_meaning(
 ) -> NotchMeaning:
     """Try values of the first notch on an axis that no load pulls, without a loop.
 
-    ``path`` lies between set-point and torque, as a measurement of the mechanics found it. With
+    ``path`` lies between setpoint and torque, as a measurement of the mechanics found it. With
     ``still`` the axis only trembles where it stands: what a notch does to the torque shows
     without any travel, and friction is no part of it.
 
@@ -383,7 +383,7 @@ def _every_level(drive: Drive, points: list[tuple[int, float]]) -> tuple[tuple[i
 
 
 def path_of(rate: float, facts: AxisFacts, hold: str | None, delay_s: float) -> SignalPath:
-    """The path between set-point and torque, as a frequency response found it."""
+    """The path between setpoint and torque, as a frequency response found it."""
     path = SignalPath(rate, current_bandwidth_hz=facts.current_bandwidth_hz,
                       command_delay_s=delay_s)  # fmt: skip
     return replace(path, hold="linear") if hold == "linear" else path

@@ -18,10 +18,10 @@ from backend.analysis.response.frf import Frf, Quantity, Record, estimate_period
 from backend.analysis.response.reported import (
     charged,
     commanded,
-    current_doubt,
+    current_uncertainty,
     mean_cycles,
-    path_doubt,
-    slow_doubt,
+    path_uncertainty,
+    slow_uncertainty,
 )
 from backend.analysis.response.sampling import (
     MODEL_SHARE,
@@ -53,7 +53,7 @@ _SLOW_HZ, _SLOWER = 450.0, 0.7
 _SLOW_OR_FILTERED = text("sweep.slow-or-filtered")
 _DROPPED = text("sweep.torque-not-used")
 #: What is charged to all lines where a speed loop's reference was the excitation, one deviation:
-#: a set-point that is held until it is sampled tells next to nothing of current loop and delay,
+#: a setpoint that is held until it is sampled tells next to nothing of current loop and delay,
 #: which the loop's own torque has to, and that is small on heavy axes.
 _BY_REFERENCE_S = 15e-6
 #: A speed loop's gain and the mechanics are found in turn, so often at most.
@@ -84,7 +84,7 @@ class SweepSettings:
     inertia_kgm2: float | None = None
     notches_off: bool = True
     hold: Hold | None = None
-    """How the drive holds set-points between cycles; None asks the drive, or the recording."""
+    """How the drive holds setpoints between cycles; None asks the drive, or the recording."""
     excitation: Waveform = "multisine"
     coulomb_nm: float | None = None
     """Friction that is taken out of a speed loop's response; None: the recording tells."""
@@ -166,8 +166,10 @@ def evaluate(
     warnings = _warnings(found, saturated, facts)
     if facts.current_bandwidth_hz is None and commanded(path):
         lines = found.direct.frequency_hz
-        doubt = current_doubt(lines)
-        direct, corrected = (charged(x, lines, doubt) for x in (found.direct, found.corrected))
+        uncertainty = current_uncertainty(lines)
+        direct, corrected = (
+            charged(x, lines, uncertainty) for x in (found.direct, found.corrected)
+        )
         found = replace(found, direct=direct, corrected=corrected)
         warnings += (_COMMANDED,)
     corner = path.current_bandwidth_hz
@@ -175,18 +177,20 @@ def evaluate(
     # Where the torque was dropped it is another one, and an ordinary path explains the motion.
     if slow or (found.torque_unexplained and not found.torque_dropped):
         lines = found.direct.frequency_hz
-        doubt = path_doubt(lines) if corner is None else slow_doubt(lines, corner)
-        doubt = np.hypot(doubt.real, path_doubt(lines).real) + 1j * np.hypot(
-            doubt.imag, path_doubt(lines).imag
+        uncertainty = path_uncertainty(lines) if corner is None else slow_uncertainty(lines, corner)
+        uncertainty = np.hypot(uncertainty.real, path_uncertainty(lines).real) + 1j * np.hypot(
+            uncertainty.imag, path_uncertainty(lines).imag
         )
-        direct, corrected = (charged(x, lines, doubt) for x in (found.direct, found.corrected))
+        direct, corrected = (
+            charged(x, lines, uncertainty) for x in (found.direct, found.corrected)
+        )
         found = replace(found, direct=direct, corrected=corrected)
         warnings += (_SLOW,)
     if slow and quantity == "torque_injection" and facts.torque_filter_hz is None:
         # Beside a loop the motion alone does not tell which of the two it is.
         lines = found.direct.frequency_hz
-        doubt = np.log(lag_response(lines, corner))
-        direct = charged(found.direct, lines, doubt)
+        uncertainty = np.log(lag_response(lines, corner))
+        direct = charged(found.direct, lines, uncertainty)
         found = replace(found, direct=direct, corrected=direct, trusted=False)
         warnings += (_SLOW_OR_FILTERED,)
     if by_speed:

@@ -272,7 +272,7 @@ async def _as_sent(
     sent: Play,
     start: int,
 ) -> excite.Sequence:  # fmt: skip
-    """The excitation as the rounded set-points say; estimators must know what really went out."""
+    """The excitation as the rounded setpoints say; estimators must know what really went out."""
     if settings.kind == "mechanics" and not setup.by_speed:
         return sequence
     units = await axis.units()

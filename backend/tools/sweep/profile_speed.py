@@ -1,7 +1,7 @@
 """Speeds with every SYNC for a drive that has no cyclic mode, and what must hold before that.
 
 Such a drive takes its speeds in Profile velocity. For a measurement its ramps are put out of the
-way, so that each set-point takes effect with its SYNC; they come back on every exit. Nothing in
+way, so that each setpoint takes effect with its SYNC; they come back on every exit. Nothing in
 the drive ends the last speed when this computer falls silent (DS_C documents no watchdog): so the
 drive's own travel limits must be active and a person must agree, for every measurement.
 """
@@ -137,7 +137,7 @@ async def _prepare(
 async def interpolated(
     axis: Axis, session: CyclicSession, speed_rpm: npt.NDArray[np.float64]
 ) -> AsyncIterator[None]:
-    """Let the drive's own ramp carry it from one set-point of a smooth move to the next.
+    """Let the drive's own ramp carry it from one setpoint of a smooth move to the next.
 
     A speed that steps with every SYNC makes a torque that falls during each cycle, and samples at
     its end miss half of that: an inertia would come out too small by half a cycle of the speed

@@ -26,7 +26,7 @@ _TURN = 2 * np.pi
 #: Peak of the first trial in rad/s: even a high gain makes little torque of it.
 FIRST_RAD_S = 0.3
 #: Shares of the permitted speed: for what the axis makes of the excitation, and for the highest
-#: set-point. A drive that nothing watches goes on with that when the computer falls silent.
+#: setpoint. A drive that nothing watches goes on with that when the computer falls silent.
 _SPEED_SHARE, _REFERENCE_SHARE = 0.3, 0.9
 _UNWATCHED_SPEED_SHARE, _UNWATCHED_REFERENCE_SHARE = 0.15, 0.5
 #: Share of the permitted torque for excitation and base motion together, and what is left of the
@@ -76,9 +76,9 @@ def fitting_size(
     """What makes a torque that peaks at ``torque_nm``, as far as the trial tells.
 
     A soft loop makes little speed of its reference, so that the axis' own speed counts; the
-    set-points stay within a share, too. Such a loop may answer the base motion with much torque,
+    setpoints stay within a share, too. Such a loop may answer the base motion with much torque,
     as that lies near its resonance: the base motion gets what the excitation leaves. ``watched``:
-    the drive ends a motion whose set-points stop coming.
+    the drive ends a motion whose setpoints stop coming.
     """
     speed_share = _SPEED_SHARE if watched else _UNWATCHED_SPEED_SHARE
     reference_share = _REFERENCE_SHARE if watched else _UNWATCHED_REFERENCE_SHARE
@@ -109,8 +109,8 @@ def telling_weight(
     """
     taken = tuple(_record(s, r) for s, r in records)
     told = estimate_periodic(taken, SignalPath(rate), "closed_loop", position=True)
-    doubt = np.nan_to_num(told.std_db, nan=1.0)
-    relative = doubt / float(np.median(doubt))
+    uncertainty = np.nan_to_num(told.std_db, nan=1.0)
+    relative = uncertainty / float(np.median(uncertainty))
     return np.asarray(np.clip(relative, *_WEIGHTS) ** _BY_DOUBT)
 
 

@@ -15,7 +15,7 @@ def message_of(trajectory: Trajectory) -> Message:
     """What the host process is told of a trajectory.
 
     Raises:
-        NotAllowed: no set-point for cyclic motion.
+        NotAllowed: no setpoint for cyclic motion.
         OutOfRange: a value does not fit its object or the envelope.
     """
     require_fits(trajectory)

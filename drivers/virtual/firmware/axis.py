@@ -228,7 +228,7 @@ class VirtualAxis:
         self.p[k.P_T_TARGET], self.p[k.P_T_SLOPE] = torque_nm, slope_nm_s
 
     def run_cyclic(self, loop: int) -> None:
-        """Follow interpolated set-points from the present demand (or actual) values."""
+        """Follow interpolated setpoints from the present demand (or actual) values."""
         s = self.s
         if self.p[k.P_LOOP] != k.LOOP_POSITION:
             s[k.S_P_DEMAND] = s[k.S_THETA]
@@ -239,7 +239,7 @@ class VirtualAxis:
         s[k.S_IP_LEFT] = 0.0
 
     def set_cyclic(self, angle_rad: float, speed: float, torque_nm: float, steps: int) -> None:
-        """New cyclic set-points, reached linearly in ``steps`` of 50 µs (004:7618-7621)."""
+        """New cyclic setpoints, reached linearly in ``steps`` of 50 µs (004:7618-7621)."""
         s, item = self.s, self.s.item
         s[k.S_IP_POSITION_INC] = (angle_rad - item(k.S_IP_POSITION)) / steps
         s[k.S_IP_SPEED_INC] = (speed - item(k.S_IP_SPEED)) / steps

@@ -1,4 +1,4 @@
-"""What each mode of operation does with its set-points (004:3641-4530)."""
+"""What each mode of operation does with its setpoints (004:3641-4530)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class _Move(NamedTuple):
 
 
 class Modes:
-    """Starts modes and feeds them; knows set-points, not states."""
+    """Starts modes and feeds them; knows setpoints, not states."""
 
     def __init__(self, core: Core) -> None:
         self._core = core
@@ -87,9 +87,9 @@ class Modes:
         else:
             self.start(self.mode)
 
-    # --- set-points ------------------------------------------------------------------------
+    # --- setpoints ------------------------------------------------------------------------
     def refresh(self) -> None:
-        """A set-point or parameter of the running mode changed."""
+        """A setpoint or parameter of the running mode changed."""
         if not self.running:
             return
         core = self._core
@@ -184,7 +184,7 @@ class Modes:
         self.on_cyclic(spacing if steady and 0 < spacing < self._steps else None)
 
     def on_cyclic(self, steps: int | None = None) -> None:
-        """New cyclic set-points: interpolate to them over ``steps``, by default 60C2h."""
+        """New cyclic setpoints: interpolate to them over ``steps``, by default 60C2h."""
         if not self.running or self.mode not in _CYCLIC_LOOP:
             return
         core, units = self._core, self._core.units

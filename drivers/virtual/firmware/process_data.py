@@ -96,7 +96,7 @@ class OutputImage:
         return self._struct.pack(*[entry.current() for entry in self._entries])
 
     def unpack(self, data: bytes) -> None:
-        """Take over one cycle's outputs; set-points first, the control word last."""
+        """Take over one cycle's outputs; setpoints first, the control word last."""
         # Process data overrule what another access wrote in between.
         if data != self._last or self._writes != self._od.writes:
             self._last, self._writes = data, self._od.writes
@@ -122,7 +122,7 @@ class OutputImage:
                 entry.value = entry.active = before
 
 
-#: The mode must act before the control word, and both after the set-points of the same cycle.
+#: The mode must act before the control word, and both after the setpoints of the same cycle.
 _ORDER = {"6060:00": 1, "6040:00": 2}
 
 

@@ -41,7 +41,7 @@ _RESET_AFTER_STEPS: Final = 400
 """20 ms from the reset command to the reset, so that the wire can still answer it."""
 _BOOT_S: Final = 0.3
 _OUTPUTS: Final = 0x60FE01
-#: Set-points that the cyclic modes and bit 4 of the control word fetch by themselves.
+#: Setpoints that the cyclic modes and bit 4 of the control word fetch by themselves.
 _FETCHED: Final = frozenset({"607A:00", "60B0:00", "60B1:00", "60B2:00", "60FE:01", "60FE:02"})
 _OPTION_CODES: Final = frozenset({"605A:00", "605B:00", "605C:00", "605D:00", "605E:00"})
 #: Standard objects that change how the loops are set, not only windows and limits.

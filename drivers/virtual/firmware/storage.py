@@ -13,7 +13,7 @@ from drivers.virtual.firmware.settings import MotorData
 from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw
 
-#: Set-points and commands, which no drive stores.
+#: Setpoints and commands, which no drive stores.
 VOLATILE: Final = frozenset(
     f"{index:04X}:00"
     for index in (0x6040, 0x6060, 0x607A, 0x60FF, 0x6071, 0x60B0, 0x60B1, 0x60B2, 0x60B8)

@@ -1,6 +1,6 @@
 """What drives and machines do that an analysis does not assume, as options of a virtual axis.
 
-Each option has a structure of its own, not the one that `backend.analysis` fits: a held set-point
+Each option has a structure of its own, not the one that `backend.analysis` fits: a held setpoint
 where 60C2h exists, a torque that is reported late or copied from the demand, a loop that runs at
 another period, friction that begins as a spring, a belt that creeps. All are off by default.
 """
@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 class RoughTorqueSpec(BaseModel):
     """Torque path, loop period and machine of a rough axis; everything 0 or off is as before.
 
-    ``holds_torque`` and ``holds_speed``: cyclic set-points act at once and stay for the cycle,
+    ``holds_torque`` and ``holds_speed``: cyclic setpoints act at once and stay for the cycle,
     although the dictionary has 60C2h. ``reported``: 6077h is the current's torque or a copy of the
     demand, behind a first-order filter of ``reported_filter_s``. ``torque_filter_s``: a first-order
     low-pass of the torque command that no parameter names. ``loop_period_s`` (50 µs or longer):
@@ -29,7 +29,7 @@ class RoughTorqueSpec(BaseModel):
     place. ``slip_per_s``: share of the first coupling's twist that a belt gives way per second.
     ``dip_share`` of the torque is missing for ``dip_s`` out of every ``dip_every_s``, as with a
     supply that breaks down. ``interpolation_rad`` sin(``interpolation_per_rev`` θ) is the encoder's
-    error. ``jitter_s``: a cyclic set-point acts later by up to this.
+    error. ``jitter_s``: a cyclic setpoint acts later by up to this.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

@@ -1,4 +1,4 @@
-"""What lies between set-points and torque, found again from simulated recordings."""
+"""What lies between setpoints and torque, found again from simulated recordings."""
 
 from dataclasses import replace
 
@@ -76,7 +76,7 @@ def test_a_straight_line_is_told_from_a_staircase(interpolates):
 
 @pytest.mark.parametrize("known_hz", [None, 1000.0])
 def test_a_line_that_begins_in_its_own_cycle_is_a_line(known_hz):
-    """Set-points that act at once: the line of steps is 25 µs before one of whole cycles.
+    """Setpoints that act at once: the line of steps is 25 µs before one of whole cycles.
 
     A staircase with part of a cycle of delay is near it in the sampled torque (0.68 cycles, a
     current loop of 1 kHz), and 25 µs too late a line explains less than that.
@@ -98,7 +98,7 @@ def test_a_delay_just_short_of_whole_cycles_is_found():
     assert best.command_delay_s == pytest.approx(39 * 50e-6, abs=5e-6)
 
 
-def test_a_noisy_loop_leaves_no_doubt_of_whole_cycles():
+def test_a_noisy_loop_leaves_no_uncertainty_of_whole_cycles():
     """A quarter of the torque is the loop's answer to noise, which looks like other paths, too."""
     case = case_of(1000.0, late_steps=0, current_hz=1400.0, loop_hz=30.0, counts_per_rev=2**20,
                    noise_counts=8.0)  # fmt: skip
@@ -189,14 +189,14 @@ def test_minimum_is_that_of_a_general_solver():
         assert np.all((own.x >= low) & (own.x <= high))
 
 
-def test_doubt_tells_how_far_a_path_that_is_off_bends_the_answer():
+def test_uncertainty_tells_how_far_a_path_that_is_off_bends_the_answer():
     case = case_of(1000.0, late_steps=0, current_hz=1000.0)
     path = SignalPath(1000.0, current_bandwidth_hz=1000.0, response_bandwidth_hz=1000.0)
     task = _Task(records_of(case), "torque_mode")
     found = task.trial(path)
-    doubt = task.doubt(found, corner_known=True)
+    uncertainty = task.uncertainty(found, corner_known=True)
     # One deviation of the delay, as the covariance of the torque's fit has it, and the same again.
-    std = doubt.path_std[0]
+    std = uncertainty.path_std[0]
     other = task.trial(moved_path(path, std, 0.0), start=found.solution)
     f = found.views.velocity.frequency_hz
     now, then = (
@@ -204,8 +204,8 @@ def test_doubt_tells_how_far_a_path_that_is_off_bends_the_answer():
         for t in (found, other)
     )
     moved = np.log(then / now)
-    assert np.median(np.abs(moved.imag)) <= 1.5 * np.median(doubt.corrected[0].imag)
-    assert np.median(np.abs(moved.real)) <= 1.5 * np.median(doubt.corrected[0].real)
+    assert np.median(np.abs(moved.imag)) <= 1.5 * np.median(uncertainty.corrected[0].imag)
+    assert np.median(np.abs(moved.real)) <= 1.5 * np.median(uncertainty.corrected[0].real)
 
 
 def test_what_else_may_be_true_widens_the_band():

@@ -49,7 +49,7 @@ def integral_of_held(values: np.ndarray, path: SignalPath) -> np.ndarray:
             lagged = a * lagged + (1 - a) * value
             out[n] = lagged
         integral = out
-    # What is sampled with a set-point is the state just before it takes effect.
+    # What is sampled with a setpoint is the state just before it takes effect.
     return np.concatenate([[0.0], integral[FINE - 1 :: FINE]])[: values.size]
 
 

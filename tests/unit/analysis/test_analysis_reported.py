@@ -8,7 +8,7 @@ import pytest
 from drive_sim import TURN, Drive, simulate
 from measured_axes import ONE, tuned_drive
 
-from backend.analysis.response.reported import commanded, current_doubt, mean_cycles
+from backend.analysis.response.reported import commanded, current_uncertainty, mean_cycles
 from backend.analysis.response.sampling import SignalPath, lag_response
 from backend.analysis.signals.excitation import BaseMotion, choose_lines, multisine, scaled
 from backend.analysis.signals.line_spectra import Record
@@ -84,7 +84,9 @@ def test_a_torque_that_is_the_command_hides_the_current_loop():
     assert not commanded(SignalPath(RATE, current_bandwidth_hz=2000.0))
     assert not commanded(SignalPath(RATE))
     f = np.geomspace(5.0, 400.0, 100)
-    doubt = current_doubt(f)
-    assert doubt.real == pytest.approx(np.log(np.abs(lag_response(f, 1000.0))))
+    uncertainty = current_uncertainty(f)
+    assert uncertainty.real == pytest.approx(np.log(np.abs(lag_response(f, 1000.0))))
     # A delay is found anyway: what is left of the phase is its curvature.
-    assert np.max(np.abs(doubt.imag)) < 0.1 * np.max(np.abs(np.angle(lag_response(f, 1000.0))))
+    assert np.max(np.abs(uncertainty.imag)) < 0.1 * np.max(
+        np.abs(np.angle(lag_response(f, 1000.0)))
+    )

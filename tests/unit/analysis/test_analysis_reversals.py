@@ -1,4 +1,4 @@
-"""Strong friction beside soft modes, images by speed and position together, and modes in doubt."""
+"""Strong friction beside soft modes, images by speed and position together, and modes uncertain."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from random_axes import ENVELOPE, RATED_NM, Case, errors, facts_of, played
 from backend.analysis.mechanics import identify
 from backend.analysis.mechanics.fit_problem import CHAIN, Problem, View
 from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
-from backend.analysis.mechanics.mode_uncertainty import ModeDoubt, mode_doubts
+from backend.analysis.mechanics.mode_uncertainty import ModeUncertainty, mode_uncertainties
 from backend.analysis.mechanics.resonance import Resonance
 from backend.analysis.mechanics.resonance_table import resonance_table
 from backend.analysis.response.frf import Frf
@@ -115,7 +115,7 @@ def test_a_mode_that_may_be_none_is_not_listed():
     lines = np.arange(5.0, 400.0, 1.5)
     modes = (Mode(20.0, 0.03, 4e3, 0.0), Mode(120.0, 0.02, 2e3, 0.0))
     model = MechanicalModel(5e3, 0.1, modes)
-    unsure, sure = ModeDoubt(0.02, 0.5, 0.4), ModeDoubt(0.001, 0.1, 0.05)
+    unsure, sure = ModeUncertainty(0.02, 0.5, 0.4), ModeUncertainty(0.001, 0.1, 0.05)
     rows = resonance_table(model, lines, 400.0, (unsure, sure))
     [row] = [r for r in rows if r.kind == "resonance"]
     assert isinstance(row, Resonance)
@@ -141,17 +141,17 @@ def test_what_friction_adds_to_a_mode_is_the_same_however_it_is_damped(damping_n
     view = View.of(seen, none == 0.0, path, LoopModel(), 0.01, integrated=False, second=False)
     problem = Problem((view,), 1e-3, CHAIN, free_filter=False)
     taken = -more * model.response(lines)
-    [doubt] = mode_doubts(problem, x, np.zeros((8, 8)), [taken], friction_seen=True)
-    added = np.sqrt(doubt.damping**2 - 0.03**2) * model.modes[0].damping
+    [uncertainty] = mode_uncertainties(problem, x, np.zeros((8, 8)), [taken], friction_seen=True)
+    added = np.sqrt(uncertainty.damping**2 - 0.03**2) * model.modes[0].damping
     w = np.sqrt(stiffness * 2.0 / inertia)
     assert added == pytest.approx(more * 0.5 / inertia / (2.0 * w), rel=0.03)
 
 
 def test_a_damping_that_is_not_known_to_half_of_itself_may_be_none():
-    assert ModeDoubt(0.0, 0.1, 0.0).damping_interval(0.02, 1.96) == pytest.approx(
+    assert ModeUncertainty(0.0, 0.1, 0.0).damping_interval(0.02, 1.96) == pytest.approx(
         (0.01608, 0.02392)
     )
-    low, high = ModeDoubt(0.0, 0.6, 0.0).damping_interval(0.02, 1.96)
+    low, high = ModeUncertainty(0.0, 0.6, 0.0).damping_interval(0.02, 1.96)
     assert low == 0.0
     assert high == pytest.approx(0.04352)
 

@@ -10,7 +10,7 @@ from backend.api.app import make_app
 from backend.drive.drive import Drive
 from backend.drive.ports import Port
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from drivers.link import Found
 from profiles.motion.classify import classified
 from profiles.motion.rule import MotionRule
@@ -122,8 +122,8 @@ async def bench(servo: Servo, tmp_path: Path) -> AsyncIterator[Bench]:
 
 
 @pytest.fixture
-def x(bench: Bench) -> Member:
-    return bench.member("x")
+def x(bench: Bench) -> ConnectedDrive:
+    return bench.connected("x")
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Samples find their set-points again, whatever part of the recording is missing."""
+"""Samples find their setpoints again, whatever part of the recording is missing."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def noise(rows: int = 600) -> FloatArray:
 def recorded(
     sent: FloatArray, lost: tuple[range, ...] = (), skipped: dict[int, int] | None = None
 ) -> list[Run]:
-    """What is recorded of a sequence: a counter of the samples as position, and the set-points.
+    """What is recorded of a sequence: a counter of the samples as position, and the setpoints.
 
-    ``lost`` are samples of the recording that never came; before the set-point at each row of
+    ``lost`` are samples of the recording that never came; before the setpoint at each row of
     ``skipped`` the loop left out so many cycles and played it later.
     """
     before, after = np.repeat(sent[:1] * 0, IDLE, axis=0), np.repeat(sent[-1:], IDLE, axis=0)

@@ -18,7 +18,7 @@ from backend.axis.cyclic import CyclicSession
 from backend.people.identity import LOCAL, Actor, acting
 from backend.people.station import People
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.station.measuring import Exchange
 from backend.station.monitor import Snapshot
 from backend.work.jobs import JobRunner, Progress
@@ -46,7 +46,7 @@ def begin(bench: Bench) -> None:
 
 
 async def test_an_axis_that_left_the_bench_unstopped_is_stopped_when_it_comes_back(
-    bench: Bench, x: Member, servo: Servo
+    bench: Bench, x: ConnectedDrive, servo: Servo
 ) -> None:
     """Taken off while its cable was pulled and connected again: it stayed enabled."""
     await x.axis.transition(State.OPERATION_ENABLED, Mode.PP)
@@ -58,7 +58,7 @@ async def test_an_axis_that_left_the_bench_unstopped_is_stopped_when_it_comes_ba
     await again.monitor.close()
     await again.monitor.refresh()
     assert servo.number(STATUS) != ENABLED
-    assert not again.axis.owes_stop
+    assert not again.axis.stop_pending
     await bench.remove("x")
     servo.enable()
     third = await bench.connect(URL, 1, "mms7", "X")
@@ -82,7 +82,7 @@ class SlowSession:
 
 
 async def test_nothing_begins_to_move_on_its_way_off_the_bench(
-    bench: Bench, x: Member, servo: Servo
+    bench: Bench, x: ConnectedDrive, servo: Servo
 ) -> None:
     """STOP reaches the drives of the bench: one that moved after it left would be out of reach."""
     await x.axis.transition(State.OPERATION_ENABLED, Mode.PP)
@@ -98,7 +98,7 @@ async def test_nothing_begins_to_move_on_its_way_off_the_bench(
         await bench.remove("x")
     servo.gate.set()
     await removing
-    assert "x" not in bench.members
+    assert "x" not in bench.connected_drives
     assert servo.number(STATUS) != ENABLED
 
 
@@ -153,7 +153,7 @@ class LateCyclic:
         self.running = False
 
 
-async def test_an_exchange_that_started_too_late_is_ended(x: Member, servo: Servo) -> None:
+async def test_an_exchange_that_started_too_late_is_ended(x: ConnectedDrive, servo: Servo) -> None:
     """Nobody would know that it owns the drives' control words."""
     servo.cyclic = cyclic = LateCyclic()  # type: ignore[assignment]
     session = CyclicSession(servo, [x.drive])
@@ -197,7 +197,7 @@ class Page:
     def release(self, *_what: object) -> None: ...
 
 
-async def _enabled_by(x: Member, page: Page) -> None:
+async def _enabled_by(x: ConnectedDrive, page: Page) -> None:
     acting.set(Actor(LOCAL, page.id))
     await x.axis.transition(State.OPERATION_ENABLED, Mode.PP)
 
@@ -211,7 +211,7 @@ async def _left(bench: Bench, tmp_path: Path, *pages: Page) -> Any:
 
 
 async def test_what_a_page_enabled_loses_its_power_with_it(
-    bench: Bench, x: Member, servo: Servo, tmp_path: Path
+    bench: Bench, x: ConnectedDrive, servo: Servo, tmp_path: Path
 ) -> None:
     page = Page("c1")
     await _enabled_by(x, page)
@@ -222,7 +222,7 @@ async def test_what_a_page_enabled_loses_its_power_with_it(
 
 
 async def test_who_controls_the_axis_looks_after_it_from_then_on(
-    bench: Bench, x: Member, servo: Servo, tmp_path: Path
+    bench: Bench, x: ConnectedDrive, servo: Servo, tmp_path: Path
 ) -> None:
     first, second = Page("c1"), Page("c2")
     await _enabled_by(x, first)
@@ -234,7 +234,7 @@ async def test_who_controls_the_axis_looks_after_it_from_then_on(
 
 
 async def test_what_no_page_enabled_stays_as_it_is(
-    bench: Bench, x: Member, servo: Servo, tmp_path: Path
+    bench: Bench, x: ConnectedDrive, servo: Servo, tmp_path: Path
 ) -> None:
     """A script enables for itself, and other masters do on their own."""
     acting.set(Actor(LOCAL, None))
@@ -275,19 +275,19 @@ async def test_a_drive_put_back_on_the_bench_is_watched_as_often_as_before(
 
 
 async def test_a_scope_of_a_drive_that_goes_while_it_is_begun_is_refused_and_leaves_nothing(
-    bench: Bench, x: Member, servo: Servo, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    bench: Bench, x: ConnectedDrive, servo: Servo, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It ended the page's whole connection, and the drive was polled for ever."""
     page = connection(bench, tmp_path)
 
     async def gone(_drive: str) -> None:
-        del bench.members["x"]
+        del bench.connected_drives["x"]
 
     monkeypatch.setattr(page.scopes, "_units", gone)
     request = ScopeStart(subscription=1, channels=[ScopeChannel(drive="x", key="6064:00")])
     before = asyncio.all_tasks()
     await page.scopes._start(request)
-    bench.members["x"] = x
+    bench.connected_drives["x"] = x
     assert not page.scopes._running[1].streams
     assert asyncio.all_tasks() <= before
     await page.close()
@@ -354,7 +354,7 @@ class BreakingOff:
 
 
 async def test_a_stop_that_an_ending_exchange_refused_is_sent_again(
-    x: Member, servo: Servo
+    x: ConnectedDrive, servo: Servo
 ) -> None:
     servo.enable()
     x.axis.session = BreakingOff()  # type: ignore[assignment]
@@ -367,7 +367,7 @@ async def test_a_stop_that_an_ending_exchange_refused_is_sent_again(
 
 
 async def test_stop_brakes_at_least_as_hard_as_the_motion_that_it_stops(
-    x: Member, servo: Servo
+    x: ConnectedDrive, servo: Servo
 ) -> None:
     """An R6L is shipped with 60 rpm/s (002: 6085h): STOP from 300 rpm would take 5 s."""
     servo.set(QUICK, 65536)
@@ -380,7 +380,7 @@ async def test_stop_brakes_at_least_as_hard_as_the_motion_that_it_stops(
         assert servo.number(QUICK) == 9 * 65536, "none is lowered"
 
 
-async def test_a_cancelled_stop_is_sent_again(x: Member, servo: Servo) -> None:
+async def test_a_cancelled_stop_is_sent_again(x: ConnectedDrive, servo: Servo) -> None:
     servo.enable()
     servo.gate.clear()
     stopping = asyncio.create_task(x.axis.quick_stop())
@@ -393,13 +393,13 @@ async def test_a_cancelled_stop_is_sent_again(x: Member, servo: Servo) -> None:
     assert CONTROL in [place for place, _ in servo.written]
 
 
-def shown(member: Member) -> Snapshot:
+def shown(connected: ConnectedDrive) -> Snapshot:
     """What pages see of the axis."""
-    return member.monitor.snapshot
+    return connected.monitor.snapshot
 
 
 async def test_the_watch_over_a_drive_does_not_end_unseen(
-    x: Member, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    x: ConnectedDrive, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """The last state would be shown as the present one for ever."""
     assert (await x.monitor.refresh()).fresh

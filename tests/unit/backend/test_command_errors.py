@@ -62,7 +62,7 @@ async def test_the_bench_refuses_it_too(tmp_path: Path, link: MemoryLink) -> Non
             await bench.connect("mlink://virtual0", 1, "m6l")
         with pytest.raises(NotAllowed, match="no profile named 'mms8'; there are"):
             await bench.connect("mlink://virtual0", 1, "mms8")
-        assert bench.members == {}
+        assert bench.connected_drives == {}
     finally:
         await bench.close()
 

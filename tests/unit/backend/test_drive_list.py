@@ -55,15 +55,15 @@ async def test_a_full_disk_keeps_nobody_from_connecting_a_drive(tmp_path: Path) 
     link = MemoryLink({})
     bench = Bench(tmp_path, {"mlink://virtual0": lambda: link})
     try:
-        member = await bench.connect("mlink://virtual0", 1, "mms7", "X")
-        assert bench.members == {"x": member}
+        connected = await bench.connect("mlink://virtual0", 1, "mms7", "X")
+        assert bench.connected_drives == {"x": connected}
         assert "the list of drives is not stored" in next(
             e.text for e in bench.journal.entries() if e.level == "error"
         )
         with pytest.raises(StorageFailed, match=r"bench\.json could not be written"):
             bench.rename("x", "Y", "on the left")
-        assert (member.drive.name, member.drive.notes) == ("X", "")
+        assert (connected.drive.name, connected.drive.notes) == ("X", "")
         await bench.remove("x")
-        assert bench.members == {}
+        assert bench.connected_drives == {}
     finally:
         await bench.close()

@@ -25,7 +25,7 @@ from backend.restore.identity import identity_of
 from backend.restore.store import RestoreStore
 from backend.scales.gear_calculator import GearValue
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.station.measuring import Exchange, exchange_for
 from backend.tools.jog.cyclic import jog_cyclic
 from backend.tools.jog.run import Hold, JogSettings
@@ -52,16 +52,16 @@ async def forever(_progress: Progress) -> None:
 class Loop:
     """An exchange of several drives whose loop owns the control words."""
 
-    def __init__(self, *members: Member) -> None:
+    def __init__(self, *connected_drives: ConnectedDrive) -> None:
         self.running, self.trouble, self.stopped = True, "", 0
         self.state = CyclicState(0.002, None, (), ())
-        self.drives = tuple(member.drive for member in members)
+        self.drives = tuple(connected.drive for connected in connected_drives)
         self.by_speed: frozenset[str] = frozenset()
         self.cyclic = self
         self.goals: list[State] = []
         self.broken = False
-        for member in members:
-            member.axis.session = self  # type: ignore[assignment]
+        for connected in connected_drives:
+            connected.axis.session = self  # type: ignore[assignment]
 
     def power(self) -> Loop:
         return self
@@ -84,7 +84,7 @@ class Loop:
 # --- an exchange that several axes use --------------------------------------------------
 
 
-async def two_axes(bench: Bench, x: Member) -> tuple[Member, Any]:
+async def two_axes(bench: Bench, x: ConnectedDrive) -> tuple[ConnectedDrive, Any]:
     y = await bench.connect(URL, 2, "mms7", "Y")
     await y.monitor.close()
     loop = Loop(x, y)
@@ -93,7 +93,7 @@ async def two_axes(bench: Bench, x: Member) -> tuple[Member, Any]:
 
 
 async def test_the_end_of_a_measurement_leaves_the_exchange_to_an_axis_that_borrowed_it(
-    bench: Bench, x: Member
+    bench: Bench, x: ConnectedDrive
 ) -> None:
     """X's measurement started the exchange and ends; Y moves through it and must not be braked."""
     _y, loop = await two_axes(bench, x)
@@ -114,14 +114,16 @@ async def test_the_end_of_a_measurement_leaves_the_exchange_to_an_axis_that_borr
     assert x.axis.session is None
 
 
-async def test_its_own_job_does_not_keep_an_exchange(bench: Bench, x: Member) -> None:
+async def test_its_own_job_does_not_keep_an_exchange(bench: Bench, x: ConnectedDrive) -> None:
     _y, loop = await two_axes(bench, x)
     bench.jobs.start("sweep", "Sweep X", forever, drive="x", motion=True)
     await Exchange(loop, bench, "x", URL, own=True).end()
     assert loop.stopped == 1
 
 
-async def test_a_measurement_borrows_what_runs_and_does_not_end_it(bench: Bench, x: Member) -> None:
+async def test_a_measurement_borrows_what_runs_and_does_not_end_it(
+    bench: Bench, x: ConnectedDrive
+) -> None:
     _y, loop = await two_axes(bench, x)
     borrowed = await exchange_for(bench, x, 0.001)
     assert borrowed.session == loop
@@ -130,7 +132,7 @@ async def test_a_measurement_borrows_what_runs_and_does_not_end_it(bench: Bench,
 
 
 async def test_an_axis_does_not_take_the_exchange_of_another_off_the_bench(
-    bench: Bench, x: Member
+    bench: Bench, x: ConnectedDrive
 ) -> None:
     _y, loop = await two_axes(bench, x)
     moving = bench.jobs.start("move", "Move Y", forever, drive="y", motion=True)
@@ -143,7 +145,7 @@ async def test_an_axis_does_not_take_the_exchange_of_another_off_the_bench(
 
 
 async def test_no_motion_begins_on_a_bus_that_is_searched(
-    bench: Bench, x: Member, servo: Servo, monkeypatch: pytest.MonkeyPatch
+    bench: Bench, x: ConnectedDrive, servo: Servo, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A scan asks for axes that stand; one that began after the question was reset as it moved."""
     gate = asyncio.Event()
@@ -165,7 +167,7 @@ async def test_no_motion_begins_on_a_bus_that_is_searched(
 # --- enabling through the loop ------------------------------------------------------------
 
 
-async def test_what_was_not_enabled_in_time_is_not_enabled_later(x: Member) -> None:
+async def test_what_was_not_enabled_in_time_is_not_enabled_later(x: ConnectedDrive) -> None:
     """No main power: the loop tried on, and enabled by itself when the power came."""
     loop = Loop(x)
     with x.axis.granted("a test"), pytest.raises(NotAllowed, match="does not go to"):
@@ -173,7 +175,7 @@ async def test_what_was_not_enabled_in_time_is_not_enabled_later(x: Member) -> N
     assert loop.goals == [State.OPERATION_ENABLED, State.SWITCH_ON_DISABLED]
 
 
-async def test_an_enabling_that_was_cancelled_does_not_go_on(x: Member) -> None:
+async def test_an_enabling_that_was_cancelled_does_not_go_on(x: ConnectedDrive) -> None:
     loop = Loop(x)
     with x.axis.granted("a test"):
         enabling = asyncio.create_task(
@@ -187,7 +189,7 @@ async def test_an_enabling_that_was_cancelled_does_not_go_on(x: Member) -> None:
     assert loop.goals[-1] is State.SWITCH_ON_DISABLED
 
 
-async def test_a_disabling_that_fails_enables_nothing(x: Member, servo: Servo) -> None:
+async def test_a_disabling_that_fails_enables_nothing(x: ConnectedDrive, servo: Servo) -> None:
     loop = Loop(x)
     servo.enable()
     with pytest.raises(NotAllowed):
@@ -195,16 +197,16 @@ async def test_a_disabling_that_fails_enables_nothing(x: Member, servo: Servo) -
     assert loop.goals == [State.SWITCH_ON_DISABLED]
 
 
-def owes_stop(member: Member) -> bool:
+def stop_pending(connected: ConnectedDrive) -> bool:
     """Whether it is told to stop as soon as it answers."""
-    return member.axis.owes_stop
+    return connected.axis.stop_pending
 
 
 # --- leaving ------------------------------------------------------------------------------
 
 
 async def test_a_motion_whose_loop_does_not_take_its_halt_owes_a_stop(
-    x: Member, servo: Servo
+    x: ConnectedDrive, servo: Servo
 ) -> None:
     """Nobody knows what still moves: the drive is told by itself as soon as it can be."""
     loop, hold = Loop(x), Hold()
@@ -213,33 +215,33 @@ async def test_a_motion_whose_loop_does_not_take_its_halt_owes_a_stop(
     hold.release("released")
     with pytest.raises(LinkTimeout):
         await jog_cyclic(x.axis, loop, JOG, hold, Progress(lambda: None))  # type: ignore[arg-type]
-    assert owes_stop(x)
+    assert stop_pending(x)
     x.axis.session = None
     await x.monitor.refresh()
-    assert not owes_stop(x)
+    assert not stop_pending(x)
     assert servo.words() == [2]
     assert servo.number(STATUS) != ENABLED
 
 
-async def test_an_exchange_that_broke_off_in_a_motion_owes_a_stop(x: Member) -> None:
+async def test_an_exchange_that_broke_off_in_a_motion_owes_a_stop(x: ConnectedDrive) -> None:
     loop = Loop(x)
     loop.running, loop.trouble = False, "the process died"
     await x.axis.leave_cyclic(loop, 1.0)  # type: ignore[arg-type]
-    assert x.axis.owes_stop
+    assert x.axis.stop_pending
 
 
-async def test_an_exchange_that_was_ended_in_order_owes_none(x: Member) -> None:
+async def test_an_exchange_that_was_ended_in_order_owes_none(x: ConnectedDrive) -> None:
     loop = Loop(x)
     loop.running = False
     await x.axis.leave_cyclic(loop, 1.0)  # type: ignore[arg-type]
-    assert not x.axis.owes_stop
+    assert not x.axis.stop_pending
 
 
 # --- settings that change together --------------------------------------------------------
 
 
 async def test_nothing_begins_to_move_while_its_settings_change(
-    bench: Bench, x: Member, servo: Servo
+    bench: Bench, x: ConnectedDrive, servo: Servo
 ) -> None:
     """The gear was asked for as the axis stood, and written as a jog had begun."""
     transport = httpx.ASGITransport(make_app(bench, hosts=frozenset({"test"})))
@@ -255,7 +257,9 @@ async def test_nothing_begins_to_move_while_its_settings_change(
     bench.jobs.start("move", "Move X", forever, drive="x", motion=True)
 
 
-async def half_a_gear(x: Member, servo: Servo) -> tuple[asyncio.Task[object], dict[str, int]]:
+async def half_a_gear(
+    x: ConnectedDrive, servo: Servo
+) -> tuple[asyncio.Task[object], dict[str, int]]:
     """The second of two values is on its way to the drive."""
     keys = ("6091:01", "6091:02")
     before = {key: await x.drive.raw(key) for key in keys}
@@ -273,7 +277,9 @@ async def half_a_gear(x: Member, servo: Servo) -> tuple[asyncio.Task[object], di
     return writing, before
 
 
-async def test_a_gear_whose_writing_is_cancelled_is_as_it_was(x: Member, servo: Servo) -> None:
+async def test_a_gear_whose_writing_is_cancelled_is_as_it_was(
+    x: ConnectedDrive, servo: Servo
+) -> None:
     """Half a gear is another scale: the next move would go to another place."""
     writing, before = await half_a_gear(x, servo)
     writing.cancel()
@@ -282,20 +288,20 @@ async def test_a_gear_whose_writing_is_cancelled_is_as_it_was(x: Member, servo: 
     await asyncio.wait([writing])
     assert writing.cancelled()
     assert {key: await x.drive.raw(key) for key in before} == before
-    assert not x.drive.owed
+    assert not x.drive.pending_restores
 
 
-async def test_a_gear_that_cannot_be_taken_back_is_owed(x: Member, servo: Servo) -> None:
+async def test_a_gear_that_cannot_be_taken_back_is_owed(x: ConnectedDrive, servo: Servo) -> None:
     writing, before = await half_a_gear(x, servo)
     servo.mute = True
     servo.gate.set()
     with pytest.raises(LinkTimeout, match="not put back"):
         await writing
-    assert {debt.key: debt.raw for debt in x.drive.owed.debts} == before
+    assert {entry.key: entry.raw for entry in x.drive.pending_restores.entries} == before
 
 
 async def test_a_server_killed_with_half_a_gear_has_noted_it(
-    bench: Bench, x: Member, servo: Servo, tmp_path: Path
+    bench: Bench, x: ConnectedDrive, servo: Servo, tmp_path: Path
 ) -> None:
     del bench
     writing, before = await half_a_gear(x, servo)
@@ -315,7 +321,7 @@ def test_the_search_for_an_end_is_weak_both_ways(now: int, allowed: int) -> None
     assert limited(now, 200) == allowed
 
 
-async def test_a_motion_that_a_fault_ended_names_the_fault(x: Member, servo: Servo) -> None:
+async def test_a_motion_that_a_fault_ended_names_the_fault(x: ConnectedDrive, servo: Servo) -> None:
     """The loop sees only that the drive left Operation enabled; 603Fh says why (004: 3230h)."""
     servo.enable()
 
@@ -330,9 +336,9 @@ async def test_a_motion_that_a_fault_ended_names_the_fault(x: Member, servo: Ser
 
 
 async def test_a_motion_that_went_well_until_a_fault_at_its_end_did_not_go_well(
-    x: Member, servo: Servo
+    x: ConnectedDrive, servo: Servo
 ) -> None:
-    """No set-point was to come any more, so that nobody looked: it ended as if nothing was."""
+    """No setpoint was to come any more, so that nobody looked: it ended as if nothing was."""
     servo.enable()
 
     async def motion() -> None:
@@ -342,7 +348,7 @@ async def test_a_motion_that_went_well_until_a_fault_at_its_end_did_not_go_well(
 
     with pytest.raises(NotAllowed, match=r"end of its motion \(0x3230 Overload\)"):
         await motion()
-    assert not owes_stop(x)
+    assert not stop_pending(x)
 
 
 # --- clocks that are set ------------------------------------------------------------------
@@ -464,7 +470,7 @@ async def test_a_page_that_goes_ends_its_motion_whatever_else_fails(
 
 
 async def test_what_fails_at_the_end_of_the_server_keeps_nothing_else_from_its_end(
-    bench: Bench, x: Member, servo: Servo, monkeypatch: pytest.MonkeyPatch
+    bench: Bench, x: ConnectedDrive, servo: Servo, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     await x.axis.transition(State.OPERATION_ENABLED, Mode.PP)
 

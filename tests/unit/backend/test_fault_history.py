@@ -11,7 +11,7 @@ from backend.axis.fault_history import named_fault, read_history
 from backend.drive.drive import Drive
 from backend.drive.ports import Port
 from backend.recording.facts import past_faults
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address
 from profiles import load_profile
@@ -137,13 +137,13 @@ async def test_a_support_bundle_takes_what_reading_alone_brings(
 ) -> None:
     link.objects |= {(0x200A, 0x13): b"\2\0", (0x200A, 0x14): b"\0\0", (0x200A, 0x16): b"\x37\1"}
     axis = _axis(profile, link, _slots())
-    found = await past_faults(Member(axis.drive, axis, NO_MONITOR), timeout_s=5)
+    found = await past_faults(ConnectedDrive(axis.drive, axis, NO_MONITOR), timeout_s=5)
     (record,) = found["records"]
     assert (record["code"], record["title"], record["values"][0]["value"]) == (
         "Er.002", "Overvoltage", 0x137,
     )  # fmt: skip
     axis = _axis(profile, link, _selected())
-    found = await past_faults(Member(axis.drive, axis, NO_MONITOR), timeout_s=5)
+    found = await past_faults(ConnectedDrive(axis.drive, axis, NO_MONITOR), timeout_s=5)
     assert found["records"] == []
     assert "writing 200D:24" in found["why"]
     assert link.written == [], "nobody asked for a write"

@@ -245,8 +245,8 @@ async def test_real_terminals_that_do_not_count_again_are_owed(
     await ended(lambda: sessions.get("x", "simulation") is None)
     assert session.job is not None
     assert isinstance(session.job.error, LinkTimeout)
-    debts = {debt.key: debt.unapplied for debt in axis.drive.owed.debts}
-    assert debts == {"2031:02": True, "2031:03": True}
+    entries = {entry.key: entry.unapplied for entry in axis.drive.pending_restores.entries}
+    assert entries == {"2031:02": True, "2031:03": True}
 
 
 @pytest.mark.parametrize("how", ["cancelled", "STOP"])

@@ -37,14 +37,14 @@ class Axis:
     def __init__(self) -> None:
         self.held = dict(HELD)
         self.drive = SimpleNamespace(
-            name="X", owed=self, raw=self.raw, profile=SimpleNamespace(notch=None)
+            name="X", pending_restores=self, raw=self.raw, profile=SimpleNamespace(notch=None)
         )
 
     async def raw(self, key: str) -> int:
         return self.held[key]
 
     @contextmanager
-    def lent(self, _values: dict[str, int]) -> Iterator[None]:
+    def borrowed(self, _values: dict[str, int]) -> Iterator[None]:
         yield
 
     async def state(self) -> State:

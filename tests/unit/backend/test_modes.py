@@ -26,8 +26,8 @@ async def stranger(tmp_path: Path) -> AsyncIterator[tuple[Servo, Bench]]:
     servo.kind = "canopen"
     servo.set(MODES, 0b100101)
     bench = Bench(tmp_path, {CAN: lambda: servo})
-    member = await bench.connect(CAN, 1, "generic402", "X")
-    await member.monitor.close()
+    connected = await bench.connect(CAN, 1, "generic402", "X")
+    await connected.monitor.close()
     yield servo, bench
     await bench.close()
 
@@ -36,15 +36,15 @@ async def test_a_mode_that_the_drive_does_not_tell_is_not_offered(
     stranger: tuple[Servo, Bench],
 ) -> None:
     _, bench = stranger
-    (member,) = bench.members.values()
-    await member.monitor.refresh()
-    assert member.drive.modes == (PP, PV, HM)
+    (connected,) = bench.connected_drives.values()
+    await connected.monitor.refresh()
+    assert connected.drive.modes == (PP, PV, HM)
     transport = httpx.ASGITransport(make_app(bench, hosts=frozenset({"test"})))
     async with httpx.AsyncClient(transport=transport, base_url="http://test/api/v1") as http:
-        state = (await http.get(f"/drives/{member.drive.id}/state")).json()
+        state = (await http.get(f"/drives/{connected.drive.id}/state")).json()
     assert state["modes"] == [PP, PV, HM]
     with pytest.raises(NotAllowed, match="Cyclic"):
-        await member.axis.set_mode(Mode.CST)
+        await connected.axis.set_mode(Mode.CST)
 
 
 @pytest.mark.parametrize("told", [0, None])
@@ -52,15 +52,15 @@ async def test_a_drive_that_tells_nothing_keeps_what_the_profile_says(
     stranger: tuple[Servo, Bench], told: int | None
 ) -> None:
     servo, bench = stranger
-    (member,) = bench.members.values()
-    member.drive.forget()
+    (connected,) = bench.connected_drives.values()
+    connected.drive.forget()
     if told is None:
         del servo.objects[MODES]
     else:
         servo.set(MODES, told)
     asked: list[object] = []
-    await member.monitor.refresh()
+    await connected.monitor.refresh()
     servo.on_read = asked.append
-    await member.monitor.refresh()
-    assert member.drive.modes == (PP, PV, PT, HM, CSP, CSV, CST)
+    await connected.monitor.refresh()
+    assert connected.drive.modes == (PP, PV, PT, HM, CSP, CSV, CST)
     assert MODES not in asked, "asked once"

@@ -11,7 +11,7 @@ import pytest
 from backend.axis.cyclic import CyclicSession
 from backend.drive.drive import Drive
 from backend.station import monitor as watching
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.work.journal import Journal
 from drivers.cia402 import State
 from tests.support.servo import STATUS, Servo
@@ -53,7 +53,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 @pytest.fixture
-async def exchange(x: Member, servo: Servo, clock: Clock) -> Exchange:
+async def exchange(x: ConnectedDrive, servo: Servo, clock: Clock) -> Exchange:
     """Of a drive that was looked at as a whole just now."""
     exchange = Exchange({STATUS_KEY: servo.number(STATUS), POSITION_KEY: 0, ERROR_KEY: 0})
     x.axis.session = cast(CyclicSession, exchange)
@@ -61,12 +61,12 @@ async def exchange(x: Member, servo: Servo, clock: Clock) -> Exchange:
     return exchange
 
 
-async def polled(x: Member) -> watching.Snapshot:
+async def polled(x: ConnectedDrive) -> watching.Snapshot:
     return await x.monitor._poll(x.monitor._read_what_changes)
 
 
 async def test_what_every_cycle_brings_is_not_asked_for(
-    x: Member, servo: Servo, exchange: Exchange, clock: Clock
+    x: ConnectedDrive, servo: Servo, exchange: Exchange, clock: Clock
 ) -> None:
     asked: list[int | None] = []
     servo.on_read = lambda place: asked.append(place[0])
@@ -80,7 +80,7 @@ async def test_what_every_cycle_brings_is_not_asked_for(
 
 
 async def test_a_dead_mailbox_is_told_although_process_data_go_on(
-    x: Member, servo: Servo, exchange: Exchange, clock: Clock
+    x: ConnectedDrive, servo: Servo, exchange: Exchange, clock: Clock
 ) -> None:
     servo.mute = True
     clock.now_s += watching.ASKED_S
@@ -96,7 +96,7 @@ async def test_a_dead_mailbox_is_told_although_process_data_go_on(
 
 @pytest.mark.parametrize("key", [STATUS_KEY, ERROR_KEY])
 async def test_a_change_has_everything_asked_for(
-    x: Member, servo: Servo, exchange: Exchange, clock: Clock, key: str
+    x: ConnectedDrive, servo: Servo, exchange: Exchange, clock: Clock, key: str
 ) -> None:
     servo.enable()
     exchange.values[key] = {STATUS_KEY: servo.number(STATUS), ERROR_KEY: 0x7305}[key]
@@ -105,7 +105,7 @@ async def test_a_change_has_everything_asked_for(
 
 
 async def test_bits_of_a_motion_are_no_change_of_state(
-    x: Member, servo: Servo, exchange: Exchange, clock: Clock
+    x: ConnectedDrive, servo: Servo, exchange: Exchange, clock: Clock
 ) -> None:
     servo.mute = True
     exchange.values[STATUS_KEY] = servo.number(STATUS) | 0x0400
@@ -115,7 +115,7 @@ async def test_bits_of_a_motion_are_no_change_of_state(
 
 
 async def test_process_data_that_end_are_no_values(
-    x: Member, servo: Servo, exchange: Exchange, clock: Clock
+    x: ConnectedDrive, servo: Servo, exchange: Exchange, clock: Clock
 ) -> None:
     """A lost station, an invalid cycle or old data: then the drive is asked, and is silent."""
     exchange.values.clear()
@@ -124,7 +124,7 @@ async def test_process_data_that_end_are_no_values(
     assert not (await polled(x)).fresh
 
 
-def test_axes_are_asked_one_after_the_other(x: Member, clock: Clock) -> None:
+def test_axes_are_asked_one_after_the_other(x: ConnectedDrive, clock: Clock) -> None:
     period_s = watching.WATCHED_S
     monitors = [watching.Monitor(x.axis, Journal(), lambda _: None, lambda: None) for _ in range(5)]
     due_s = []

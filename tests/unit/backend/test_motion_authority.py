@@ -18,7 +18,7 @@ from backend.motion.authority import UNATTENDED_S, MotionAuthority
 from backend.motion.grant import Grant, NotGranted
 from backend.motion.stopping import stops
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import Busy, NotAllowed
@@ -33,13 +33,13 @@ TARGET, MODE, CONTROL = "607A:00", "6060:00", "6040:00"
 # --- what a grant permits ---------------------------------------------------------------
 
 
-async def test_a_grant_made_by_hand_permits_nothing(x: Member) -> None:
+async def test_a_grant_made_by_hand_permits_nothing(x: ConnectedDrive) -> None:
     forged = Grant("x", "", "a forgery", time.monotonic() + 60)
     with pytest.raises(NotGranted, match="not for it"):
         await x.drive.command(TARGET, 1000, forged)
 
 
-async def test_a_grant_is_for_one_drive(x: Member) -> None:
+async def test_a_grant_is_for_one_drive(x: ConnectedDrive) -> None:
     with (
         x.drive.authority.granted("y", "Y", "move Y") as other,
         pytest.raises(NotGranted, match="not for it"),
@@ -47,14 +47,14 @@ async def test_a_grant_is_for_one_drive(x: Member) -> None:
         await x.drive.command(TARGET, 1000, other)
 
 
-async def test_a_grant_for_some_objects_is_for_no_other(x: Member) -> None:
+async def test_a_grant_for_some_objects_is_for_no_other(x: ConnectedDrive) -> None:
     with x.axis.granted("force outputs", keys=frozenset({"60FE:01"})) as grant:
         await x.drive.energise("60FE:01", 0, grant)
         with pytest.raises(NotGranted):
             await x.drive.command(TARGET, 1000, grant)
 
 
-async def test_a_grant_that_was_given_back_permits_nothing(x: Member, servo: Servo) -> None:
+async def test_a_grant_that_was_given_back_permits_nothing(x: ConnectedDrive, servo: Servo) -> None:
     with x.axis.granted("move") as grant:
         await x.drive.command(TARGET, 1000, grant)
     servo.written.clear()
@@ -63,7 +63,7 @@ async def test_a_grant_that_was_given_back_permits_nothing(x: Member, servo: Ser
     assert servo.written == []
 
 
-async def test_nothing_enables_without_a_grant(x: Member, servo: Servo) -> None:
+async def test_nothing_enables_without_a_grant(x: ConnectedDrive, servo: Servo) -> None:
     with pytest.raises(NotGranted):
         await x.axis.go_to(State.OPERATION_ENABLED)
     assert await x.axis.state() is not State.OPERATION_ENABLED
@@ -72,7 +72,7 @@ async def test_nothing_enables_without_a_grant(x: Member, servo: Servo) -> None:
 
 
 async def test_others_do_not_hold_the_grant_of_a_motion(
-    x: Member, bench: Bench, http: httpx.AsyncClient
+    x: ConnectedDrive, bench: Bench, http: httpx.AsyncClient
 ) -> None:
     held: list[Grant | None] = []
 
@@ -110,10 +110,10 @@ async def test_work_that_keeps_its_axis_still_has_no_grant(bench: Bench) -> None
 
 
 async def test_stop_ends_every_grant_but_lets_borrowed_values_go_back(
-    x: Member, bench: Bench
+    x: ConnectedDrive, bench: Bench
 ) -> None:
     drive = x.drive
-    with x.axis.granted("move") as grant, drive.owed.lent({MODE: 1}):
+    with x.axis.granted("move") as grant, drive.pending_restores.borrowed({MODE: 1}):
         await bench.motion.stop(["x"])
         assert bench.authority.grant_of("x") is None
         with pytest.raises(NotGranted, match="STOP was pressed"):
@@ -145,7 +145,7 @@ async def test_an_inner_grant_lasts_no_longer_than_the_outer() -> None:
 
 
 async def test_an_axis_left_enabled_by_a_script_loses_its_power(
-    x: Member, bench: Bench, monkeypatch: pytest.MonkeyPatch
+    x: ConnectedDrive, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert UNATTENDED_S == 600.0
     monkeypatch.setattr("backend.axis.axis.UNATTENDED_S", 0.05)
@@ -161,7 +161,7 @@ async def test_an_axis_left_enabled_by_a_script_loses_its_power(
 
 
 async def test_only_a_live_grant_permits_an_axis_left_enabled_to_turn(
-    x: Member, bench: Bench
+    x: ConnectedDrive, bench: Bench
 ) -> None:
     assert not bench._may_turn("x")
     await x.axis.transition(State.OPERATION_ENABLED, Mode.PV)
@@ -174,7 +174,7 @@ async def test_only_a_live_grant_permits_an_axis_left_enabled_to_turn(
 # --- classes ----------------------------------------------------------------------------
 
 
-async def test_limits_are_not_written_with_power(x: Member, servo: Servo) -> None:
+async def test_limits_are_not_written_with_power(x: ConnectedDrive, servo: Servo) -> None:
     """605Ah = 0 was taken during a jog, and STOP then coasted."""
     servo.enable()
     for key, raw in (("605A:00", 0), ("607D:01", -(2**31)), ("6065:00", 0xFFFFFFFF)):

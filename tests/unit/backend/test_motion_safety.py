@@ -12,7 +12,7 @@ from backend.axis.axis import Envelope
 from backend.axis.cyclic import CyclicState
 from backend.drive.ports import Port
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.tools.jog import run as jogging
 from backend.tools.jog.cyclic import GeneratorSettings, generate, jog_cyclic
 from backend.tools.jog.run import Hold, JogSettings, jog
@@ -49,7 +49,7 @@ async def eventually(condition: object) -> None:
 
 
 async def test_stop_is_sent_even_when_its_asker_is_gone(
-    bench: Bench, x: Member, servo: Servo
+    bench: Bench, x: ConnectedDrive, servo: Servo
 ) -> None:
     servo.enable()
     servo.gate.clear()
@@ -69,7 +69,7 @@ async def test_a_command_begun_before_stop_never_enables_even_after_a_new_one(
     )
     await eventually(lambda: bench.jobs.moving("x"))
     stop = asyncio.create_task(http.post("/stop", json={}))
-    await eventually(lambda: bench.member("x").axis.stopped)
+    await eventually(lambda: bench.connected("x").axis.stopped)
     other = asyncio.create_task(
         http.post("/drives/x/transition", json={"goal": "Switch on disabled"})
     )
@@ -83,7 +83,7 @@ async def test_a_command_begun_before_stop_never_enables_even_after_a_new_one(
 
 
 async def test_no_job_begins_while_the_power_state_is_changed(
-    bench: Bench, x: Member, servo: Servo, http: httpx.AsyncClient
+    bench: Bench, x: ConnectedDrive, servo: Servo, http: httpx.AsyncClient
 ) -> None:
     servo.gate.clear()
     first = asyncio.create_task(
@@ -98,7 +98,7 @@ async def test_no_job_begins_while_the_power_state_is_changed(
 
 
 async def test_work_that_swallows_its_cancellation_cannot_enable_again(
-    bench: Bench, x: Member, servo: Servo
+    bench: Bench, x: ConnectedDrive, servo: Servo
 ) -> None:
     async def stubborn(_progress: Progress) -> None:
         for _ in range(2):
@@ -117,7 +117,7 @@ async def test_work_that_swallows_its_cancellation_cannot_enable_again(
 
 
 async def test_stop_that_did_not_reach_the_drive_is_sent_when_it_answers(
-    bench: Bench, x: Member, servo: Servo
+    bench: Bench, x: ConnectedDrive, servo: Servo
 ) -> None:
     servo.enable()
     servo.mute = True
@@ -132,7 +132,7 @@ async def test_stop_that_did_not_reach_the_drive_is_sent_when_it_answers(
 
 
 async def test_motion_whose_end_was_lost_is_stopped_when_the_drive_answers(
-    x: Member, servo: Servo
+    x: ConnectedDrive, servo: Servo
 ) -> None:
     with pytest.raises(DriveError):
         async with x.axis.enabled(Mode.PV, ENVELOPE):
@@ -144,7 +144,7 @@ async def test_motion_whose_end_was_lost_is_stopped_when_the_drive_answers(
 
 
 async def test_stop_goes_over_the_second_port_when_the_first_is_dead(
-    x: Member, servo: Servo
+    x: ConnectedDrive, servo: Servo
 ) -> None:
     second = Servo()
     second.enable()
@@ -155,7 +155,7 @@ async def test_stop_goes_over_the_second_port_when_the_first_is_dead(
 
 
 async def test_after_stop_power_is_not_cut_while_the_axis_still_moves(
-    bench: Bench, x: Member, servo: Servo, monkeypatch: pytest.MonkeyPatch
+    bench: Bench, x: ConnectedDrive, servo: Servo, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("backend.axis.axis.CLEANUP_TIMEOUT_S", 0.4)
 
@@ -177,14 +177,16 @@ async def test_after_stop_power_is_not_cut_while_the_axis_still_moves(
 # --- enabling -------------------------------------------------------------------------
 
 
-async def test_enabling_does_not_reset_a_fault(x: Member, servo: Servo) -> None:
+async def test_enabling_does_not_reset_a_fault(x: ConnectedDrive, servo: Servo) -> None:
     servo.trip()
     with pytest.raises(NotAllowed, match="Fault"):
         await x.axis.go_to(State.OPERATION_ENABLED)
     assert servo.words() == []
 
 
-async def test_a_drive_that_trips_on_enabling_is_not_enabled_again(x: Member, servo: Servo) -> None:
+async def test_a_drive_that_trips_on_enabling_is_not_enabled_again(
+    x: ConnectedDrive, servo: Servo
+) -> None:
     servo.trips = True
     with x.axis.granted("a test"), pytest.raises(NotAllowed):
         async with asyncio.timeout(5):
@@ -193,7 +195,7 @@ async def test_a_drive_that_trips_on_enabling_is_not_enabled_again(x: Member, se
 
 
 async def test_fault_reset_does_not_cut_the_power_of_a_healthy_axis(
-    x: Member, servo: Servo
+    x: ConnectedDrive, servo: Servo
 ) -> None:
     servo.enable()
     await x.axis.reset_fault()
@@ -219,7 +221,9 @@ async def test_mode_change_of_an_enabled_axis_takes_no_stale_speed(
     assert seen == [0]
 
 
-async def test_motion_of_an_enabled_axis_takes_no_stale_speed(x: Member, servo: Servo) -> None:
+async def test_motion_of_an_enabled_axis_takes_no_stale_speed(
+    x: ConnectedDrive, servo: Servo
+) -> None:
     servo.enable()
     servo.set(VELOCITY_TARGET, 100_000)
     seen: list[int] = []
@@ -237,7 +241,9 @@ async def test_motion_of_an_enabled_axis_takes_no_stale_speed(x: Member, servo: 
 # --- restoring ------------------------------------------------------------------------
 
 
-async def test_everything_that_could_not_be_restored_is_named(x: Member, servo: Servo) -> None:
+async def test_everything_that_could_not_be_restored_is_named(
+    x: ConnectedDrive, servo: Servo
+) -> None:
     servo.set(MODE, 3)
     with pytest.raises(DriveError) as caught:
         async with x.axis.restoring("6081:00"), x.axis.enabled(Mode.PP, ENVELOPE):
@@ -247,7 +253,7 @@ async def test_everything_that_could_not_be_restored_is_named(x: Member, servo: 
 
 
 async def test_a_cleanup_that_takes_too_long_names_what_it_leaves(
-    x: Member, servo: Servo, monkeypatch: pytest.MonkeyPatch
+    x: ConnectedDrive, servo: Servo, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("backend.axis.axis.CLEANUP_TIMEOUT_S", 0.05)
 
@@ -260,7 +266,9 @@ async def test_a_cleanup_that_takes_too_long_names_what_it_leaves(
         await work()
 
 
-async def test_another_drive_at_the_place_gets_nothing_restored(x: Member, servo: Servo) -> None:
+async def test_another_drive_at_the_place_gets_nothing_restored(
+    x: ConnectedDrive, servo: Servo
+) -> None:
     from drivers.link import Found
 
     x.drive.found = Found(1, serial=7)
@@ -308,7 +316,7 @@ async def test_gains_may_be_written_while_the_axis_moves(
     await bench.jobs.cancel(job)
 
 
-async def test_units_are_read_anew_whoever_wrote_the_gearing(x: Member) -> None:
+async def test_units_are_read_anew_whoever_wrote_the_gearing(x: ConnectedDrive) -> None:
     before = (await x.axis.units()).counts_per_rev
     assert before is not None
     revolutions = await x.drive.raw("6092:01")
@@ -363,14 +371,16 @@ def quiet() -> Progress:
     return Progress(lambda: None)
 
 
-async def test_jog_released_before_it_is_enabled_enables_nothing(x: Member, servo: Servo) -> None:
+async def test_jog_released_before_it_is_enabled_enables_nothing(
+    x: ConnectedDrive, servo: Servo
+) -> None:
     hold = Hold()
     hold.release("released")
     assert (await jog(x.axis, JOG, hold, quiet()))["reason"] == "released"
     assert enabling(servo) == 0
 
 
-async def test_jog_released_while_enabling_aims_nowhere(x: Member, servo: Servo) -> None:
+async def test_jog_released_while_enabling_aims_nowhere(x: ConnectedDrive, servo: Servo) -> None:
     hold = Hold()
     targets: list[int] = []
 
@@ -385,7 +395,7 @@ async def test_jog_released_while_enabling_aims_nowhere(x: Member, servo: Servo)
     assert set(targets) == {servo.number(POSITION)}
 
 
-async def test_jog_ends_at_the_end_of_the_number_range(x: Member, servo: Servo) -> None:
+async def test_jog_ends_at_the_end_of_the_number_range(x: ConnectedDrive, servo: Servo) -> None:
     servo.set(POSITION, 2**31 - 100)
     hold = Hold(clock=lambda: 0.0)
     targets: list[int] = []
@@ -404,7 +414,7 @@ async def test_jog_ends_at_the_end_of_the_number_range(x: Member, servo: Servo) 
 
 
 async def test_jog_needs_a_known_resolution(
-    x: Member, servo: Servo, monkeypatch: pytest.MonkeyPatch
+    x: ConnectedDrive, servo: Servo, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from dataclasses import replace
 
@@ -415,7 +425,9 @@ async def test_jog_needs_a_known_resolution(
     assert servo.written == []
 
 
-async def test_jog_slower_than_the_drive_can_count_is_refused(x: Member, servo: Servo) -> None:
+async def test_jog_slower_than_the_drive_can_count_is_refused(
+    x: ConnectedDrive, servo: Servo
+) -> None:
     from dataclasses import replace
 
     with pytest.raises(OutOfRange, match="below the resolution"):
@@ -425,7 +437,7 @@ async def test_jog_slower_than_the_drive_can_count_is_refused(x: Member, servo: 
 
 @pytest.mark.parametrize("target", [40_000.0, -40_000.0])
 async def test_target_outside_the_number_range_enables_nothing(
-    x: Member, servo: Servo, target: float
+    x: ConnectedDrive, servo: Servo, target: float
 ) -> None:
     wide = Envelope(1e9, 100.0, 50.0, 10.0)
     settings = moving.MoveSettings("PP", target, wide, relative=True)
@@ -434,7 +446,9 @@ async def test_target_outside_the_number_range_enables_nothing(
     assert enabling(servo) == 0
 
 
-async def test_back_and_forth_checks_both_places_before_it_moves(x: Member, servo: Servo) -> None:
+async def test_back_and_forth_checks_both_places_before_it_moves(
+    x: ConnectedDrive, servo: Servo
+) -> None:
     settings = moving.SequenceSettings(0.5, 50.0, 60.0, 600.0, 0.0, 2, ENVELOPE)
     with pytest.raises(OutOfRange):
         await moving.sequence(x.axis, settings, quiet())
@@ -443,7 +457,7 @@ async def test_back_and_forth_checks_both_places_before_it_moves(x: Member, serv
 
 @pytest.mark.parametrize("mode", ["PV", "PT"])
 async def test_a_watchdog_that_watches_the_exchange_is_none_without_it(
-    x: Member, servo: Servo, mode: Literal["PV", "PT"]
+    x: ConnectedDrive, servo: Servo, mode: Literal["PV", "PT"]
 ) -> None:
     """004:4824: the watchdog is that of the process data; SDO commands do not feed it."""
     spec = x.drive.profile.link("ethercat")
@@ -490,7 +504,9 @@ class Exchange:
     async def renew(self, _station: int) -> None: ...
 
 
-async def test_cyclic_jog_released_while_enabling_plays_nothing(x: Member, servo: Servo) -> None:
+async def test_cyclic_jog_released_while_enabling_plays_nothing(
+    x: ConnectedDrive, servo: Servo
+) -> None:
     exchange, hold = Exchange(), Hold()
     enables = {"seen": False}
 
@@ -507,7 +523,9 @@ async def test_cyclic_jog_released_while_enabling_plays_nothing(x: Member, servo
     assert servo.number(STATUS) == 0x250
 
 
-async def test_a_signal_outside_its_envelope_enables_nothing(x: Member, servo: Servo) -> None:
+async def test_a_signal_outside_its_envelope_enables_nothing(
+    x: ConnectedDrive, servo: Servo
+) -> None:
     settings = GeneratorSettings("CSP", "sine", 6.0, 1.0, ENVELOPE)
     with pytest.raises(OutOfRange, match="envelope"):
         await generate(x.axis, Exchange(), settings, quiet())  # type: ignore[arg-type]
@@ -515,7 +533,7 @@ async def test_a_signal_outside_its_envelope_enables_nothing(x: Member, servo: S
 
 
 async def test_a_gap_halts_the_polled_jog_and_a_new_target_ends_the_halt(
-    x: Member, servo: Servo
+    x: ConnectedDrive, servo: Servo
 ) -> None:
     """6040h bit 8 while no sign of life comes; afterwards a target from where it halted."""
     now = {"s": 0.0}

@@ -10,7 +10,7 @@ import pytest
 
 from backend.axis.axis import Envelope
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.jog.run import Hold, JogSettings, jog
 from backend.tools.moves.move import MoveSettings, move
@@ -55,11 +55,11 @@ def plain() -> Plain:
 
 
 @pytest.fixture
-async def member(plain: Plain, tmp_path: Path) -> AsyncIterator[Member]:
+async def connected(plain: Plain, tmp_path: Path) -> AsyncIterator[ConnectedDrive]:
     bench = Bench(tmp_path, {URL: lambda: plain})
-    member = await bench.connect(URL, 1, "generic402", "X")
-    await member.monitor.close()
-    yield member
+    connected = await bench.connect(URL, 1, "generic402", "X")
+    await connected.monitor.close()
+    yield connected
     await bench.close()
 
 
@@ -73,48 +73,48 @@ async def member(plain: Plain, tmp_path: Path) -> AsyncIterator[Member]:
 )
 async def test_the_limits_that_are_there_hold_the_torque(
     plain: Plain,
-    member: Member,
+    connected: ConnectedDrive,
     missing: tuple[tuple[int, int], ...],
     held: list[tuple[int, int]],
 ) -> None:
     plain.without(*missing)
     before = {place: plain.number(place) for place in held}
-    async with member.axis.enabled(Mode.PP, HALF):
+    async with connected.axis.enabled(Mode.PP, HALF):
         assert [plain.number(place) for place in held] == [500] * len(held)  # ‰ of rated
     assert {place: plain.number(place) for place in held} == before
 
 
 @pytest.mark.parametrize("missing", [(MAX_TORQUE, NEGATIVE), (MAX_TORQUE, POSITIVE, NEGATIVE)])
 async def test_a_torque_that_is_free_in_one_direction_is_not_enabled(
-    plain: Plain, member: Member, missing: tuple[tuple[int, int], ...]
+    plain: Plain, connected: ConnectedDrive, missing: tuple[tuple[int, int], ...]
 ) -> None:
     plain.without(*missing)
     with pytest.raises(NotAllowed, match="60E1:00 Negative torque limit") as refused:
-        async with member.axis.enabled(Mode.PP, HALF):
+        async with connected.axis.enabled(Mode.PP, HALF):
             pass
     assert "cyclic exchange" in (refused.value.remedy or "")
     assert plain.words() == []
 
 
 async def test_a_limit_that_cannot_be_read_for_another_reason_is_not_taken_for_none(
-    plain: Plain, member: Member
+    plain: Plain, connected: ConnectedDrive
 ) -> None:
     plain.read_errors[POSITIVE] = Rejected("a general error", abort_code=0x08000000)
     with pytest.raises(Rejected):
-        async with member.axis.enabled(Mode.PP, HALF):
+        async with connected.axis.enabled(Mode.PP, HALF):
             pass
     assert plain.words() == []
 
 
 async def test_a_drive_without_a_deceleration_is_jogged_by_its_acceleration(
-    plain: Plain, member: Member
+    plain: Plain, connected: ConnectedDrive
 ) -> None:
     """CiA 402-2 object 6084h: without it the drive brakes by 6083h."""
     plain.without(DECELERATION, QUICK_STOP)
     hold = Hold()
     asyncio.get_running_loop().call_later(0.1, hold.release, "let go")
     told = await jog(
-        member.axis, JogSettings(1, 60.0, 600.0, 1.0, 50.0), hold, Progress(lambda: None)
+        connected.axis, JogSettings(1, 60.0, 600.0, 1.0, 50.0), hold, Progress(lambda: None)
     )
     assert told["reason"] == "let go"
     # 600 rpm/s are 10 rev/s², 100000 inc/s².
@@ -123,40 +123,42 @@ async def test_a_drive_without_a_deceleration_is_jogged_by_its_acceleration(
 
 
 async def test_without_an_acceleration_the_way_to_rest_is_not_known(
-    plain: Plain, member: Member
+    plain: Plain, connected: ConnectedDrive
 ) -> None:
     plain.without(ACCELERATION)
     with pytest.raises(NotAllowed, match="6083:00 Profile acceleration"):
         await jog(
-            member.axis, JogSettings(1, 60.0, 600.0, 1.0, 50.0), Hold(), Progress(lambda: None)
+            connected.axis, JogSettings(1, 60.0, 600.0, 1.0, 50.0), Hold(), Progress(lambda: None)
         )  # fmt: skip
     assert plain.words() == []
 
 
 async def test_two_ramps_are_not_given_to_a_drive_that_has_one(
-    plain: Plain, member: Member
+    plain: Plain, connected: ConnectedDrive
 ) -> None:
     plain.without(DECELERATION)
     settings = MoveSettings(
         "PP", 0.1, HALF, acceleration_rpm_s=600.0, deceleration_rpm_s=300.0
     )  # fmt: skip
     with pytest.raises(OutOfRange, match="no deceleration of its own"):
-        await move(member.axis, settings, Progress(lambda: None))
+        await move(connected.axis, settings, Progress(lambda: None))
     assert plain.written == []
 
 
-async def test_what_is_known_without_a_rated_torque_is_told(plain: Plain, member: Member) -> None:
+async def test_what_is_known_without_a_rated_torque_is_told(
+    plain: Plain, connected: ConnectedDrive
+) -> None:
     plain.without(RATED_TORQUE, POSITIVE)
-    facts = await read_facts(member.axis)
+    facts = await read_facts(connected.axis)
     assert not facts.torque_known
-    assert await drive_limit_percent(member.axis) == 200.0
+    assert await drive_limit_percent(connected.axis) == 200.0
 
 
 async def test_faults_of_a_drive_that_does_not_answer_are_not_told_as_none(
-    plain: Plain, member: Member
+    plain: Plain, connected: ConnectedDrive
 ) -> None:
     plain.without((0x603F, 0))
-    assert await member.axis.active_faults() == [], "603Fh is optional in CiA 402-2"
+    assert await connected.axis.active_faults() == [], "603Fh is optional in CiA 402-2"
     plain.mute = True
     with pytest.raises(LinkTimeout):
-        await member.axis.active_faults()
+        await connected.axis.active_faults()

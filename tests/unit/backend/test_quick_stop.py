@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from backend.axis.axis import Envelope
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.stopping.quick_stop import STOP_S
 from backend.tools.measuring.recording import Play, bus_limits, enabled, play
 from backend.tools.measuring.temporary import stopping_hard
@@ -21,7 +21,7 @@ QUICK = (0x6085, 0)
 
 
 async def test_it_brakes_from_the_permitted_speed_and_none_is_lowered(
-    x: Member, servo: Servo
+    x: ConnectedDrive, servo: Servo
 ) -> None:
     units = await x.axis.units()
     counts = units.counts_per_rev or 0.0

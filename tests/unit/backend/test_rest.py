@@ -9,7 +9,7 @@ import pytest
 
 from backend.axis.axis import Axis
 from backend.drive.drive import Drive
-from backend.drive.exclusive import Resting
+from backend.drive.exclusive import ExclusiveAccessHeld
 from backend.drive.ports import Port
 from backend.tools.moves.procedures import run_procedure
 from drivers.errors import DriveError
@@ -90,9 +90,11 @@ async def test_a_question_under_way_ends_before_the_write_and_none_follows_it(
     await turns()
     assert slow.asked == [GAIN, SAVE]
     assert quiet.rest.held
-    with pytest.raises(Resting, match=r"X axis must not be asked for another 10 s.*stores"):
+    with pytest.raises(
+        ExclusiveAccessHeld, match=r"X axis must not be asked for another 10 s.*stores"
+    ):
         await quiet.read("2005:03")
-    with pytest.raises(Resting):
+    with pytest.raises(ExclusiveAccessHeld):
         await quiet.write("2005:03", 300)
     many = await quiet.read_many(["2005:03", "2005:10"])
     assert all("must not be asked" in reading.error for reading in many.values())
@@ -141,7 +143,7 @@ async def test_stop_goes_through_and_ends_the_rest(quiet: Drive, slow: SlowLink)
 async def test_two_cannot_have_it_alone(quiet: Drive) -> None:
     saving = begin(quiet, 10.0)
     await turns()
-    with pytest.raises(Resting):
+    with pytest.raises(ExclusiveAccessHeld):
         await begin(quiet, 10.0)
     assert quiet.rest.held
     saving.cancel()

@@ -13,18 +13,21 @@ import pytest
 
 from backend.commands import restoring
 from backend.commands.state import STATE_FOLDER_VARIABLE, state_folder
-from backend.drive.pending_restore import Debt
+from backend.drive.pending_restore import PendingRestore
 from backend.restore import store as store_module
 from backend.restore.identity import DriveIdentity, identity_of
 from backend.restore.process import lives, this_process
 from backend.restore.store import RestoreStore
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from drivers.errors import Busy, NotAllowed
 from tests.support.servo import Servo
 
 TORQUE = "6072:00"
 HERE = DriveIdentity(0x748, 7, 1234, (("ethercat://eth0", 1),))
-VALUES = (Debt(TORQUE, 3000, frozenset({800})), Debt("6060:00", 8, frozenset({9, 10})))
+VALUES = (
+    PendingRestore(TORQUE, 3000, frozenset({800})),
+    PendingRestore("6060:00", 8, frozenset({9, 10})),
+)
 
 
 @pytest.mark.parametrize(
@@ -73,7 +76,7 @@ def test_a_list_of_an_earlier_version_is_read_and_replaced(tmp_path: Path) -> No
     earlier = tmp_path / "owed" / "mms7-1.json"
     earlier.parent.mkdir()
     earlier.write_text(
-        '{"serial": 1234, "debts": [{"key": "6072:00", "raw": 3000, "left": [800],'
+        '{"serial": 1234, "entries": [{"key": "6072:00", "raw": 3000, "left": [800],'
         ' "unapplied": false}], "in_motion": false}'
     )
     lists = RestoreStore(tmp_path, "a server")
@@ -129,7 +132,7 @@ def test_the_disk_is_waited_for_before_a_value_changes_but_not_for_long(
 
 
 async def test_the_list_is_on_the_disk_before_the_first_write(
-    x: Member, servo: Servo, tmp_path: Path
+    x: ConnectedDrive, servo: Servo, tmp_path: Path
 ) -> None:
     seen: list[int] = []
     servo.set((0x6072, 0), 3000)
@@ -145,7 +148,7 @@ async def test_the_list_is_on_the_disk_before_the_first_write(
 
 
 @pytest.fixture
-def left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, x: Member, servo: Servo) -> Path:
+def left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, x: ConnectedDrive, servo: Servo) -> Path:
     """A folder in which a command that was killed has left a torque limit of 80 %, was 300 %."""
     folder = tmp_path / "of the commands"
     monkeypatch.setenv(STATE_FOLDER_VARIABLE, str(folder))
@@ -156,7 +159,7 @@ def left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, x: Member, servo: Serv
 
 
 async def test_a_command_says_what_is_pending_and_stores_nothing_of_it(
-    x: Member, left: Path, capsys: pytest.CaptureFixture[str]
+    x: ConnectedDrive, left: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     restoring.recall(x.drive, "ethercat://eth0", 1)
     told = capsys.readouterr().err
@@ -169,7 +172,7 @@ async def test_a_command_says_what_is_pending_and_stores_nothing_of_it(
 
 
 async def test_a_motion_of_a_command_begins_with_the_drives_own_values(
-    x: Member, servo: Servo, left: Path, capsys: pytest.CaptureFixture[str]
+    x: ConnectedDrive, servo: Servo, left: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pending = restoring.recall(x.drive, "ethercat://eth0", 1)
     await restoring.restore_first(x.axis, pending)
@@ -181,7 +184,7 @@ async def test_a_motion_of_a_command_begins_with_the_drives_own_values(
 
 
 async def test_a_value_that_somebody_changed_since_is_offered_not_restored(
-    x: Member, servo: Servo, left: Path, capsys: pytest.CaptureFixture[str]
+    x: ConnectedDrive, servo: Servo, left: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     servo.set((0x6072, 0), 1234)
     await restoring.restore_first(x.axis, restoring.recall(x.drive, "ethercat://eth0", 1))
@@ -191,7 +194,7 @@ async def test_a_value_that_somebody_changed_since_is_offered_not_restored(
 
 
 async def test_no_motion_begins_while_another_process_moves_the_drive(
-    x: Member, left: Path, monkeypatch: pytest.MonkeyPatch
+    x: ConnectedDrive, left: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(store_module, "this_process", lambda: "this one")
     monkeypatch.setattr(store_module, "lives", lambda _mark: True)

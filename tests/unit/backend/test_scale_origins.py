@@ -12,7 +12,7 @@ from backend.axis.remembered import AxisRecord, AxisStore
 from backend.drive.drive import Drive
 from backend.drive.ports import Port
 from backend.scales.resolve import Told, scales_of
-from backend.scales.scale import Doubt, Origin, ScaleUnknown
+from backend.scales.scale import Origin, ScaleUnknown, Uncertainty
 from backend.scales.taught import Taught
 from backend.scales.units import AxisUnits, read_units
 from backend.scales.units_found import nearest_unit
@@ -29,12 +29,12 @@ RPM, TENTH_RPM, RAD_S, DEGREE_S = 0x00B44700, 0xFFB44700, 0x00100300, 0x00410300
 TENTH_DEGREE = 0xFF410000
 
 
-def velocity(code: int | None, **raws: int) -> tuple[float | None, Doubt | None]:
+def velocity(code: int | None, **raws: int) -> tuple[float | None, Uncertainty | None]:
     told = {"608F:01": 65_536, "608F:02": 1} | raws
     if code is not None:
         told["60A9:00"] = code
     scale = scales_of(GENERIC, Told(told), None).velocity
-    return scale.raw_per_unit, scale.doubt
+    return scale.raw_per_unit, scale.uncertainty
 
 
 @pytest.mark.parametrize(
@@ -54,22 +54,22 @@ def test_codes_of_60a9h(code: int, raw_per_rpm: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("code", "doubt"),
+    ("code", "uncertainty"),
     [
-        (None, Doubt.NOT_STATED),
-        (0, Doubt.NOT_STATED),
-        (0x00010300, Doubt.UNREADABLE),  # m/s: how far a revolution goes is not said
-        (0x12345678, Doubt.UNREADABLE),
+        (None, Uncertainty.NOT_STATED),
+        (0, Uncertainty.NOT_STATED),
+        (0x00010300, Uncertainty.UNREADABLE),  # m/s: how far a revolution goes is not said
+        (0x12345678, Uncertainty.UNREADABLE),
     ],
 )
-def test_a_unit_that_nobody_states_is_none(code: int | None, doubt: Doubt) -> None:
-    assert velocity(code) == (None, doubt)
+def test_a_unit_that_nobody_states_is_none(code: int | None, uncertainty: Uncertainty) -> None:
+    assert velocity(code) == (None, uncertainty)
 
 
 def test_turns_behind_a_gear_are_not_certain() -> None:
     """6091h of 5 to 1: rpm of the motor, or of the shaft behind it?"""
     gear = {"6091:01": 5, "6091:02": 1}
-    assert velocity(RPM, **gear) == (None, Doubt.BEHIND_GEAR)
+    assert velocity(RPM, **gear) == (None, Uncertainty.BEHIND_GEAR)
     assert velocity(INC_S, **gear) == (pytest.approx(65_536 / 5 / 60), None)
 
 
@@ -84,8 +84,8 @@ def test_turns_behind_a_gear_are_not_certain() -> None:
 )
 def test_a_speed_that_is_counted_otherwise_is_not_certain(raws: dict[str, int]) -> None:
     """6090h beside a 608Fh of 65536 increments, or a velocity factor (CiA 402-2 clause 10)."""
-    assert velocity(INC_S, **raws) == (None, Doubt.FACTOR)
-    assert velocity(RPM, **raws) == (None, Doubt.FACTOR)
+    assert velocity(INC_S, **raws) == (None, Uncertainty.FACTOR)
+    assert velocity(RPM, **raws) == (None, Uncertainty.FACTOR)
 
 
 def test_factors_that_change_nothing_are_none() -> None:
@@ -98,7 +98,7 @@ def test_a_factor_of_the_acceleration_leaves_the_speed_certain() -> None:
     told = {"608F:01": 65_536, "60A9:00": INC_S, "60AA:00": INC_S2, "6097:01": 1, "6097:02": 10}
     scales = scales_of(GENERIC, Told(told), None)
     assert scales.velocity.certain
-    assert scales.acceleration.doubt is Doubt.FACTOR
+    assert scales.acceleration.uncertainty is Uncertainty.FACTOR
 
 
 @pytest.mark.parametrize(
@@ -119,19 +119,21 @@ def test_increments_of_a_revolution(raws: dict[str, int], per_rev: float) -> Non
 
 
 @pytest.mark.parametrize(
-    ("raws", "doubt"),
+    ("raws", "uncertainty"),
     [
-        ({}, Doubt.NO_RESOLUTION),
-        ({"6092:01": 0, "6092:02": 1}, Doubt.NO_RESOLUTION),
-        ({"6092:01": 1, "6092:02": 1, "608F:01": 131_072}, Doubt.FEED_OF_ONE),
-        ({"60A8:00": TENTH_DEGREE, "6092:01": 10_000}, Doubt.UNIT_AND_FEED),
-        ({"60A8:00": 0xFA010000}, Doubt.LINEAR),  # µm
-        ({"60A8:00": 0x00990000}, Doubt.UNREADABLE),
+        ({}, Uncertainty.NO_RESOLUTION),
+        ({"6092:01": 0, "6092:02": 1}, Uncertainty.NO_RESOLUTION),
+        ({"6092:01": 1, "6092:02": 1, "608F:01": 131_072}, Uncertainty.FEED_OF_ONE),
+        ({"60A8:00": TENTH_DEGREE, "6092:01": 10_000}, Uncertainty.UNIT_AND_FEED),
+        ({"60A8:00": 0xFA010000}, Uncertainty.LINEAR),  # µm
+        ({"60A8:00": 0x00990000}, Uncertainty.UNREADABLE),
     ],
 )
-def test_a_resolution_that_nobody_states_is_none(raws: dict[str, int], doubt: Doubt) -> None:
+def test_a_resolution_that_nobody_states_is_none(
+    raws: dict[str, int], uncertainty: Uncertainty
+) -> None:
     scale = scales_of(GENERIC, Told(raws), None).position
-    assert (scale.raw_per_unit, scale.doubt) == (None, doubt)
+    assert (scale.raw_per_unit, scale.uncertainty) == (None, uncertainty)
 
 
 def test_what_a_person_said_counts_while_the_drive_is_as_it_was() -> None:
@@ -154,7 +156,10 @@ def test_the_makers_file_counts_where_the_drive_is_silent() -> None:
 
 def test_a_profile_imported_before_origins_were_kept_is_not_taken_for_a_manual() -> None:
     old = GENERIC.model_copy(update={"origins": {}})
-    assert scales_of(old, Told({"608F:01": 1_000}), None).velocity.doubt is Doubt.NOT_STATED
+    assert (
+        scales_of(old, Told({"608F:01": 1_000}), None).velocity.uncertainty
+        is Uncertainty.NOT_STATED
+    )
 
 
 @pytest.mark.parametrize("name", ["mms7", "m6l", "r6l", "ds_c"])

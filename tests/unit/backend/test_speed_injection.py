@@ -77,7 +77,7 @@ def test_steps_of_the_encoder_are_not_taken_for_torque_of_the_reference() -> Non
 
 
 def test_a_soft_loop_gets_more_reference_than_the_axis_may_turn() -> None:
-    """A heavy axis hardly follows; its set-points stay below half of the permitted speed."""
+    """A heavy axis hardly follows; its setpoints stay below half of the permitted speed."""
     soft = sized(1.5e-3, 0.5 * GAIN)
     assert soft.peak_rad_s > 2 * 0.15 * ROOM.speed_rad_s
     assert soft.peak_rad_s + soft.base_rad_s <= 0.5 * ROOM.speed_rad_s + 1e-9

@@ -25,7 +25,7 @@ from backend.axis.remembered import AxisRecord
 from backend.scales.gear_calculator import Mechanics
 from backend.scales.travel_units import REVOLUTIONS, TravelUnit
 from backend.station.bench import Bench
-from backend.station.connected_drive import Member
+from backend.station.connected_drive import ConnectedDrive
 from backend.tools.jog import run as jogging
 from backend.tools.jog.cyclic import _require_inside
 from backend.tools.moves import move as moving
@@ -99,7 +99,9 @@ def test_the_other_motions_are_converted() -> None:
     assert jog.travel_rev == pytest.approx(20 / 180)
 
 
-async def test_the_unit_comes_from_the_mechanics_that_are_kept(bench: Bench, x: Member) -> None:
+async def test_the_unit_comes_from_the_mechanics_that_are_kept(
+    bench: Bench, x: ConnectedDrive
+) -> None:
     assert await convert_motion.unit_of(bench, x, "rev") is REVOLUTIONS
     with pytest.raises(NotAllowed, match="needs mechanics"):
         await convert_motion.unit_of(bench, x, "mm")
@@ -110,7 +112,7 @@ async def test_the_unit_comes_from_the_mechanics_that_are_kept(bench: Bench, x: 
     assert refused.value.limit == "rev, mm"
 
 
-async def test_refusals_name_the_unit_of_the_request(x: Member) -> None:
+async def test_refusals_name_the_unit_of_the_request(x: ConnectedDrive) -> None:
     """A target 30 mm away with a limit of 20 mm; nobody hears of revolutions."""
     request = MoveRequest(mode="PP", target=30, relative=True, speed=20, unit="mm", **LIMITS)
     settings = convert_motion.move_settings(request, MM)
@@ -122,7 +124,7 @@ async def test_refusals_name_the_unit_of_the_request(x: Member) -> None:
     assert "rev" not in str(refused.value)
 
 
-async def test_a_speed_above_the_envelope_is_told_in_its_unit(x: Member) -> None:
+async def test_a_speed_above_the_envelope_is_told_in_its_unit(x: ConnectedDrive) -> None:
     envelope = Envelope(6.0, 180.0, 50.0, 10.0, "mm", 10 / 3)
     settings = moving.MoveSettings("PP", 1.0, envelope, speed_rpm=360.0)
     with pytest.raises(OutOfRange) as refused:
@@ -130,13 +132,13 @@ async def test_a_speed_above_the_envelope_is_told_in_its_unit(x: Member) -> None
     assert "20 mm/s is above the envelope's 10 mm/s" in str(refused.value)
 
 
-async def test_a_jog_too_slow_to_count_is_told_in_its_unit(x: Member) -> None:
+async def test_a_jog_too_slow_to_count_is_told_in_its_unit(x: ConnectedDrive) -> None:
     settings = jogging.JogSettings(1, 1e-4, 600.0, 5.0, 50.0, shown=DEGREES)
     with pytest.raises(OutOfRange, match=r"0\.0003 °/s is below"):
         await jogging.jog(x.axis, settings, jogging.Hold(), quiet())
 
 
-def test_an_amplitude_beyond_the_envelope_is_told_in_its_unit(x: Member) -> None:
+def test_an_amplitude_beyond_the_envelope_is_told_in_its_unit(x: ConnectedDrive) -> None:
     request = GenerateRequest(
         mode="CSP", shape="step", amplitude=40, duration_s=1, speed_limit=100, unit="mm", **LIMITS
     )

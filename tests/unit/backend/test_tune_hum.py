@@ -60,13 +60,15 @@ async def kept_of(
         return {}
 
     @contextmanager
-    def lent(_earlier: dict[str, int]) -> Iterator[None]:
+    def borrowed(_earlier: dict[str, int]) -> Iterator[None]:
         yield
 
     for name in ("plan", "write_settings", "put_back_in_time"):
         monkeypatch.setattr(tune_apply, name, nothing)
     monkeypatch.setattr(tune_apply, "verify", verify)
-    axis: Any = SimpleNamespace(drive=SimpleNamespace(name="X", owed=SimpleNamespace(lent=lent)))
+    axis: Any = SimpleNamespace(
+        drive=SimpleNamespace(name="X", pending_restores=SimpleNamespace(borrowed=borrowed))
+    )
     check: Any = SimpleNamespace(inertia_kgm2=1e-4, motor_inertia_kgm2=None)
     tried: list[Text] = []
     session: Any = None

@@ -87,7 +87,7 @@ async def test_without_margins_the_design_comes_back(monkeypatch: pytest.MonkeyP
     assert held == NEW
     assert [each.words() for each in tried] == ["as it was: phase margin"]
     assert "with 29% of the speed gain" in str(note)
-    assert "did not keep the promise" in str(note)
+    assert "did not meet its prediction" in str(note)
 
 
 async def test_a_prediction_that_was_right_is_believed(monkeypatch: pytest.MonkeyPatch) -> None:

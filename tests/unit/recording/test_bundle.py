@@ -120,7 +120,7 @@ def test_bundle_holds_the_samples_as_a_recording(tmp_path: Path) -> None:
 def test_what_came_long_ago_is_no_evidence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bench: Any = SimpleNamespace(
         journal=Journal(),
-        members={},
+        connected_drives={},
         on_snapshot=[],
         on_readings=[],
         on_drives=[],
@@ -148,7 +148,7 @@ def test_what_a_full_disk_does_not_take_is_held_until_it_does(
     journal = Journal()
     bench: Any = SimpleNamespace(
         journal=journal,
-        members={},
+        connected_drives={},
         on_snapshot=[],
         on_readings=[],
         on_drives=[],

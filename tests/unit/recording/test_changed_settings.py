@@ -27,7 +27,7 @@ def bench_with(**known: int) -> Any:
         key={"position_target": TARGET, "mode": MODE}.get,
         parameter=_PARAMETERS.__getitem__,
     )
-    return SimpleNamespace(members={"x": SimpleNamespace(drive=drive)})
+    return SimpleNamespace(connected_drives={"x": SimpleNamespace(drive=drive)})
 
 
 def test_the_first_change_counts_too() -> None:

@@ -83,7 +83,7 @@ def test_a_long_ramp_is_waited_for_with_its_power_on() -> None:
     async def main() -> None:
         async with rig("mms7") as bench:
             await profile_velocity(bench)
-            units = await bench.member.axis.units()
+            units = await bench.connected.axis.units()
             bench.poke("6085:00", units.acceleration_raw(100.0))
             axis = await stop(bench)
             assert axis["verdict"] == "stopped"
@@ -114,11 +114,11 @@ def test_a_new_motion_ends_the_watch_of_the_old_stop() -> None:
     async def main() -> None:
         async with rig("mms7") as bench:
             await profile_velocity(bench)
-            units = await bench.member.axis.units()
+            units = await bench.connected.axis.units()
             bench.poke("6085:00", units.acceleration_raw(100.0))
             asked = asyncio.create_task(stop(bench))
             await asyncio.sleep(0.5)
-            bench.bench.motion.permit(bench.member.drive.id)
+            bench.bench.motion.permit(bench.connected.drive.id)
             axis = await asked
             assert axis["superseded"]
             assert codes(axis) == ["quick_stop"]
@@ -134,7 +134,7 @@ def test_a_drive_that_leaves_the_bench_is_stopped_first_and_has_its_verdict() ->
             await profile_velocity(bench)
             asked = asyncio.create_task(stop(bench))
             await asyncio.sleep(0.02)
-            removed = await bench.http.delete(f"/drives/{bench.member.drive.id}")
+            removed = await bench.http.delete(f"/drives/{bench.connected.drive.id}")
             assert removed.is_success, removed.text
             assert (await asked)["verdict"] == "stopped"
             assert bench.shaft_rpm < 3.0

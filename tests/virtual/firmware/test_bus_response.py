@@ -1,6 +1,6 @@
 """What a master on the bus sees of the mechanics, from 6071h in to 606Ch out, in closed form.
 
-The set-point is interpolated over the 1 ms cycle in 20 steps of 50 µs, held for a step each,
+The setpoint is interpolated over the 1 ms cycle in 20 steps of 50 µs, held for a step each,
 passes the first-order current loop and the chain; the speed is the difference of the sampled
 angle through a first-order low pass, and the bus takes every 20th value. All of that is linear,
 so the answer to a sine is the sum over the images that both samplings fold together.
@@ -33,7 +33,7 @@ SPEC = rigid(
 
 
 def expected(spec: MechanicsSpec, f_hz: float) -> complex:
-    """Sampled speed [rad/s] over sampled torque set-point [Nm]."""
+    """Sampled speed [rad/s] over sampled torque setpoint [Nm]."""
     total = 0j
     for m in range(-RATIO // 2, RATIO // 2):
         omega = TURN * (f_hz + m / T)

@@ -101,7 +101,7 @@ def test_save_survives_the_process(bench, tmp_path: Path) -> None:
     again = bench(nvm_path=path)
     assert again.get("2005:01") == 321
     assert again.get("2005:03") == 2000
-    assert again.get("607A:00") == 0  # a set-point is not a parameter
+    assert again.get("607A:00") == 0  # a setpoint is not a parameter
     assert again.servo.axis.p[k.P_KP_POSITION_1] == pytest.approx(TURN * 32.1)
 
 

@@ -128,7 +128,7 @@ def test_every_cia402_mode_moves_a_family_without_printed_defaults(family) -> No
 
 
 def test_set_points_are_buffered_unless_bit_5_says_at_once(family) -> None:
-    """CiA 402-2 "single set-point" and "set of set-points"."""
+    """CiA 402-2 "single setpoint" and "set of setpoints"."""
     b = family(M6L)
     b.set("2009:27", 0)
     b.enable(1)

@@ -315,7 +315,7 @@ def test_modulo_position_never_leaves_its_range(bench) -> None:
 
 # --- loops ------------------------------------------------------------------------------------
 def speed_response(b: Bench, f_hz: float) -> complex:
-    """Closed speed loop at one frequency, by torque-free injection into the speed set-point."""
+    """Closed speed loop at one frequency, by torque-free injection into the speed setpoint."""
     axis = b.servo.axis
     axis.run_cyclic(k.LOOP_SPEED)
     period = round(1 / (f_hz * k.STEP_S))

@@ -133,7 +133,7 @@ async def can_bench(
     spec: MechanicsSpec, cycle_s: float = 1e-3, *, drive: str = "ds_c", pace: float = 4.0,
     bitrate: int = 1_000_000, patient: bool = True,
 ) -> AsyncIterator[CanBench]:  # fmt: skip
-    """``patient``: set-points outlive that simulated time passes faster than the tools' clock."""
+    """``patient``: setpoints outlive that simulated time passes faster than the tools' clock."""
     profile = load_profile(drive)
     bus = LockstepBus(make_device(drive, spec, station=STATION), pace)
     bus.pass_s(0.01)

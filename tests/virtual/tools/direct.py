@@ -4,7 +4,7 @@ For what needs many axes or many samples and nothing of the wire itself. While t
 time passes as fast as the computer can, 20 ms at a go, and `time.monotonic` with it: who waits for
 30 ms or has 3 s, waits for 30 ms and has 3 s of the drive. While something is computed in a thread
 time keeps to the pace of its processor time about, so that a busy computer, where the same takes
-longer, changes nothing. One cycle lies between a set-point and the sample that shows it, as with
+longer, changes nothing. One cycle lies between a setpoint and the sample that shows it, as with
 EtherCAT.
 """
 
@@ -60,7 +60,7 @@ _ACCESS_NS = 200_000
 _TURN_NS = 20_000_000
 #: What a turn lasts for those who compute meanwhile, in time of a processor.
 _REST_S = 0.01
-#: Set-points live this much longer than on a wire: simulated time outruns the tools' clock.
+#: Setpoints live this much longer than on a wire: simulated time outruns the tools' clock.
 _PATIENCE = 1000
 
 

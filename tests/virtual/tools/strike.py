@@ -187,10 +187,10 @@ async def _object(doing: Awaitable[object]) -> object:
 
 async def _calm(b: DirectBench, before: dict[str, object], told: str, *, gone: bool) -> None:
     """Nothing moves, nothing is enabled, and every setting is as before or owed, told, and back."""
-    axis, owed = b.axis, {debt.key for debt in b.axis.drive.owed.debts}
+    axis, owed = b.axis, {entry.key for entry in b.axis.drive.pending_restores.entries}
     b.link.cut = False
     b.link.pass_s(OFF_S + 3.0)
-    if axis.owes_stop:
+    if axis.stop_pending:
         assert await axis.repeat_stop()
     assert await axis.state() is not State.OPERATION_ENABLED
     assert await axis.standstill(2.0)
@@ -206,7 +206,7 @@ async def _calm(b: DirectBench, before: dict[str, object], told: str, *, gone: b
         found = await settle(axis, asked=False)
         assert found["left"] == {}, found
         assert await settings_of(axis.drive) == before
-    assert not axis.drive.owed, axis.drive.owed
+    assert not axis.drive.pending_restores, axis.drive.pending_restores
     b.link.pass_s(1.0)
     assert abs(units.position(await axis.position_raw() - stood)) < 0.01, "it still moves"
     assert await axis.state() is not State.OPERATION_ENABLED

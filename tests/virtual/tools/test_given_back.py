@@ -32,7 +32,7 @@ async def measured(b: DirectBench, how: str) -> None:
         enabled(b.axis, b.session, Mode.CSV),
     ):
         assert await b.axis.drive.raw(MODE) == Mode.CSV
-        assert [(debt.key, debt.raw) for debt in b.axis.drive.owed.outstanding] == [
+        assert [(entry.key, entry.raw) for entry in b.axis.drive.pending_restores.outstanding] == [
             (MODE, Mode.HM)
         ], "for the next server, should this one be killed"
         match how:
@@ -66,7 +66,7 @@ async def test_the_mode_is_as_before(drive: str, how: str) -> None:
             State.FAULT if how == "faulted" else State.SWITCH_ON_DISABLED
         )
         assert await b.axis.drive.raw(MODE) == Mode.HM
-        assert not b.axis.drive.owed.outstanding
+        assert not b.axis.drive.pending_restores.outstanding
 
 
 @drives
@@ -80,4 +80,4 @@ async def test_the_mode_of_a_lost_drive_is_owed_to_it(drive: str) -> None:
         found = await settle(b.axis, asked=False)
         assert found == {"back": {MODE: Mode.HM}, "left": {}}
         assert await b.axis.drive.raw(MODE) == Mode.HM
-        assert not b.axis.drive.owed
+        assert not b.axis.drive.pending_restores

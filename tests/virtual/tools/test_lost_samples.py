@@ -1,6 +1,6 @@
 """A bus that loses samples, or a computer that is late, costs a measurement time and not its sense.
 
-Samples of a lost frame are not numbers, and set-points that went out late disturb the axis.
+Samples of a lost frame are not numbers, and setpoints that went out late disturb the axis.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ def silent() -> Progress:
 
 
 async def learned(b: DirectBench, *, still: bool) -> Hold | None:
-    """What autotune does between the mechanics and the design; how the drive holds set-points."""
+    """What autotune does between the mechanics and the design; how the drive holds setpoints."""
     axis = b.axis
     facts = await read_facts(axis)
     found = await sweep(axis, b.session, SweepSettings(WIDE, realisations=1), silent())

@@ -105,8 +105,8 @@ async def test_everything_is_as_before(drive: str, tool: str, step: str, trouble
             assert "verload" in str(why.value) or "emperature" in str(why.value)
         assert await b.axis.state() is not State.OPERATION_ENABLED
         assert await settings_of(b.axis.drive, MODE) == before
-        assert not b.axis.drive.owed
-        assert not b.axis.owes_stop
+        assert not b.axis.drive.pending_restores
+        assert not b.axis.stop_pending
 
 
 @midways
@@ -119,12 +119,12 @@ async def test_what_a_lost_drive_is_owed_comes_back_by_itself(
         with pytest.raises(DriveError) as told:
             await b.measure(tool, at.progress)
         assert at.done
-        owed = {debt.key for debt in b.axis.drive.owed.debts}
+        owed = {entry.key for entry in b.axis.drive.pending_restores.entries}
         b.line.cut = False
         # A free axis coasts for a while.
         b.line.pass_s(3.0)
         # What the monitor does when the drive answers again: the stop first, then the rest.
-        if b.axis.owes_stop:
+        if b.axis.stop_pending:
             assert await b.axis.repeat_stop()
         assert await b.axis.standstill(2.0)
         assert await b.axis.state() is not State.OPERATION_ENABLED
@@ -136,7 +136,7 @@ async def test_what_a_lost_drive_is_owed_comes_back_by_itself(
         found = await settle(b.axis, asked=False)
         assert found["left"] == {}
         assert await settings_of(b.axis.drive, MODE) == before
-        assert not b.axis.drive.owed
+        assert not b.axis.drive.pending_restores
 
 
 async def test_an_emergency_stop_that_is_released_lets_nothing_go_on() -> None:

@@ -15,7 +15,7 @@ import pytest
 
 from backend.axis import teaching
 from backend.axis.axis import Envelope
-from backend.scales.scale import Doubt, Origin, ScaleUnknown
+from backend.scales.scale import Origin, ScaleUnknown, Uncertainty
 from backend.tools.autotune.run import AutotuneSettings, autotune
 from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.inertia.run import inertia
@@ -210,7 +210,7 @@ async def test_no_tool_moves_by_a_unit_that_nobody_knows(tool: str, little: str)
 
 
 async def _must_not_play(_trajectories: Any) -> int:
-    raise AssertionError("a set-point went out")
+    raise AssertionError("a setpoint went out")
 
 
 async def test_608f_alone_gives_the_resolution() -> None:
@@ -246,8 +246,8 @@ async def test_a_small_move_teaches_resolution_and_unit(bus: str) -> None:
     spec = rough(velocity_unit=TENTH_RPM_CODE, lacks=("6092", "608F", "60A9", "60A8"))
     async with bench(bus, spec) as b:
         units = await b.axis.units()
-        assert units.scales.position.doubt is Doubt.NO_RESOLUTION
-        assert units.scales.velocity.doubt is Doubt.NOT_STATED
+        assert units.scales.position.uncertainty is Uncertainty.NO_RESOLUTION
+        assert units.scales.velocity.uncertainty is Uncertainty.NOT_STATED
         with pytest.raises(OutOfRange, match="1 to 1000 now"):
             await small_move(b.axis, b.session, SmallMoveSettings(5_000), silent())
         for increments in (500, 5_000):

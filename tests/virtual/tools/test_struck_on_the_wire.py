@@ -65,8 +65,8 @@ async def struck(
     async with asyncio.timeout(90.0):
         while not await settled(b, before):  # noqa: ASYNC110 - nothing tells of it
             await asyncio.sleep(0.1)
-    assert not b.axis.drive.owed
-    assert not b.axis.owes_stop
+    assert not b.axis.drive.pending_restores
+    assert not b.axis.stop_pending
     assert await b.axis.state() is not State.OPERATION_ENABLED
     units, stood = await b.axis.units(), await b.axis.position_raw()
     await asyncio.sleep(0.5)
@@ -76,7 +76,7 @@ async def struck(
 async def settled(b: Bench | CanBench, before: dict[str, object]) -> bool:
     """What a server does when a drive answers again; whether all is as before now."""
     try:
-        if b.axis.owes_stop and not await b.axis.repeat_stop():
+        if b.axis.stop_pending and not await b.axis.repeat_stop():
             return False
         await settle(b.axis, asked=False)
         return await settings_of(b.axis.drive, MODE) == before

@@ -74,7 +74,7 @@ def asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[InertiaSettin
         try:
             async with httpx.AsyncClient(transport=transport, base_url=f"{address}/api/v1") as http:
                 yield Remote(address, http)
-            assert [m.drive.profile.drive for m in bench.members.values()] == ["mms7"]
+            assert [m.drive.profile.drive for m in bench.connected_drives.values()] == ["mms7"]
         finally:
             await bench.close()
 

@@ -88,14 +88,14 @@ async def test_the_cable_is_pulled_and_put_back(namespace: Namespace) -> None:
         async with asyncio.timeout(60.0):
             while not await settled(b, before):  # noqa: ASYNC110 - nothing tells of it
                 await asyncio.sleep(0.1)
-        assert not b.axis.drive.owed
-        assert not b.axis.owes_stop
+        assert not b.axis.drive.pending_restores
+        assert not b.axis.stop_pending
 
 
 async def settled(b: Bench, before: dict[str, object]) -> bool:
     """What a server does when a drive answers again; whether all is as before now."""
     try:
-        if b.axis.owes_stop and not await b.axis.repeat_stop():
+        if b.axis.stop_pending and not await b.axis.repeat_stop():
             return False
         await settle(b.axis, asked=False)
         return await settings_of(b.axis.drive, MODE) == before

@@ -107,4 +107,4 @@ async def test_cancelled_in_the_second_look_everything_is_as_before(step: str) -
             await job
         assert second.done
         assert await settings_of(b.axis.drive) == before
-        assert not b.axis.drive.owed
+        assert not b.axis.drive.pending_restores

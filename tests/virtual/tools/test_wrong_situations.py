@@ -304,7 +304,7 @@ async def test_a_link_that_is_lost_while_it_is_measured(
         with pytest.raises(DriveError) as told:
             await works[tool]()
         assert at.done
-        owed = {debt.key for debt in b.axis.drive.owed.debts}
+        owed = {entry.key for entry in b.axis.drive.pending_restores.entries}
         b.link.cut = False
         # Disabled in the middle of a motion it coasts for a while.
         b.link.pass_s(3.0)
@@ -320,7 +320,7 @@ async def test_a_link_that_is_lost_while_it_is_measured(
         found = await settle(b.axis, asked=False)
         assert found["left"] == {}
         assert await dump(b) == before
-        assert not b.axis.drive.owed
+        assert not b.axis.drive.pending_restores
 
 
 @families

@@ -1095,7 +1095,7 @@ export interface paths {
         put?: never;
         /**
          * Put Back
-         * @description Put back every value that is owed to the drive, while its axis stands.
+         * @description Restore every pending value of the drive, while its axis stands.
          */
         post: operations["put_back"];
         delete?: never;
@@ -1332,26 +1332,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/v1/drives/{drive_id}/owed": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        post?: never;
-        /**
-         * Keep As It Is
-         * @description The values shall stay as they are now; nothing is written.
-         */
-        delete: operations["keep_as_it_is"];
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/v1/drives/{drive_id}/parameters": {
         parameters: {
             query?: never;
@@ -1395,6 +1375,26 @@ export interface paths {
         put: operations["write_parameter"];
         post?: never;
         delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/pending-restores": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        /**
+         * Keep As It Is
+         * @description The values shall stay as they are now; nothing is written.
+         */
+        delete: operations["keep_as_it_is"];
         options?: never;
         head?: never;
         patch?: never;
@@ -1621,7 +1621,7 @@ export interface paths {
         put?: never;
         /**
          * Transition
-         * @description Drive the power state machine. Enabling aims the set-point at where the axis stands.
+         * @description Drive the power state machine. Enabling aims the setpoint at where the axis stands.
          */
         post: operations["transition"];
         delete?: never;
@@ -4286,12 +4286,6 @@ export interface components {
             name: string;
         };
         /**
-         * Doubt
-         * @description Why a scale is not certain.
-         * @enum {string}
-         */
-        Doubt: "no_resolution" | "feed_of_one" | "unit_and_feed" | "linear" | "not_stated" | "unreadable" | "behind_gear" | "needs_resolution" | "factor";
-        /**
          * DriveIdentification
          * @description Identification that a bit of the control word starts, while an object counts its states.
          */
@@ -4345,11 +4339,6 @@ export interface components {
             name: string;
             /** Notes */
             notes: string;
-            /**
-             * Owed
-             * @description what a motion could not put back
-             */
-            owed: components["schemas"]["OwedValue"][];
             /** Partial */
             partial: boolean;
             /**
@@ -4357,6 +4346,11 @@ export interface components {
              * @description parameters waiting for write-settings, enable or power-off
              */
             pending: number;
+            /**
+             * Pending Restores
+             * @description what a motion could not put back
+             */
+            pending_restores: components["schemas"]["PendingRestoreValue"][];
             /** Ports */
             ports: components["schemas"]["PortInfo"][];
             /** Profile */
@@ -5664,6 +5658,7 @@ export interface components {
             looked_for: number | null;
             /** Low */
             low: number | null;
+            /** @description of text, as code and facts */
             message: components["schemas"]["MessageInfo"];
             next_step: components["schemas"]["MessageInfo"] | null;
             /** Now */
@@ -7327,26 +7322,6 @@ export interface components {
          */
         Origin: "manual" | "makers_file" | "drive" | "user" | "measured" | "unknown";
         /**
-         * OwedValue
-         * @description A parameter that a motion changed and could not put back, as the link was lost.
-         */
-        OwedValue: {
-            /** Key */
-            key: string;
-            /** Name */
-            name: string;
-            /**
-             * Raw
-             * @description what it was before; writing it puts it back
-             */
-            raw: number | string;
-            /**
-             * Unapplied
-             * @description it is back, but does not act yet
-             */
-            unapplied: boolean;
-        };
-        /**
          * ParameterGroup
          * @description Parameters that a person sets together, on one page.
          */
@@ -7568,6 +7543,26 @@ export interface components {
             title: string;
             /** Values */
             values: components["schemas"]["ParameterValue"][];
+        };
+        /**
+         * PendingRestoreValue
+         * @description A parameter that a motion changed and could not put back, as the link was lost.
+         */
+        PendingRestoreValue: {
+            /** Key */
+            key: string;
+            /** Name */
+            name: string;
+            /**
+             * Raw
+             * @description what it was before; writing it puts it back
+             */
+            raw: number | string;
+            /**
+             * Unapplied
+             * @description it is back, but does not act yet
+             */
+            unapplied: boolean;
         };
         /**
          * PeopleHere
@@ -8649,8 +8644,6 @@ export interface components {
          * @description One scale with its origin.
          */
         ScaleInfo: {
-            /** @description why it is not certain */
-            doubt: components["schemas"]["Doubt"] | null;
             /**
              * Is Time
              * @description a ramp given as a time in ms, which no factor converts
@@ -8678,6 +8671,8 @@ export interface components {
              * @description objects, file or the manual's place
              */
             source: string;
+            /** @description why it is not certain */
+            uncertainty: components["schemas"]["Uncertainty"] | null;
             /**
              * Unit
              * @description rev, rpm or rpm/s
@@ -10027,6 +10022,12 @@ export interface components {
             unit: string;
         };
         /**
+         * Uncertainty
+         * @description Why a scale is not certain.
+         * @enum {string}
+         */
+        Uncertainty: "no_resolution" | "feed_of_one" | "unit_and_feed" | "linear" | "not_stated" | "unreadable" | "behind_gear" | "needs_resolution" | "factor";
+        /**
          * Undo
          * @description Raw values that were there before; writing them back undoes the change.
          *
@@ -10212,7 +10213,6 @@ export type Diff = components['schemas']['Diff'];
 export type DiffRow = components['schemas']['DiffRow'];
 export type DoctorCause = components['schemas']['DoctorCause'];
 export type DoctorFact = components['schemas']['DoctorFact'];
-export type Doubt = components['schemas']['Doubt'];
 export type DriveIdentification = components['schemas']['DriveIdentification'];
 export type DriveSummary = components['schemas']['DriveSummary'];
 export type DriveUpdate = components['schemas']['DriveUpdate'];
@@ -10332,7 +10332,6 @@ export type NotchShape = components['schemas']['NotchShape'];
 export type NotchSlotInfo = components['schemas']['NotchSlotInfo'];
 export type NotchWrite = components['schemas']['NotchWrite'];
 export type Origin = components['schemas']['Origin'];
-export type OwedValue = components['schemas']['OwedValue'];
 export type ParameterGroup = components['schemas']['ParameterGroup'];
 export type ParameterRow = components['schemas']['ParameterRow'];
 export type ParameterValue = components['schemas']['ParameterValue'];
@@ -10340,6 +10339,7 @@ export type ParameterWrite = components['schemas']['ParameterWrite'];
 export type ParameterWrites = components['schemas']['ParameterWrites'];
 export type PasswordChange = components['schemas']['PasswordChange'];
 export type PastFaultInfo = components['schemas']['PastFaultInfo'];
+export type PendingRestoreValue = components['schemas']['PendingRestoreValue'];
 export type PeopleHere = components['schemas']['PeopleHere'];
 export type PeopleList = components['schemas']['PeopleList'];
 export type PersonHere = components['schemas']['PersonHere'];
@@ -10444,6 +10444,7 @@ export type TouchProbe = components['schemas']['TouchProbe'];
 export type TransitionRequest = components['schemas']['TransitionRequest'];
 export type TurnedUpdate = components['schemas']['TurnedUpdate'];
 export type TurningInfo = components['schemas']['TurningInfo'];
+export type Uncertainty = components['schemas']['Uncertainty'];
 export type Undo = components['schemas']['Undo'];
 export type ValuesChanged = components['schemas']['ValuesChanged'];
 export type VersionInfo = components['schemas']['VersionInfo'];
@@ -21203,145 +21204,6 @@ export interface operations {
             };
         };
     };
-    keep_as_it_is: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                drive_id: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["DriveSummary"];
-                };
-            };
-            /** @description Not a request of this interface */
-            400: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-            /** @description Nobody is logged in */
-            401: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-            /** @description Not for this person, or not from our page */
-            403: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-            /** @description No such thing */
-            404: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-            /** @description Not with this method */
-            405: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-            /** @description The body came too slowly */
-            408: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-            /** @description Not possible now */
-            409: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-            /** @description Too large */
-            413: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-            /** @description Not acceptable */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-            /** @description Too often */
-            429: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-            /** @description The answer makes no sense */
-            502: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-            /** @description The link is gone */
-            503: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-            /** @description No answer in time */
-            504: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
-        };
-    };
     list_parameters: {
         parameters: {
             query?: never;
@@ -21787,6 +21649,145 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ParameterValue"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    keep_as_it_is: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DriveSummary"];
                 };
             };
             /** @description Not a request of this interface */

@@ -5,7 +5,7 @@ import * as live from '../live/live'
 import { contents, useAxisState, useDrive, useDrives, useLink, useStore } from '../live/store'
 import { clock } from '../widgets/format'
 import { Icon } from '../widgets/Icon'
-import { OwedNote } from '../widgets/OwedNote'
+import { PendingRestoresNote } from '../widgets/PendingRestoresNote'
 import {
   AXIS_PAGES,
   BENCH_PAGES,
@@ -110,7 +110,7 @@ export function Frame({ children }: { children: ReactNode }) {
           <LeaseNotices />
           <SupportBar />
           {axis && <AxisNotes key={key} drive={axis.id} page={page} />}
-          {axis && <OwedNote key={`owed ${axis.id}`} drive={axis.id} />}
+          {axis && <PendingRestoresNote key={`restores ${axis.id}`} drive={axis.id} />}
         </Late>
         <div className="room">{children}</div>
       </main>

@@ -1,5 +1,5 @@
 health_antiresonance = 反谐振
-health_axis-not-on-bench = 服务器的台架上没有名为 { $name } 的驱动器
+health_axis-not-on-bench = 服务器的轴列表上没有名为 { $name } 的驱动器
     .remedy = 请从其驱动器中选择：{ $names }
 health_baseline-changed = { $axis } 的基线与签署时不同：校验和不一致，因此不与其比较
     .remedy = 请签署新的基线，或从备份恢复数据库
@@ -13,7 +13,7 @@ health_few-runs = { $name }：基线的重复次数太少，无法判断变化
     .remedy = 请测量三轮或更多，并签署新的基线
 health_friction = 摩擦
 health_friction-higher = { $name }相对基线变化 { NUM($change_percent, format: "+.1f") } %（{ NUM($low_percent, format: "+.1f") } 至 { NUM($high_percent, format: "+.1f") } %）
-    .remedy = 断电后检查皮带是否磨损或过紧、轴承和导轨是否缺油或损坏、制动器是否拖滞；润滑后重新测量
+    .remedy = 断电后检查皮带是否磨损或过紧、轴承和导轨是否缺油或损坏、抱闸是否拖滞；润滑后重新测量
 health_friction-lower = { $name }相对基线变化 { NUM($change_percent, format: "+.1f") } %（{ NUM($low_percent, format: "+.1f") } 至 { NUM($high_percent, format: "+.1f") } %）
     .remedy = 检查皮带是否松弛、丝杠或轴承的预紧是否丧失；若为润滑或磨合之后，请签署新的基线
 health_inertia = 惯量

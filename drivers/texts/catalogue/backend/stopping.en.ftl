@@ -2,7 +2,7 @@ stopping_coasts = { $drive } has no power and coasts{ $speed ->
         [none] {""}
        *[other] {" "}at { $speed } { $unit }
     } after STOP: keep away until it stands
-stopping_ended-unwatched = it was taken off the bench before it was seen to stand
+stopping_ended-unwatched = it was removed from the axis list before it was seen to stand
 stopping_mode-not-changed = the drive does not change its mode
 stopping_no-answer = no answer
 stopping_not-on-bench = not on this bench

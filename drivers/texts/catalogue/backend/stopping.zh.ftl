@@ -2,10 +2,10 @@ stopping_coasts = STOP 后 { $drive } 无电且{ $speed ->
         [none] {""}
        *[other] 以 { $speed } { $unit }{" "}
     }惯性滑行：停稳前请勿靠近
-stopping_ended-unwatched = 在确认停稳之前已从台架移除
+stopping_ended-unwatched = 在确认停稳之前已从轴列表移除
 stopping_mode-not-changed = 驱动器未切换模式
 stopping_no-answer = 无应答
-stopping_not-on-bench = 不在此台架上
+stopping_not-on-bench = 不在此轴列表上
 stopping_not-reached = STOP 未到达 { $drive }：请使用机器的急停
 stopping_not-reached-why = STOP 未到达 { $drive }（{ $why }）：请使用机器的急停
 stopping_not-tell-how-moves = { $drive } 未上报其运动状态

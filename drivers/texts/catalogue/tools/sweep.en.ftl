@@ -1,5 +1,5 @@
 sweep_band-must-span-least = the band must span at least two octaves
-sweep_by-place = the inertia or the torque depends on the place (once per revolution of the motor, about ±{ NUM($amplitude_kgm2, format: ".2g") } kg·m²), as with a crank, a cam or a load off its axis: the band holds every place
+sweep_by-place = the inertia or the torque depends on the place (once per motor revolution, about ±{ NUM($amplitude_kgm2, format: ".2g") } kg·m²), as with a crank, a cam or an eccentric load: the band holds every place
 sweep_by-place-of-unknown-size = the inertia or the torque depends on the place (once per revolution of the motor), as with a crank, a cam or a load off its axis: the band holds every place
 sweep_coherence-low = coherence is low: raise the excitation, or look for backlash and friction
 sweep_designing-excitation = designing the excitation

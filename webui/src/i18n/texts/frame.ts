@@ -133,7 +133,7 @@ export const frame = {
   'mode.Cyclic synchronous position': ['Cyclic synchronous position', '周期同步位置'],
   'mode.Cyclic synchronous velocity': ['Cyclic synchronous velocity', '周期同步速度'],
   'mode.Cyclic synchronous torque': ['Cyclic synchronous torque', '周期同步转矩'],
-  'bit.set-point acknowledged': ['setpoint acknowledged', '设定值已确认'],
+  'bit.setpoint acknowledged': ['setpoint acknowledged', '设定值已确认'],
   'bit.following error': ['following error', '跟随误差'],
   'bit.speed is zero': ['speed is zero', '速度为零'],
   'bit.maximum slippage': ['maximum slippage', '最大滑差'],

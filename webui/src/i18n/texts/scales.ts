@@ -20,33 +20,39 @@ export const scales = {
   'scales.origin.user': ['stated by a person', '由人员给定'],
   'scales.origin.measured': ['measured', '测量得出'],
   'scales.origin.unknown': ['unknown', '未知'],
-  'scales.doubt.no_resolution': ['Increments per revolution are unknown.', '每转增量数未知。'],
-  'scales.doubt.feed_of_one': [
+  'scales.uncertainty.no_resolution': [
+    'Increments per revolution are unknown.',
+    '每转增量数未知。',
+  ],
+  'scales.uncertainty.feed_of_one': [
     '6092h says one unit per revolution beside the encoder of 608Fh: it was never set.',
     '6092h 为每转一个单位，与 608Fh 的编码器不符：该值从未设置。',
   ],
-  'scales.doubt.unit_and_feed': [
+  'scales.uncertainty.unit_and_feed': [
     '60A8h and 6092h give different numbers of units for a revolution.',
     '60A8h 与 6092h 给出的每转单位数不同。',
   ],
-  'scales.doubt.linear': [
+  'scales.uncertainty.linear': [
     'The unit is a length, and how far a revolution goes is unknown.',
     '单位为长度，而每转行程未知。',
   ],
-  'scales.doubt.not_stated': [
+  'scales.uncertainty.not_stated': [
     'Neither the drive nor its description says in which unit it is.',
     '驱动器及其描述文件均未说明单位。',
   ],
-  'scales.doubt.unreadable': ['The unit that is stated is not known here.', '所给单位无法识别。'],
-  'scales.doubt.behind_gear': [
+  'scales.uncertainty.unreadable': [
+    'The unit that is stated is not known here.',
+    '所给单位无法识别。',
+  ],
+  'scales.uncertainty.behind_gear': [
     'It counts turns, and 6091h holds a gear: of which shaft is not said.',
     '以转数计，而 6091h 中设有减速比：未说明是哪根轴。',
   ],
-  'scales.doubt.needs_resolution': [
+  'scales.uncertainty.needs_resolution': [
     'It counts increments, and increments per revolution are unknown.',
     '以增量计，而每转增量数未知。',
   ],
-  'scales.doubt.factor': [
+  'scales.uncertainty.factor': [
     '6090h is another resolution than 608Fh, or 6096h or 6097h holds a factor: what the drive makes of it is not said.',
     '6090h 与 608Fh 的分辨率不同，或 6096h、6097h 中设有系数：驱动器如何使用它未予说明。',
   ],

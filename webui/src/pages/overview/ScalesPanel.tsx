@@ -80,7 +80,7 @@ function One({ scale }: { scale: ScaleInfo }) {
           ? t('scales.time')
           : scale.raw_per_unit !== null
             ? t('scales.per', { value: figure(scale.raw_per_unit, 6), unit: scale.unit })
-            : scale.doubt && t(`scales.doubt.${scale.doubt}`)}{' '}
+            : scale.uncertainty && t(`scales.uncertainty.${scale.uncertainty}`)}{' '}
         <small className="dim">
           {t(`scales.origin.${scale.origin}`)}
           {scale.source && ` · ${scale.source}`}

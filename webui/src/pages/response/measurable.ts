@@ -1,7 +1,7 @@
 const PROFILE_VELOCITY = 3
 const CYCLIC = [8, 9, 10]
 
-/** How an axis can be given a set-point with every cycle of its bus. */
+/** How an axis can be given a setpoint with every cycle of its bus. */
 export interface Measurable {
   possible: boolean
   /** By its profile velocity, as it has no cyclic mode (DS_C over CANopen). */

@@ -2,7 +2,7 @@ import type { AxisState, DriveSummary } from '../../api/schema'
 import { useBuses } from '../connect/useBuses'
 import { type Measurable, measurable } from './measurable'
 
-/** How an axis can be given a set-point with every cycle of its bus, as it is connected now. */
+/** How an axis can be given a setpoint with every cycle of its bus, as it is connected now. */
 export function useMeasurable(drive: DriveSummary | null, state: AxisState | null): Measurable {
   const { buses } = useBuses()
   const urls = drive?.ports.map((port) => port.url) ?? []

@@ -20,7 +20,7 @@ import { VerdictTable } from './VerdictTable'
 
 const undone = new Set<string>()
 
-/** Everything that was measured and decided, the check of the promise, and the way back. */
+/** Everything that was measured and decided, the verification, and the way back. */
 export function AutotuneReport({
   drive,
   job,

@@ -8,13 +8,13 @@ import { ProblemNote } from './ProblemNote'
 import { useAction } from './useAction'
 
 /** What a motion changed and could not put back, with one press to do so once the drive answers. */
-export function OwedNote({ drive }: { drive: string }) {
+export function PendingRestoresNote({ drive }: { drive: string }) {
   const t = useT()
   const summary = useDrive(drive)
   const act = useAction()
   const [started, setStarted] = useState<string | null>(null)
   const told = <JobNote id={started} onClose={() => setStarted(null)} />
-  if (!summary || summary.owed.length === 0) return told
+  if (!summary || summary.pending_restores.length === 0) return told
   const path = { params: { path: { drive_id: drive } } }
   const putBack = () =>
     act.run(async () => {
@@ -22,17 +22,18 @@ export function OwedNote({ drive }: { drive: string }) {
       setJob(job)
       setStarted(job.id)
     })
-  const leave = () => act.run(() => ask(api.DELETE('/api/v1/drives/{drive_id}/owed', path)))
+  const leave = () =>
+    act.run(() => ask(api.DELETE('/api/v1/drives/{drive_id}/pending-restores', path)))
   return (
     <div className="note warn" role="alert">
       <p>
-        <strong>{t('owed.title', { count: summary.owed.length })}</strong>{' '}
+        <strong>{t('owed.title', { count: summary.pending_restores.length })}</strong>{' '}
         {t(summary.connected ? 'owed.offered' : 'owed.text')}
       </p>
       <details>
         <summary>{t('owed.which')}</summary>
         <dl className="facts">
-          {summary.owed.map((each) => (
+          {summary.pending_restores.map((each) => (
             <div key={each.key} className="pair">
               <dt>
                 <span className="mono">{each.key}</span> {each.name}
