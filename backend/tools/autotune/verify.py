@@ -218,7 +218,7 @@ def _by_raised_gain(missed: Missed) -> bool:
 
 
 def _wanted_db(missed: tuple[Missed, ...], promised: Goals) -> float:
-    """How much more gain is tried: where it is uncertain, the required margin less its tolerance."""
+    """How much more gain is tried; where uncertain, the required margin less its tolerance."""
     if any(each.what != "coverage" for each in missed):
         return promised.gain_margin_db - WORST_DB
     return min(promised.gain_margin_db - _NOT_SHOWN_DB, _MOST_SHOWN_DB)
