@@ -41,7 +41,7 @@ BENCH = {
 }  # fmt: skip
 OWED = {
     "serial": 7, "in_motion": False,
-    "entries": [{"key": "2005:03", "raw": 400, "left": [900], "unapplied": False}],
+    "debts": [{"key": "2005:03", "raw": 400, "left": [900], "unapplied": False}],
 }  # fmt: skip
 DRIVE = DriveIdentity(0x1, 0x2, 7, (("ethercat:eth1", 1),))
 

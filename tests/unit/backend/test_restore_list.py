@@ -76,7 +76,7 @@ def test_a_list_of_an_earlier_version_is_read_and_replaced(tmp_path: Path) -> No
     earlier = tmp_path / "owed" / "mms7-1.json"
     earlier.parent.mkdir()
     earlier.write_text(
-        '{"serial": 1234, "entries": [{"key": "6072:00", "raw": 3000, "left": [800],'
+        '{"serial": 1234, "debts": [{"key": "6072:00", "raw": 3000, "left": [800],'
         ' "unapplied": false}], "in_motion": false}'
     )
     lists = RestoreStore(tmp_path, "a server")
