@@ -20,6 +20,8 @@ from drivers.canopen.pdo import INVALID
 from drivers.canopen.port import CanPort
 from drivers.canopen.scanning import probe
 from drivers.canopen.url import CanUrl
+from drivers.dialect import dialect_of
+from drivers.doctor.can_diagnosis import EMERGENCY_CAUSES
 from drivers.doctor.can_evidence import BusFacts, CanEvidence
 from drivers.errors import DriveError, LinkLost, LinkTimeout, Rejected
 from profiles.schema import Profile
@@ -76,11 +78,14 @@ class Examiner:
             identity = profile.identity
             facts |= {"known_vendor": identity.vendor_id, "known_product": identity.product_code}
             facts["known_revision"] = identity.revision
+        own_status_word = profile is not None and dialect_of(profile).echoes_control
         self._cyclic.forget_arrivals()
         try:
             self._ask(node, facts)
         except LinkLost:
             facts["answers"] = 0
+        if own_status_word:
+            facts["status_word"] = None  # bit 9 has another meaning than that of CiA 402
         self._listen(begin_s)
         wanted, silent = self._cyclic.arrivals(node)
         facts |= {"started": wanted > 0, "pdos_wanted": wanted, "pdos_silent": silent}
@@ -205,7 +210,9 @@ class Examiner:
             "boots": sum(now_s - at_s < _RECENT_S for at_s in record.boots_s),
             "toggle_repeated": _recent(record.toggle_repeated_s, now_s),
             "emergency": code,
-            "emergency_open": bool(code),
+            # Some drives never report the end of an emergency: 603Fh shows that theirs is over.
+            "emergency_open": bool(code)
+            and (code in EMERGENCY_CAUSES or facts.get("drive_error") != 0),
             "foreign_master": _recent(record.foreign_master_s, now_s),
         }
 

@@ -78,7 +78,7 @@ async def test_after_a_notch_that_could_not_be_learned(monkeypatch: pytest.Monke
             b.axis, b.session, how, facts, outcome, found, silent()
         )
         units = await b.axis.units()
-        assert "beyond the limit" in said
+        assert "beyond the limit" in str(said)
         assert len(away.begun_rev) == 1
         assert abs(units.position(await b.axis.position_raw() - home)) < 0.05
         assert await b.axis.state() is not State.OPERATION_ENABLED

@@ -175,7 +175,7 @@ async def test_a_torque_that_does_not_change_is_refused() -> None:
             return blocks(without)
 
         b.link.blocks = frozen  # type: ignore[method-assign]
-        with pytest.raises(NotAllowed, match="does not change while the axis moves"):
+        with pytest.raises(NotAllowed, match="does not change during a reciprocating move"):
             await mapped(b.axis, b.session)
 
 
