@@ -20,6 +20,7 @@ from drivers.canopen.pdo import INVALID
 from drivers.canopen.port import CanPort
 from drivers.canopen.scanning import probe
 from drivers.canopen.url import CanUrl
+from drivers.dialect import dialect_of
 from drivers.doctor.can_evidence import BusFacts, CanEvidence
 from drivers.errors import DriveError, LinkLost, LinkTimeout, Rejected
 from profiles.schema import Profile
@@ -76,6 +77,7 @@ class Examiner:
             identity = profile.identity
             facts |= {"known_vendor": identity.vendor_id, "known_product": identity.product_code}
             facts["known_revision"] = identity.revision
+            facts["own_status_word"] = dialect_of(profile).echoes_control
         self._cyclic.forget_arrivals()
         try:
             self._ask(node, facts)
@@ -111,7 +113,8 @@ class Examiner:
         }  # fmt: skip
         for name, address in numbers_read.items():
             facts[name] = self._number(node, *address)
-        if (self._number(node, 0x1001, 0) or 0) & 1:
+        facts["error_register"] = register = self._number(node, 0x1001, 0)
+        if (register or 0) & 1:
             facts["emergency"] = (self._number(node, 0x1003, 1) or 0) & 0xFFFF or None
         facts["collisions"] = self._collisions(node, others)
         self._ask_state(node)
@@ -205,7 +208,9 @@ class Examiner:
             "boots": sum(now_s - at_s < _RECENT_S for at_s in record.boots_s),
             "toggle_repeated": _recent(record.toggle_repeated_s, now_s),
             "emergency": code,
-            "emergency_open": bool(code),
+            # Bit 0 of 1001h is set as long as there is any error (CiA 301 clause 7.5.2.2): some
+            # drives never take an emergency back by code 0.
+            "emergency_open": bool(code) and facts.get("error_register") != 0,
             "foreign_master": _recent(record.foreign_master_s, now_s),
         }
 
