@@ -99,6 +99,13 @@ class LocalDevice(SmallDevice):
         return value
 
 
+class FaultyDevice(SmallDevice):
+    """With an error that lasts: bit 0 of 1001h (CiA 301 clause 7.5.2.2)."""
+
+    def read(self, index: int, subindex: int) -> bytes:
+        return b"\x01" if (index, subindex) == (0x1001, 0) else super().read(index, subindex)
+
+
 class InputsOutputs(SmallDevice):
     """A node of CiA 401."""
 
@@ -281,14 +288,22 @@ CASES: tuple[CanCase, ...] = (
     CanCase("can_pdo_length", "PDO of one byte for two", _fault_and_short_pdo),
     CanCase("can_master_not_heard", "heartbeat of the master missing", _master_gone,
             as_it_is=True),
-    CanCase("can_drive_fault", "emergency 7305h", _emergency(0x7305), "code"),
-    CanCase("can_drive_fault", "emergency 3210h", _emergency(0x3210), "code"),
-    CanCase("can_overrun", "emergency 8110h", _emergency(0x8110), "code"),
-    CanCase("can_error_passive", "emergency 8120h", _emergency(0x8120), "code"),
-    CanCase("can_node_bus_off", "emergency 8140h", _emergency(0x8140), "code"),
-    CanCase("can_cob_id_collision", "emergency 8150h", _emergency(0x8150), "code"),
-    CanCase("can_sync_wrong", "emergency 8240h", _emergency(0x8240), "code"),
-    CanCase("can_outputs_late", "emergency 8250h", _emergency(0x8250), "code"),
+    CanCase("can_drive_fault", "emergency 7305h", _emergency(0x7305), "code",
+            device=FaultyDevice),
+    CanCase("can_drive_fault", "emergency 3210h", _emergency(0x3210), "code",
+            device=FaultyDevice),
+    CanCase("can_overrun", "emergency 8110h", _emergency(0x8110), "code",
+            device=FaultyDevice),
+    CanCase("can_error_passive", "emergency 8120h", _emergency(0x8120), "code",
+            device=FaultyDevice),
+    CanCase("can_node_bus_off", "emergency 8140h", _emergency(0x8140), "code",
+            device=FaultyDevice),
+    CanCase("can_cob_id_collision", "emergency 8150h", _emergency(0x8150), "code",
+            device=FaultyDevice),
+    CanCase("can_sync_wrong", "emergency 8240h", _emergency(0x8240), "code",
+            device=FaultyDevice),
+    CanCase("can_outputs_late", "emergency 8250h", _emergency(0x8250), "code",
+            device=FaultyDevice),
 )  # fmt: skip
 
 

@@ -21,7 +21,6 @@ from drivers.canopen.port import CanPort
 from drivers.canopen.scanning import probe
 from drivers.canopen.url import CanUrl
 from drivers.dialect import dialect_of
-from drivers.doctor.can_diagnosis import EMERGENCY_CAUSES
 from drivers.doctor.can_evidence import BusFacts, CanEvidence
 from drivers.errors import DriveError, LinkLost, LinkTimeout, Rejected
 from profiles.schema import Profile
@@ -78,14 +77,12 @@ class Examiner:
             identity = profile.identity
             facts |= {"known_vendor": identity.vendor_id, "known_product": identity.product_code}
             facts["known_revision"] = identity.revision
-        own_status_word = profile is not None and dialect_of(profile).echoes_control
+            facts["own_status_word"] = dialect_of(profile).echoes_control
         self._cyclic.forget_arrivals()
         try:
             self._ask(node, facts)
         except LinkLost:
             facts["answers"] = 0
-        if own_status_word:
-            facts["status_word"] = None  # bit 9 has another meaning than that of CiA 402
         self._listen(begin_s)
         wanted, silent = self._cyclic.arrivals(node)
         facts |= {"started": wanted > 0, "pdos_wanted": wanted, "pdos_silent": silent}
@@ -116,7 +113,8 @@ class Examiner:
         }  # fmt: skip
         for name, address in numbers_read.items():
             facts[name] = self._number(node, *address)
-        if (self._number(node, 0x1001, 0) or 0) & 1:
+        facts["error_register"] = register = self._number(node, 0x1001, 0)
+        if (register or 0) & 1:
             facts["emergency"] = (self._number(node, 0x1003, 1) or 0) & 0xFFFF or None
         facts["collisions"] = self._collisions(node, others)
         self._ask_state(node)
@@ -210,9 +208,9 @@ class Examiner:
             "boots": sum(now_s - at_s < _RECENT_S for at_s in record.boots_s),
             "toggle_repeated": _recent(record.toggle_repeated_s, now_s),
             "emergency": code,
-            # Some drives never report the end of an emergency: 603Fh shows that theirs is over.
-            "emergency_open": bool(code)
-            and (code in EMERGENCY_CAUSES or facts.get("drive_error") != 0),
+            # Bit 0 of 1001h is set as long as there is any error (CiA 301 clause 7.5.2.2): some
+            # drives never take an emergency back by code 0.
+            "emergency_open": bool(code) and facts.get("error_register") != 0,
             "foreign_master": _recent(record.foreign_master_s, now_s),
         }
 

@@ -177,7 +177,8 @@ def _identity(e: CanEvidence) -> Iterator[Sign]:
     refused = bool(e.refused_key)
     if e.revision and e.known_revision is not None and e.revision != e.known_revision and refused:
         yield "can_other_revision", 7, Fact("revision", e.revision, e.known_revision)
-    if e.status_word is not None and not e.status_word & _REMOTE:
+    known = e.status_word is not None and not e.own_status_word
+    if known and not (e.status_word or 0) & _REMOTE:
         fact = Fact("status_word_6041", f"{e.status_word:04X}h", "bit 9 = 1")
         yield "can_local_control", 4, fact
 

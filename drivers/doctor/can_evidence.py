@@ -65,7 +65,10 @@ class CanEvidence:
     known_product: int | None = None
     known_revision: int | None = None
     sync_cob: int | None = None
+    error_register: int | None = None
     status_word: int | None = None
+    own_status_word: bool = False
+    """Bits of 6041h are not those of CiA 402 (it echoes the control word): bit 9 says nothing."""
     drive_error: int | None = None
     pdos_wanted: int = 0
     pdos_silent: tuple[int, ...] = ()

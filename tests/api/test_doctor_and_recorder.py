@@ -141,7 +141,7 @@ def test_the_bundle_of_a_fault_has_the_frames(
 
 
 def doctor(running: Station, url: str, **query: int) -> list[dict[str, Any]]:
-    found = running.ok(running.http.get("/buses/doctor", params={"url": url} | query))
+    found = running.ok(running.http.get("/buses/doctor", params={"url": url, **query}))
     return list(found)
 
 
@@ -162,7 +162,7 @@ def test_a_node_that_waits_to_be_started_and_one_that_has_a_fault(station: Stati
     station.ok(station.http.post(f"/drives/{drive}/fault-reset", json={}))
     until(lambda: not station.state(drive)["faults"], what="no fault")
     (only,) = doctor(station, CAN, station=3)
-    assert [cause["code"] for cause in only["causes"]] == ["can_not_started"]
+    assert [cause["code"] for cause in only["causes"]] == ["can_not_started"], only
 
 
 def test_a_mute_node_is_named(station: Station) -> None:

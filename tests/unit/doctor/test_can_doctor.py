@@ -68,6 +68,10 @@ def test_an_emergency_that_was_taken_back_is_no_cause() -> None:
     assert diagnose(replace(WELL, emergency=0x8130, emergency_open=False)) == ()
 
 
+def test_a_status_word_of_the_makers_own_says_nothing_of_local_control() -> None:
+    assert diagnose(replace(WELL, status_word=0x0400, own_status_word=True)) == ()
+
+
 def test_the_revision_matters_only_where_something_was_refused() -> None:
     other = replace(WELL, revision=2, known_revision=3)
     assert diagnose(other) == ()

@@ -49,10 +49,18 @@ async def test_the_examination_starts_no_life_guarding(bench: Bench, link: Canop
     """The first request of guarding would start it (CiA 301 clause 7.2.8.3.2.1)."""
     read = bench.device.read
     held = {(0x100C, 0): b"\x64\0", (0x100D, 0): b"\x03"}
-    asked = []
+    asked: list[int] = []
     guard = bench.node._guard
-    bench.node._guard = lambda now: (asked.append(now), guard(now))  # type: ignore[method-assign]
-    bench.device.read = lambda i, s: held.get((i, s)) or read(i, s)  # type: ignore[method-assign]
+
+    def guarded(now: int) -> None:
+        asked.append(now)
+        guard(now)
+
+    def with_life_guarding(index: int, subindex: int) -> bytes:
+        return held.get((index, subindex)) or read(index, subindex)
+
+    bench.node._guard = guarded  # type: ignore[method-assign]
+    bench.device.read = with_life_guarding  # type: ignore[method-assign]
     await link.examination(NODE)
     assert asked == []
     held.clear()
