@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 NODE_FITS := $(shell node -e 'const [a, b] = process.versions.node.split(".").map(Number); console.log(a > 22 || (a == 22 && b >= 12) || (a == 20 && b >= 19) ? "yes" : "")' 2>/dev/null)
 NPM := $(if $(NODE_FITS),npm,$(CURDIR)/$(BIN)/python $(CURDIR)/hatch_build.py)
 PAGE := webui/dist/index.html
-PAGE_SOURCES := $(shell find webui/src webui/public -type f 2>/dev/null) webui/index.html \
+PAGE_SOURCES := $(shell find webui/src webui/public drivers/texts/catalogue -type f 2>/dev/null) webui/index.html \
 	webui/package.json webui/package-lock.json webui/vite.config.ts
 
 .PHONY: install run test bench fmt docs page clean check-python supply-chain wheels packages audit

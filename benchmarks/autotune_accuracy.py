@@ -64,7 +64,7 @@ async def tuned(
         f"GM {_kept(p.gain_margin_db, n.gain_margin_db, gm, 1.0, 3.0, db)} dB "
         f"Ms {_kept(-p.ms, -n.ms, m.get('ms'), 0.03 * p.ms, np.inf)} "
         f"{marked(_moving_s(found), 60.0, '.0f')}s of motion, {took_s:.0f} s in all  "
-        f"{'; '.join(found.notes + found.tried)}"
+        f"{'; '.join(str(each) for each in found.notes + found.tried)}"
     )
 
 

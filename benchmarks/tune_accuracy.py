@@ -231,11 +231,11 @@ def _moved(outcome: InertiaOutcome, spec: MechanicsSpec) -> str:
     j = r.inertia_kgm2.value / spec.total_inertia_kgm2 - 1
     tc = r.coulomb_nm.value / spec.friction.coulomb_nm - 1
     if not r.identifiable:
-        return f"J not identifiable: {r.verdict.splitlines()[0]}"
+        return f"J not identifiable: {r.reasons[0]}"
     limit = 0.02 if ratio <= 30 else 0.05
     return (
         f"J {j:+6.1%}{' ' if abs(j) <= limit else '!'} Tc {tc:+6.1%}"
-        f"{' ' if abs(tc) <= 0.1 else '!'} {r.verdict.splitlines()[0]}"
+        f"{' ' if abs(tc) <= 0.1 else '!'} {', '.join(r.reasons)}"
     )
 
 

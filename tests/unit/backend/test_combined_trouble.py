@@ -412,7 +412,7 @@ async def test_the_watch_over_a_drive_does_not_end_unseen(
     async with asyncio.timeout(60):
         while shown(x).fresh:  # noqa: ASYNC110 - polls what it shows
             await asyncio.sleep(0.01)
-    assert "a defect" in shown(x).problem
+    assert "a defect" in str(shown(x).problem)
     assert "cannot be shown" in caplog.text
     monkeypatch.undo()
     x.monitor.hurry()

@@ -104,4 +104,4 @@ async def test_canopen_has_no_such_service() -> None:
 
 def test_entries_without_an_object_are_kept() -> None:
     entries = dictionary_entries([EntryDescription(0x2000, 0, 6, 16, 7, "Alone")])
-    assert [(e.name, e.object_name, e.connected_drives) for e in entries] == [("Alone", "", 0)]
+    assert [(e.name, e.object_name, e.members) for e in entries] == [("Alone", "", 0)]

@@ -151,7 +151,7 @@ def test_a_watch_that_is_ended_says_that_nobody_saw_the_axis_stand() -> None:
             await bench.bench.motion.end_watches()
             axis = await asked
             assert axis["verdict"] == "unreachable"
-            assert "taken off the bench" in str(axis["problem"])
+            assert "removed from the axis list" in str(axis["problem"])
 
     run_simulated(main)
 

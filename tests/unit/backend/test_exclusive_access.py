@@ -89,7 +89,7 @@ async def test_a_question_under_way_ends_before_the_write_and_none_follows_it(
     assert (await reading).raw == 400
     await turns()
     assert slow.asked == [GAIN, SAVE]
-    assert quiet.rest.held
+    assert quiet.exclusive.held
     with pytest.raises(
         ExclusiveAccessHeld, match=r"X axis must not be asked for another 10 s.*stores"
     ):
@@ -114,7 +114,7 @@ async def test_a_long_reading_lets_the_storing_in_between(quiet: Drive, slow: Sl
     slow.answers.set()
     many = await reading
     assert any("must not be asked" in reading.error for reading in many.values())
-    assert quiet.rest.held
+    assert quiet.exclusive.held
     assert slow.asked[-1] == SAVE
     saving.cancel()
     await asyncio.wait([saving])
@@ -123,9 +123,9 @@ async def test_a_long_reading_lets_the_storing_in_between(quiet: Drive, slow: Sl
 async def test_a_short_rest_is_waited_for(quiet: Drive, slow: SlowLink) -> None:
     saving = begin(quiet, 0.05)
     await turns()
-    assert quiet.rest.held
+    assert quiet.exclusive.held
     assert (await quiet.read("2005:03")).raw == 400
-    assert saving.done() or not quiet.rest.held
+    assert saving.done() or not quiet.exclusive.held
     await saving
 
 
@@ -134,7 +134,7 @@ async def test_stop_goes_through_and_ends_the_rest(quiet: Drive, slow: SlowLink)
     await turns()
     await Axis(quiet).quick_stop()
     assert slow.asked == [SAVE, (0x6040, 0)]
-    assert not quiet.rest.held
+    assert not quiet.exclusive.held
     assert (await quiet.read("2005:03")).raw == 400
     saving.cancel()
     await asyncio.wait([saving])
@@ -145,7 +145,7 @@ async def test_two_cannot_have_it_alone(quiet: Drive) -> None:
     await turns()
     with pytest.raises(ExclusiveAccessHeld):
         await begin(quiet, 10.0)
-    assert quiet.rest.held
+    assert quiet.exclusive.held
     saving.cancel()
     await asyncio.wait([saving])
-    assert not quiet.rest.held
+    assert not quiet.exclusive.held
