@@ -89,7 +89,7 @@ def path_uncertainty(frequency_hz: FloatArray) -> ComplexArray:
 
 
 def charged(frf: Frf, lines_hz: FloatArray, uncertainty: ComplexArray) -> Frf:
-    """A wider band by a uncertainty that is known on ``lines_hz``."""
+    """A wider band by an uncertainty that is known on ``lines_hz``."""
     size, turn = (
         np.interp(frf.frequency_hz, lines_hz, x) for x in (uncertainty.real, uncertainty.imag)
     )
