@@ -76,7 +76,8 @@ COMMANDS = {
     ),
     "brake-test": (
         "tools:brake_test",
-        "Torque against the closed holding brake, both directions. The axis is energised.",
+        "Torque against the closed holding brake, both directions, until the test torque or slip. "
+        "The axis is energised.",
     ),
     "autotune": (
         "tune:autotune",

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import backend
-from backend.store import migrate
 from backend.store.files import write_atomically
 from backend.store.lock import FolderLock
 from drivers.errors import NotAllowed
@@ -82,6 +81,8 @@ def check(folder: Path) -> StateVersion | None:
     found = read(folder)
     if found is None:
         return None
+    from backend.store import migrate  # commands without a database need none of it
+
     unknown = found.revisions - migrate.known_revisions()
     if found.version > VERSION or unknown:
         raise StateRefused(
@@ -106,6 +107,8 @@ def bring_up_to_date(folder: Path) -> bool:
         StorageFailed: it cannot be written; the folder is of the version that was noted last.
     """
     found = check(folder)
+    from backend.store import migrate  # commands without a database need none of it
+
     revisions = migrate.known_revisions()
     wanted = StateVersion(VERSION, backend.__version__, revisions)
     if found == wanted:

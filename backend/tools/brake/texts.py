@@ -12,31 +12,31 @@ from backend.tools.brake.result import BrakeResult, BrakeWay, Verdict
 from backend.tools.tool import Chart, Line, Note, Row, Section
 
 TEXTS: dict[str, tuple[str, str]] = {
-    "title": ("Brake test", "制动器测试"),
+    "title": ("Brake test", "抱闸测试"),
     "help": (
         "Torque against the closed holding brake, both directions, until the test torque or slip. "
         "The axis is energised.",
-        "对闭合的保持制动器双向加转矩，直至测试转矩或打滑。轴会通电。",
+        "对闭合的保持抱闸双向加转矩，直至测试转矩或打滑。轴会通电。",
     ),
     "lead": (
         "The axis is energised while its holding brake stays closed, and the torque rises to the "
         "test torque, forwards and then backwards. Where the shaft moves by the slip limit, the "
         "torque is taken away in the next cycle.",
-        "保持制动器闭合时给轴通电，转矩先正向后反向升至测试转矩。轴移动达到打滑限值时，"
+        "保持抱闸闭合时给轴通电，转矩先正向后反向升至测试转矩。轴移动达到打滑限值时，"
         "在下一个周期撤去转矩。",
     ),
     "danger": (
         "DANGER. A hanging load falls where its brake slips: support it so that it can neither "
         "fall nor be lifted off its support, and let nobody be below it or within its reach.",
-        "危险。制动器打滑时悬挂负载会坠落：请将负载支撑牢固，使其既不能坠落也不会被抬离支撑，"
+        "危险。抱闸打滑时悬挂负载会坠落：请将负载支撑牢固，使其既不能坠落也不会被抬离支撑，"
         "其下方及可及范围内不得有人。",
     ),
     "warning": (
         "WARNING. The shaft may turn suddenly. Keep away from everything that it drives. On a "
         "drive that is told of no brake (its output has another function) nothing but this brake "
         "holds the axis.",
-        "警告。轴可能突然转动，请远离其驱动的所有部件。驱动器在测试期间不控制制动器（其输出已改为"
-        "其他功能），轴仅由该制动器保持。",
+        "警告。轴可能突然转动，请远离其驱动的所有部件。驱动器在测试期间不控制抱闸（其输出已改为"
+        "其他功能），轴仅由该抱闸保持。",
     ),
     "step.support": (
         "1. Move the load to its lowest place or support it there; lock the support.",
@@ -49,22 +49,22 @@ TEXTS: dict[str, tuple[str, str]] = {
     "step.state": (
         "3. State below what hangs at the axis, then start. Remove the support after a brake that "
         "held, and never after one that slipped.",
-        "3. 在下方声明轴上的悬挂情况，然后启动。制动器保持后方可撤去支撑；打滑后切勿撤去。",
+        "3. 在下方声明轴上的悬挂情况，然后启动。抱闸保持后方可撤去支撑；打滑后切勿撤去。",
     ),
     "state_first": ("State first what hangs at the axis.", "请先声明轴上的悬挂情况。"),
-    "start": ("Test the brake", "测试制动器"),
+    "start": ("Test the brake", "测试抱闸"),
     "field.test_percent": ("Test torque (% of rated)", "测试转矩（额定的 %）"),
     "field.test_torque_nm": ("Test torque (N·m), instead", "测试转矩 (N·m)，替代百分比"),
-    "field.brake_rated_nm": ("Rated torque of the brake (N·m)", "制动器额定转矩 (N·m)"),
+    "field.brake_rated_nm": ("Rated torque of the brake (N·m)", "抱闸额定转矩 (N·m)"),
     "field.slip_limit_rev": ("Slip limit (revolutions)", "打滑限值（圈）"),
     "field.ramp_s": ("Time of the ramp (s)", "斜坡时间 (s)"),
     "field.brake_supply_cut": (
         "I have disconnected the brake's supply",
-        "我已断开制动器电源",
+        "我已断开抱闸电源",
     ),
     "field.nothing_hangs": (
         "No load pulls at this axis, whether its brake holds or not",
-        "无论制动器是否保持，都没有负载拉动此轴",
+        "无论抱闸是否保持，都没有负载拉动此轴",
     ),
     "field.load_supported": (
         "The hanging load is supported and nobody is below it",
@@ -72,57 +72,57 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "verdict.held": (
         "The brake held {value} % of the motor's rated torque in both directions.",
-        "制动器双向保持了电机额定转矩的 {value} %。",
+        "抱闸双向保持了电机额定转矩的 {value} %。",
     ),
     "verdict.slipped": (
         "The brake slipped at {value} % of the motor's rated torque. Do not rely on it: secure "
         "the load, and have the brake repaired or replaced.",
-        "制动器在电机额定转矩的 {value} % 处打滑。请勿依赖该制动器：固定负载，并修理或更换制动器。",
+        "抱闸在电机额定转矩的 {value} % 处打滑。请勿依赖该抱闸：固定负载，并修理或更换抱闸。",
     ),
     "verdict.not_closed": (
         "The brake is not closed, or holds less than {value} % of the motor's rated torque. "
         "Secure the load; then look at the brake's wiring and at its output.",
-        "制动器未闭合，或保持转矩低于电机额定转矩的 {value} %。请固定负载，"
-        "然后检查制动器接线及其输出。",
+        "抱闸未闭合，或保持转矩低于电机额定转矩的 {value} %。请固定负载，"
+        "然后检查抱闸接线及其输出。",
     ),
-    "verdict.cannot_be_tested": ("The brake cannot be tested.", "无法测试制动器。"),
+    "verdict.cannot_be_tested": ("The brake cannot be tested.", "无法测试抱闸。"),
     "obstacle.means_unknown": (
         "Nothing is known of how this drive could keep its brake closed while it is enabled. "
         "Disconnect the brake's supply, state that, and start again.",
-        "不知道该驱动器在使能时如何保持制动器闭合。请断开制动器电源并声明，然后重新开始。",
+        "不知道该驱动器在使能时如何保持抱闸闭合。请断开抱闸电源并声明，然后重新开始。",
     ),
     "obstacle.built_in": (
         "The brake inside the motor opens with the power stage; the manual prints no other way.",
-        "电机内置制动器随功率级打开；手册未给出其他方式。",
+        "电机内置抱闸随功率级打开；手册未给出其他方式。",
     ),
     "obstacle.fixed_output": (
         "The drive's output for the brake opens it when the axis is enabled, and cannot be given "
         "another function. Disconnect the brake's supply, state that, and start again.",
-        "轴使能时驱动器的制动器输出会打开制动器，且无法改为其他功能。请断开制动器电源并声明，"
+        "轴使能时驱动器的抱闸输出会打开抱闸，且无法改为其他功能。请断开抱闸电源并声明，"
         "然后重新开始。",
     ),
     "obstacle.bus_bit": (
         "Process data rule the brake (60FEh), or the drive by itself: the manual's excerpt does "
         "not say which output, nor how to change its function. Disconnect the brake's supply, "
         "state that, and start again.",
-        "制动器由过程数据 (60FEh) 或驱动器自身控制：手册节选未说明是哪个输出，"
+        "抱闸由过程数据 (60FEh) 或驱动器自身控制：手册节选未说明是哪个输出，"
         "也未说明如何更改其功能。"
-        "请断开制动器电源并声明，然后重新开始。",
+        "请断开抱闸电源并声明，然后重新开始。",
     ),
     "obstacle.no_output": (
         "No output of the drive has the function of a brake. Where the drive does not control the "
         "brake, disconnect the brake's supply, state that, and start again.",
-        "驱动器没有具有制动器功能的输出。若制动器不由驱动器控制，请断开制动器电源并声明，然后重新开始。",
+        "驱动器没有具有抱闸功能的输出。若抱闸不由驱动器控制，请断开抱闸电源并声明，然后重新开始。",
     ),
     "obstacle.output_inverted": (
         "The brake's output has inverted logic, so that another function might open the brake. "
         "Disconnect the brake's supply, state that, and start again.",
-        "制动器输出为反逻辑，改为其他功能可能会打开制动器。请断开制动器电源并声明，然后重新开始。",
+        "抱闸输出为反逻辑，改为其他功能可能会打开抱闸。请断开抱闸电源并声明，然后重新开始。",
     ),
     "obstacle.output_forced": (
         "60FEh would switch the brake's output on as soon as it has another function. Release the "
         "forced outputs first.",
-        "一旦改为其他功能，60FEh 会接通制动器输出。请先释放强制输出。",
+        "一旦改为其他功能，60FEh 会接通抱闸输出。请先释放强制输出。",
     ),
     "obstacle.no_torque_mode": (
         "The drive takes no torque with every cycle over this bus (cyclic synchronous torque).",
@@ -143,17 +143,17 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "by.output": (
         "The brake was kept closed by its output, which had another function meanwhile.",
-        "制动器由其输出保持闭合，该输出在测试期间改为其他功能。",
+        "抱闸由其输出保持闭合，该输出在测试期间改为其他功能。",
     ),
     "by.supply": (
         "Somebody stated that the brake's supply was disconnected.",
-        "操作人员声明已断开制动器电源。",
+        "操作人员声明已断开抱闸电源。",
     ),
     "measured_at": ("Tested at {at} (UTC).", "测试时间 {at} (UTC)。"),
     "test_torque": ("Test torque", "测试转矩"),
     "torque.forward": ("Torque carried, forwards", "承受转矩，正向"),
     "torque.backward": ("Torque carried, backwards", "承受转矩，反向"),
-    "of_brake": ("Torque carried, of the brake's rating", "承受转矩，占制动器额定值"),
+    "of_brake": ("Torque carried, of the brake's rating", "承受转矩，占抱闸额定值"),
     "travel.forward": ("Travel, forwards", "行程，正向"),
     "travel.backward": ("Travel, backwards", "行程，反向"),
     "windup.forward": ("of it elastic windup, forwards", "其中弹性扭转，正向"),
