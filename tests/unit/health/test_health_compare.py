@@ -87,7 +87,7 @@ def test_at_most_one_false_alarm_in_a_hundred(
 ) -> None:
     """Also where repeats spread four times wider than on a good axis."""
     monkeypatch.setattr(
-        "tests.unit.health.test_compare.SPREAD", {k: wider * v for k, v in SPREAD.items()}
+        "tests.unit.health.test_health_compare.SPREAD", {k: wider * v for k, v in SPREAD.items()}
     )
     rng, draws = np.random.default_rng(20261123), 2000
     count = sum(bool(alarms(compare(*drawn(rng, noise, 3, {})))) for _ in range(draws))
