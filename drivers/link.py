@@ -176,7 +176,7 @@ class Link(Protocol):
         """Counters for one station or the whole bus. Never blocks."""
 
     def listen(self, listener: Callable[[LinkEvent], None]) -> Unsubscribe:
-        """Be told of events, on the event loop's thread."""
+        """Be notified of events, on the event loop's thread."""
 
 
 @runtime_checkable

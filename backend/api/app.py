@@ -19,7 +19,7 @@ from backend.api.audit.audited import AuditedAnswers
 from backend.api.described import DescribedApp
 from backend.api.drive import functions as routes_functions
 from backend.api.drive import motion_class as routes_motion_class
-from backend.api.drive import restore as routes_owed
+from backend.api.drive import restore as routes_pending
 from backend.api.drive import routes as routes_drive
 from backend.api.drive import scales as routes_scales
 from backend.api.drive import terminals as routes_io
@@ -81,7 +81,7 @@ _PROBLEMS = (
 _PARTS = (
     routes_bench,
     routes_drive,
-    routes_owed,
+    routes_pending,
     routes_ethercat,
     routes_doctor,
     routes_flight,

@@ -44,7 +44,7 @@ class Axis(ScaledAxis):
         #: The page by which it was left enabled; None where it was no page.
         self.enabled_by: str | None = None
         self._standing: Grant | None = None
-        #: Told why, when nobody may leave the axis enabled any longer; power is to be taken off.
+        #: Called with the reason when the axis must not stay enabled; power is to be taken off.
         self.unattended: Callable[[Text], None] = lambda _why: None
 
     @property

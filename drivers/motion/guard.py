@@ -60,5 +60,5 @@ class SpeedGuard:
 def _of(contradiction: Contradiction) -> Halted:
     kind = contradiction.kind
     return Halted(
-        HaltCause.CONTRADICTION, "speed", contradiction.told, contradiction.seen, kind.value
+        HaltCause.CONTRADICTION, "speed", contradiction.reported, contradiction.seen, kind.value
     )

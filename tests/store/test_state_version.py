@@ -39,7 +39,7 @@ BENCH = {
         }
     ],
 }  # fmt: skip
-OWED = {
+PENDING = {
     "serial": 7, "in_motion": False,
     "debts": [{"key": "2005:03", "raw": 400, "left": [900], "unapplied": False}],
 }  # fmt: skip
@@ -52,7 +52,7 @@ def first(tmp_path: Path) -> Path:
     folder = tmp_path / "state"
     for name, text in {
         "bench.json": json.dumps(BENCH),
-        "owed/x-axis.json": json.dumps(OWED),
+        "owed/x-axis.json": json.dumps(PENDING),
         "axes/x-axis.json": json.dumps({"mechanics": None, "watch": ["2005:03"]}),
         "sets/hand.sdset": "by hand",
     }.items():

@@ -222,7 +222,7 @@ async def delete_library_entry(
             recordings.library.delete(entry.name)
         elif (path := records.index.path(entry.kind, entry.name)) is not None:
             path.unlink(missing_ok=True)
-        records.library.told_deleted(entry)
+        records.library.reported_deleted(entry)
         records.index.refresh(recordings.running)
 
     await bench.records.store.call(work)

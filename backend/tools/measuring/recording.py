@@ -98,7 +98,7 @@ class _Catch:
         self.blocks += self._of_motion(block)
 
     def begin(self, first: int) -> None:
-        """The bus has told the number; what came meanwhile is looked through."""
+        """The bus has shown the number; what came meanwhile is looked through."""
         self.first = first
         self.blocks = [part for block in self.blocks for part in self._of_motion(block)]
 

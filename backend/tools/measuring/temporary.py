@@ -107,8 +107,8 @@ async def put_back_in_time(axis: Axis, before: Mapping[str, Raw]) -> None:
     try:
         await shielded(lambda: put_back(axis, before), CLEANUP_TIMEOUT_S, drive.name)
     except LinkTimeout as error:
-        owed = {entry.key: entry.raw for entry in drive.pending_restores.entries}
-        left = ", ".join(f"{key} (was {owed[key]})" for key in before if key in owed)
+        pending = {entry.key: entry.raw for entry in drive.pending_restores.entries}
+        left = ", ".join(f"{key} (was {pending[key]})" for key in before if key in pending)
         raise RestoreFailed(
             "measuring.not-restored-2",
             drive=drive.name,

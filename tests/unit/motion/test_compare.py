@@ -27,7 +27,7 @@ def places(rpm: float, hz: float, rest_s: float = 0.2) -> FloatArray:
 
 
 def speeds(position: FloatArray, late: int = 0, mean: int = 1) -> FloatArray:
-    """Mean speed over the cycles before each sample, told ``late`` cycles later."""
+    """Mean speed over the cycles before each sample, reported ``late`` cycles later."""
     padded = np.concatenate([np.full(late + mean, position[0]), position])
     before = padded[: len(position)]
     return np.asarray((padded[mean : mean + len(position)] - before) / (mean * CYCLE_S))

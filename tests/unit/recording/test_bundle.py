@@ -172,5 +172,5 @@ def test_what_a_full_disk_does_not_take_is_held_until_it_does(
         assert armed.names() == ["2023-11-14 22-13-20 X 0x3210.zip"], "the first cause"
 
     asyncio.run(play())
-    told = [entry.text for entry in journal.entries()]
-    assert sum("no support bundle" in text for text in told) == 2
+    reported = [entry.text for entry in journal.entries()]
+    assert sum("no support bundle" in text for text in reported) == 2

@@ -6531,7 +6531,7 @@ export interface components {
         };
         /**
          * JoinAsGuest
-         * @description The secret of an invitation's link, and the code that was told.
+         * @description The secret of an invitation's link, and the code that was reported.
          */
         JoinAsGuest: {
             /** Code */
@@ -6914,7 +6914,7 @@ export interface components {
             profile_version: string;
             /**
              * Program
-             * @description version of servodeck that measured; empty: not told
+             * @description version of servodeck that measured; empty: not reported
              */
             program: string;
             /** Result */
@@ -9286,7 +9286,7 @@ export interface components {
             next_most: number;
             /**
              * Raw Per Inc S
-             * @description what 606Ch told in it, per increment per second; null where not found
+             * @description what 606Ch showed in it, per increment per second; null where not found
              */
             raw_per_inc_s: number | null;
         };
