@@ -73,7 +73,7 @@ def test_a_list_goes_with_its_last_value_and_takes_older_ones_along(tmp_path: Pa
 
 
 def test_a_list_of_an_earlier_version_is_read_and_replaced(tmp_path: Path) -> None:
-    earlier = tmp_path / "pending" / "mms7-1.json"
+    earlier = tmp_path / "owed" / "mms7-1.json"
     earlier.parent.mkdir()
     earlier.write_text(
         '{"serial": 1234, "debts": [{"key": "6072:00", "raw": 3000, "left": [800],'
