@@ -18,8 +18,8 @@ import numpy.typing as npt
 from drivers.cia402 import State
 from drivers.dictionary import Described
 from drivers.errors import DriveError, NotAllowed
+from drivers.feedback import FeedbackScale
 from drivers.halt import LoopState
-from drivers.motion.feedback import FeedbackScale
 from drivers.texts.message import Text
 from profiles.schema import DataType, LinkKind, Profile
 

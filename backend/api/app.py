@@ -52,10 +52,10 @@ from backend.api.tuning import measure as routes_tune
 from backend.functions.forcing import ForcingSessions
 from backend.people.station import People
 from backend.recording.rerun_assets import ViewerAssets
-from backend.recording.rerun_feed import RerunFeed
-from backend.recording.service import Recordings
 from backend.scene.feed import SceneFeed
 from backend.station.bench import Bench
+from backend.station.recording.rerun_feed import RerunFeed
+from backend.station.recording.service import Recordings
 from drivers.computer import scheduling
 
 PREFIX = "/api/v1"

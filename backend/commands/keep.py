@@ -18,12 +18,12 @@ from backend.audit.trail import Filter
 from backend.commands.options import Json
 from backend.commands.session import reporting_errors
 from backend.commands.state import chosen_folder, state_folder
+from backend.library.backup.backup import make_backup
+from backend.library.backup.restore import restore as restore_archive
 from backend.library.entries import KINDS, Kind, Query
 from backend.parameters import set_file as parameter_set
 from backend.people.identity import LOCAL, Actor, acting
 from backend.station.records import Records
-from backend.store.backup import make_backup
-from backend.store.restore import restore as restore_archive
 from backend.work.journal import Journal
 from drivers.errors import NotAllowed
 

@@ -1,1 +1,1 @@
-"""Recordings: lossless to disk, kept through crashes and full disks, exported, and captured."""
+"""Recordings as files: written without loss through crashes and full disks, read, exported."""

@@ -6,7 +6,6 @@ import contextlib
 import errno
 import os
 import secrets
-import shutil
 import threading
 import time
 from bisect import bisect_right
@@ -18,6 +17,7 @@ from typing import BinaryIO
 
 from backend.recording import chunks
 from backend.store.files import StorageFailed
+from backend.store.free_space import RESERVE_BYTES, free_bytes
 from drivers.computer.files import write_parts
 from drivers.link import ScopeBlock
 
@@ -30,8 +30,6 @@ SYNC_S = 0.5
 GATHER_S, GATHER_BYTES = 0.1, 1024 * 1024
 #: Chunks of one write: each is at most five pieces, and the system takes 1024 (IOV_MAX).
 _WRITE_ITEMS = 200
-#: A recording ends while this much is still free, so that the rest of the system lives on.
-RESERVE_BYTES = 200 * 1024 * 1024
 
 
 _Item = tuple[int, ScopeBlock] | bytes
@@ -48,11 +46,6 @@ class Written:
     first_s: float | None = None
     last_s: float | None = None
     queued_bytes: int = 0
-
-
-def free_bytes(folder: Path) -> int:
-    """Free space of the disk that holds ``folder``."""
-    return shutil.disk_usage(folder).free
 
 
 class RecordingWriter:

@@ -1,6 +1,6 @@
 """Whether 606Ch and 6064h of a whole recording tell of the same motion.
 
-The loop watches them while the axis moves (`drivers.motion.feedback`) and must decide at once. A
+The loop watches them while the axis moves (`drivers.feedback`) and must decide at once. A
 recording shows more: also at low speeds and to and fro, and before anything is computed from 606Ch.
 """
 
@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from drivers.feedback import FeedbackScale, disagreement
 from drivers.halt import HaltCause, Halted
-from drivers.motion.feedback import FeedbackScale, disagreement
 
 FloatArray = npt.NDArray[np.float64]
 

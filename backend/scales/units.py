@@ -14,7 +14,7 @@ from backend.scales.resolve import by_text, origin_of, read_reported, scales_of
 from backend.scales.scale import Origin, Quantity, Scale, Scales, ScaleUnknown, Uncertainty
 from backend.scales.taught import Taught
 from drivers.errors import NotAllowed, OutOfRange
-from drivers.motion.feedback import FeedbackScale
+from drivers.feedback import FeedbackScale
 from profiles.schema import Parameter, UnitSpec
 
 #: Raw units per 1 % of rated torque.

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from backend.scales.units import AxisUnits
+from drivers.feedback import Disagreement, disagreement
 from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted, quantity_key
-from drivers.motion.feedback import Disagreement, disagreement
 from drivers.texts.message import Text, text
 
 _MEANING = {

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from backend.recording.writer import RESERVE_BYTES, free_bytes
 from backend.store.files import StorageFailed, checked_name, write_atomically
+from backend.store.free_space import RESERVE_BYTES, free_bytes
 from drivers.errors import NotAllowed
 
 SETUP_SUFFIX, SNAPSHOT_SUFFIX = ".json", ".sdsnap"

@@ -9,8 +9,8 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from backend.axis.stop.facts import AxisStop, Verdict
 from backend.station.connected_drive import ConnectedDrive
-from backend.stopping.facts import AxisStop, Verdict
 from backend.stopping.stop_message import stop_message
 from backend.stopping.watch import StopWatch
 from drivers.errors import Busy, DriveError, internal_error

@@ -1,1 +1,1 @@
-"""STOP until standstill: the quick stop, the watch over the measured speed, and what follows."""
+"""STOP until standstill: the watch over the measured speed, and what follows a quick stop."""

@@ -17,8 +17,8 @@ from dataclasses import replace
 from backend.axis import loop
 from backend.axis.axis import Axis
 from backend.axis.restoring import shielded
-from backend.stopping.facts import AxisStop, StepCode, Verdict
-from backend.stopping.settings import (
+from backend.axis.stop.facts import AxisStop, StepCode, Verdict
+from backend.axis.stop.settings import (
     OPTION,
     deceleration_rpm_s,
     known_settings,

@@ -1,1 +1,1 @@
-"""Database and files of a station: tables, migrations, blobs, backup."""
+"""Database and files of a station: tables, migrations, blobs, free space."""

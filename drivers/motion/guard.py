@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from drivers.halt import HaltCause, Halted
-from drivers.motion.feedback import (
+from drivers.feedback import (
     LIMIT_MARGIN,
     WINDOW_S,
     Contradiction,
     FeedbackScale,
     FeedbackWatch,
 )
+from drivers.halt import HaltCause, Halted
 
 
 class SpeedGuard:

@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 from backend import cli
-from backend.recording import capture
+from backend.station.recording import capture
 from drivers.virtual.wires.netns import unavailable
 from tests.support.station import HANG_S, Station, until
 

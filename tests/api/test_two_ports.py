@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from backend.recording import capture
+from backend.station.recording import capture
 from profiles import load_profile
 from tests.support.jogging import jogged
 from tests.support.machine import within

@@ -14,16 +14,16 @@ from typer.testing import CliRunner
 import backend
 from backend.cli import app
 from backend.library import Library
+from backend.library.backup.backup import make_backup
+from backend.library.backup.restore import restore
 from backend.library.entries import Addition, Query
 from backend.restore.identity import DriveIdentity
 from backend.restore.store import RestoreStore
 from backend.station.drive_list import DriveList
 from backend.station.records import Records
 from backend.store import migrate, state_version
-from backend.store.backup import make_backup
 from backend.store.blobs import Blobs
 from backend.store.database import Store
-from backend.store.restore import restore
 from backend.store.state_version import FILE, VERSION, StateRefused
 from backend.work.journal import Journal
 from drivers.errors import Busy

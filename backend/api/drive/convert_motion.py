@@ -10,7 +10,8 @@ from backend.api.drive.models_motion import (
 )
 from backend.api.live.messages import JogStart
 from backend.axis.axis import Envelope
-from backend.scales.travel_units import REVOLUTIONS, TravelUnit, travel_unit
+from backend.motion.travel_unit import REVOLUTIONS, TravelUnit
+from backend.scales.travel_units import travel_unit
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.jog.cyclic import GeneratorSettings

@@ -26,8 +26,8 @@ from backend.api.times import in_utc
 from backend.library import NotInLibrary, sharing
 from backend.library.entries import Entry
 from backend.library.entries import Query as LibraryQuery
-from backend.recording.service import Recordings
 from backend.station.bench import Bench
+from backend.station.recording.service import Recordings
 from drivers.errors import NotAllowed
 
 router = APIRouter(prefix="/library")

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from backend.axis.axis import Axis, Envelope
 from backend.axis.polled import PolledGuard
 from backend.drive.optional import ramp_keys
-from backend.scales.travel_units import REVOLUTIONS, TravelUnit
+from backend.motion.travel_unit import REVOLUTIONS, TravelUnit
 from backend.scales.units import AxisUnits, ramp_raw
 from backend.tools.jog.hold import GAP_S, Hold
 from backend.work.jobs import JobResult, Progress

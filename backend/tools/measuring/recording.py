@@ -32,7 +32,7 @@ from backend.work.jobs import Progress
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed
-from drivers.motion.feedback import FeedbackScale
+from drivers.feedback import FeedbackScale
 from drivers.texts.message import Text
 
 _RENEW_S = 0.03

@@ -7,8 +7,8 @@ from contextlib import asynccontextmanager
 
 from backend.axis.axis import Axis
 from backend.axis.restoring import CLEANUP_TIMEOUT_S, PUT_BACK_LATER, RestoreFailed, shielded
+from backend.axis.stop.quick_stop import quick_stop_keys, raise_quick_stop_from
 from backend.drive.optional import existing
-from backend.stopping.quick_stop import quick_stop_keys, raise_quick_stop_from
 from backend.tools.moves.procedures import run_procedure
 from backend.work.jobs import Progress
 from drivers.cia402 import State

@@ -22,8 +22,8 @@ from backend.api.drive.models_motion import (
 from backend.api.live.messages import JogStart
 from backend.axis.axis import Envelope
 from backend.axis.remembered import AxisRecord
+from backend.motion.travel_unit import REVOLUTIONS, TravelUnit
 from backend.scales.gear_calculator import Mechanics
-from backend.scales.travel_units import REVOLUTIONS, TravelUnit
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.jog import run as jogging

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.recording import capture
 from backend.recording.bundle import build_apart
 from backend.recording.bundle_page import PLOT_HEIGHT, curve
 from backend.recording.evidence import Evidence, Value
 from backend.recording.reader import RecordingReader
-from backend.recording.recorder import Trigger, fires
+from backend.station.recording import capture
+from backend.station.recording.recorder import Trigger, fires
 from backend.work.journal import Entry, Journal
 from tests.unit.recording.support import block, header
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from backend.recording.rerun_feed import MAGIC, MAX_CLIENT_BYTES, FeedClient
+from backend.station.recording.rerun_feed import MAGIC, MAX_CLIENT_BYTES, FeedClient
 
 
 def parse(frame: bytes) -> tuple[int, int, list[bytes]]:

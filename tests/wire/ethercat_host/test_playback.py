@@ -9,8 +9,8 @@ import pytest
 
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
+from drivers.feedback import FeedbackScale
 from drivers.halt import HaltCause, Halted
-from drivers.motion.feedback import FeedbackScale
 from drivers.motion.playback import LET_GO_S, STOP_S, AxisLoop
 from drivers.motion.setpoint_plan import Limits, Motion, Phase
 

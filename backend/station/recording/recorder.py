@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from backend import __version__
-from backend.recording import facts
-from backend.recording.streams import describe_streams
 from backend.recording.writer import RecordingWriter, Written
 from backend.scope.hub import Subscription
 from backend.station.bench import Bench
+from backend.station.recording import facts
+from backend.station.recording.streams import describe_streams
 from backend.store.files import StorageFailed
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.link import ScopeBlock

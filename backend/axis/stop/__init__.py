@@ -1,0 +1,1 @@
+"""The quick stop of one axis: its settings, how it is raised, what brakes where it would coast."""

@@ -1,0 +1,1 @@
+"""Recording of a running station: the recorder, the capture of faults, the live feed."""
