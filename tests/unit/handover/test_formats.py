@@ -235,8 +235,9 @@ def test_ros2_follows_the_documented_fields(family: str) -> None:
     axis = axis_of(family)
     content = yaml.safe_load(made(family, "ros2"))
     if axis.profile.link("ethercat") is None:
-        assert content["drive"]["dcf"] == "list.dcf"
-        assert [row["index"] for row in content["drive"]["sdo"]] == [w.index for w in axis.writes]
+        drive = content["nodes"]["drive"]
+        assert drive["dcf"] == "list.dcf"
+        assert [row["index"] for row in drive["sdo"]] == [w.index for w in axis.writes]
         return
     assert set(content) <= ROS2_TOP
     assert (content["vendor_id"], content["product_id"]) == (VENDOR, PRODUCT)
