@@ -22,6 +22,7 @@ from backend.handover.files import (
     Format,
     digest,
     files_of,
+    fitting,
     remarks,
     with_controller,
 )
@@ -78,9 +79,12 @@ def export(
         keys = [key.strip().upper() for key in only.split(",") if key.strip()]
         contents = [set_of(file) for file in sets]
         axes = [
-            hand_over(
-                content, load_profile(content.profile), choice=choice, only=keys,
-                motor_individual=motor_individual,
+            fitting(
+                hand_over(
+                    content, load_profile(content.profile), choice=choice, only=keys,
+                    motor_individual=motor_individual,
+                ),
+                chosen,
             )
             for content in contents
         ]  # fmt: skip
