@@ -184,13 +184,17 @@ def _show(verdict: Verdict, form: str, *, as_json: bool) -> None:
         print(f"{conflict.consequence}: {conflict.sentence}{both}")
     for finding in verdict.findings:
         print(f"{finding.kind}: {finding.text}")
-    for key in verdict.unknown_here:
-        print(f"not compared: {key}: neither set nor drive gives a value")
+    if verdict.unknown_here:
+        keys = ", ".join(verdict.unknown_here)
+        print(f"not compared, neither set nor drive gives a value: {keys}")
+    if verdict.not_read:
+        print(f"not read from the drive, compare again: {', '.join(verdict.not_read)}")
     print(
         f"{form}: {len(verdict.conflicts)} conflicts, {verdict.same} equal, "
         f"{len(verdict.restored)} changed in the drive and restored by the controller, "
         f"{len(verdict.findings)} defects of the list, {len(verdict.not_written)} values of the "
-        "set that the controller does not write"
+        f"set that the controller does not write, {len(verdict.not_read)} values that the drive "
+        "did not give"
     )
 
 

@@ -53,6 +53,7 @@ def check_commands(tmp_path: Path, *where: str) -> None:
     # Nothing was changed yet: the list is what the drive holds.
     found = conflicts_of(str(listed), bus, "--set", str(held), *options)
     assert (found["conflicts"], found["findings"], found["restored"]) == ([], [], [])
+    assert found["not_read"] == []
     assert found["same"] > 50
     assert json.loads(call("handover", "watch", str(held), bus, *options, "--json")) == {
         "changed": [], "not_read": [],
@@ -137,7 +138,7 @@ def test_export_compare_and_changes(station: Station, x: str, held: str) -> None
     compare = f"/drives/{x}/handover/compare"
     query = {"file": "start.xml", "set_file": held}
     found = station.ok(station.http.post(compare, params=query, content=listed))
-    assert (found["conflicts"], found["defects"]) == ([], [])
+    assert (found["conflicts"], found["defects"], found["not_read"]) == ([], [], [])
     assert found["same"] == made["writes"]
 
     before = station.ok(station.http.get(f"/drives/{x}/parameters/{GAIN}"))["raw"]

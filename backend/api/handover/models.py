@@ -118,6 +118,7 @@ class HandoverComparison(Message):
     not_written: list[str] = Field(description="of our set, not written by the controller")
     restored: list[str] = Field(description="changed in the drive; the controller writes ours")
     unknown_here: list[str] = Field(description="neither set nor drive gives a value")
+    not_read: list[str] = Field(description="the drive was asked and gave no value")
     same: int
 
 

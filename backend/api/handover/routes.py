@@ -200,6 +200,7 @@ async def compare_handover(
         not_written=list(verdict.not_written),
         restored=list(verdict.restored),
         unknown_here=list(verdict.unknown_here),
+        not_read=list(verdict.not_read),
         same=verdict.same,
     )
 

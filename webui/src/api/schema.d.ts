@@ -5443,6 +5443,11 @@ export interface components {
             /** Format */
             format: string;
             /**
+             * Not Read
+             * @description the drive was asked and gave no value
+             */
+            not_read: string[];
+            /**
              * Not Written
              * @description of our set, not written by the controller
              */

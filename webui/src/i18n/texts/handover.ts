@@ -79,6 +79,10 @@ export const handover = {
     'Not compared, because neither the set nor the drive gives a value: {keys}',
     '因参数集和驱动器均无值而未比较：{keys}',
   ],
+  'handover.unreadNow': [
+    'The drive gave no value of these, so whether the controller changes them there is not known; compare again: {keys}',
+    '驱动器未给出以下参数的值，因此不知道控制器是否会更改它们，请重新比较：{keys}',
+  ],
   'handover.notWritten': [
     '{count} {count|value|values} of the set are not written by the controller and stay as the drive keeps them.',
     '控制器不会写入参数集中的 {count} 个值，它们保持驱动器中的值。',
