@@ -332,6 +332,9 @@ class GainSpec(Frozen):
     )
     inertia: str | None = Field(default=None, description="load or total inertia parameter")
     inertia_meaning: Literal["ratio_percent", "ratio", "total", "load"] | None = None
+    groups: tuple[str, ...] = Field(
+        default=(), description="further groups of parameters that tuning sets, as feed-forward"
+    )
     source: str
     notes: str = ""
 

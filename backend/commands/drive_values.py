@@ -22,7 +22,10 @@ class Now(NamedTuple):
 
 
 async def values_now(place: Place, keys: Collection[str] = ()) -> Now:
-    """Read these parameters; keys that the drive does not have are left out."""
+    """Read these parameters; keys that the drive does not have are left out.
+
+    What a slow drive did not give is asked for once more.
+    """
     if place.server is None:
         async with drive_at(place.url, place.station, place.profile) as drive:
             known = [
@@ -33,6 +36,8 @@ async def values_now(place: Place, keys: Collection[str] = ()) -> Now:
                 and not drive.unreachable_why(parameter)
             ]
             read = await drive.read_many(known, show_progress) if known else {}
+            missing = [key for key in known if key not in read or read[key].raw is None]
+            read |= await drive.read_many(missing) if missing else {}
             return Now(drive.name, drive.profile, {key: r.raw for key, r in read.items()})
     async with remote_drive(place) as (at, summary):
         profile = load_profile(summary.profile)
@@ -40,9 +45,13 @@ async def values_now(place: Place, keys: Collection[str] = ()) -> Now:
         readable = [
             key for key in keys if key in profile.by_key and profile.by_key[key].access != "wo"
         ]
-        if readable:
-            await at.result(f"/drives/{summary.id}/jobs/read_all", {"keys": readable})
+        missing = readable
+        for _ in range(2):
+            if not missing:
+                break
+            await at.result(f"/drives/{summary.id}/jobs/read_all", {"keys": missing})
             rows = await at.ask("GET", f"/drives/{summary.id}/parameters", list[ParameterRow])
             wanted = set(readable)
             raws = {row.key: row.reading.raw for row in rows if row.key in wanted and row.reading}
+            missing = [key for key in readable if raws.get(key) is None]
         return Now(summary.name, profile, raws)

@@ -22,6 +22,7 @@ from backend.handover.files import (
     Format,
     digest,
     files_of,
+    fitting,
     remarks,
     with_controller,
 )
@@ -78,9 +79,12 @@ def export(
         keys = [key.strip().upper() for key in only.split(",") if key.strip()]
         contents = [set_of(file) for file in sets]
         axes = [
-            hand_over(
-                content, load_profile(content.profile), choice=choice, only=keys,
-                motor_individual=motor_individual,
+            fitting(
+                hand_over(
+                    content, load_profile(content.profile), choice=choice, only=keys,
+                    motor_individual=motor_individual,
+                ),
+                chosen,
             )
             for content in contents
         ]  # fmt: skip
@@ -180,13 +184,17 @@ def _show(verdict: Verdict, form: str, *, as_json: bool) -> None:
         print(f"{conflict.consequence}: {conflict.sentence}{both}")
     for finding in verdict.findings:
         print(f"{finding.kind}: {finding.text}")
-    for key in verdict.unknown_here:
-        print(f"not compared: {key}: neither set nor drive gives a value")
+    if verdict.unknown_here:
+        keys = ", ".join(verdict.unknown_here)
+        print(f"not compared, neither set nor drive gives a value: {keys}")
+    if verdict.not_read:
+        print(f"not read from the drive, compare again: {', '.join(verdict.not_read)}")
     print(
         f"{form}: {len(verdict.conflicts)} conflicts, {verdict.same} equal, "
         f"{len(verdict.restored)} changed in the drive and restored by the controller, "
         f"{len(verdict.findings)} defects of the list, {len(verdict.not_written)} values of the "
-        "set that the controller does not write"
+        f"set that the controller does not write, {len(verdict.not_read)} values that the drive "
+        "did not give"
     )
 
 

@@ -67,6 +67,9 @@ class Verdict:
     """Keys whose value in the drive is another one now; the controller writes that of our set."""
     unknown_here: tuple[str, ...]
     """Keys that the controller writes and of which neither set nor drive gives a value."""
+    not_read: tuple[str, ...]
+    """Keys that the controller writes and of which the drive, though asked, gave no value: whether
+    the controller changes them there is not known."""
     same: int
 
 
@@ -121,9 +124,18 @@ def compare(
         else:
             same += 1
     missing = tuple(key for key in ours or () if key not in last)
-    return Verdict(
-        tuple(conflicts), diagnose(profile, listed), missing, tuple(restored), tuple(alone), same
+    unread = tuple(
+        key
+        for key in last
+        if drive is not None
+        and drive.get(key) is None
+        and key in profile.by_key
+        and profile.by_key[key].access != "wo"
     )
+    return Verdict(
+        tuple(conflicts), diagnose(profile, listed), missing, tuple(restored), tuple(alone),
+        unread, same,
+    )  # fmt: skip
 
 
 def changed_since(

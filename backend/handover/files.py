@@ -8,7 +8,7 @@ from dataclasses import replace
 from datetime import datetime
 from typing import Literal, get_args
 
-from backend.handover import text_lists, xml_lists
+from backend.handover import ros2_files, text_lists, xml_lists
 from backend.handover.eni import eni, is_complete
 from backend.handover.esi import controller_of
 from backend.handover.model import AxisHandover
@@ -24,6 +24,8 @@ SUFFIXES: dict[Format, str] = {
     "twincat": ".xml", "codesys": ".csv", "eni": ".xml", "lcec": ".xml", "ros2": ".yaml",
     "igh": ".sh", "dcf": ".dcf", "csv": ".csv", "python": ".py",
 }  # fmt: skip
+#: Formats by which a controller compares vendor ID and product code with the drive's own.
+_WITH_IDENTITY = ("eni", "lcec", "ros2")
 _ETHERCAT_ONLY = ("twincat", "codesys", "eni", "lcec", "igh")
 
 
@@ -48,6 +50,7 @@ def files_of(
         )
     for axis in axes:
         _require_bus(axis, form)
+    axes = [fitting(axis, form) for axis in axes]
     files = _list(axes, form, name, saved)
     for number, axis in enumerate(axes, 1):
         place = "" if len(axes) == 1 else f".{number}"
@@ -55,14 +58,30 @@ def files_of(
     return files
 
 
+def fitting(axis: AxisHandover, form: Format) -> AxisHandover:
+    """The axis with what this format can carry; the rest is left out, with its reason.
+
+    Raises:
+        NotAllowed: the format carries nothing of it.
+    """
+    return ros2_files.carried(axis) if form == "ros2" else axis
+
+
 def remarks(axes: Sequence[AxisHandover], form: Format) -> tuple[str, ...]:
     """What a person must know of this very format before the file is used."""
+    found = []
     if form == "eni" and not is_complete(axes):
-        return (
+        found.append(
             "no master can run this ENI: it has no mailbox addresses, registers and frames; "
-            "give each drive's ESI file",
+            "give each drive's ESI file"
         )
-    return ()
+    found += [
+        f"{axis.name}: the vendor ID of the set is 0, which no drive has on EtherCAT: a controller "
+        "that compares identities finds no such drive"
+        for axis in axes
+        if form in _WITH_IDENTITY and axis.vendor_id == 0 and axis.profile.link("ethercat")
+    ]
+    return tuple(found)
 
 
 def with_controller(axis: AxisHandover, esi_files: Sequence[tuple[bytes, str]]) -> AxisHandover:
@@ -133,18 +152,19 @@ def _ros2(axes: list[AxisHandover], name: str, saved: datetime | None) -> dict[s
     if any(wired) and not all(wired):
         raise NotAllowed("handover.drives-ethercat-canopen-no")
     if len(axes) == 1 and all(wired):
-        return {name: text_lists.ros2(axes[0])}
+        return {name: ros2_files.ros2(axes[0])}
     suffix = "yaml" if all(wired) else "dcf"
     others = [
         f"{name}.{suffix}" if len(axes) == 1 else f"{name}.{number}.{suffix}"
         for number in range(1, len(axes) + 1)
     ]
     if all(wired):
-        files = {name: text_lists.ros2_control(axes, others)}
+        files = {name: ros2_files.ros2_control(axes, others)}
         return files | {
-            other: text_lists.ros2(axis) for other, axis in zip(others, axes, strict=True)
+            other: ros2_files.ros2(axis) for other, axis in zip(others, axes, strict=True)
         }
-    files = {name: text_lists.bus_yml(axes, others)}
+    files = {name: ros2_files.bus_yml(axes, others)}
     return files | {
-        other: text_lists.dcf(axis, other, saved) for other, axis in zip(others, axes, strict=True)
+        other: text_lists.dcf(axis, other, saved, reals_as_bits=True)
+        for other, axis in zip(others, axes, strict=True)
     }

@@ -126,12 +126,13 @@ class AxisHandover:
 
 
 def gain_keys(profile: Profile) -> frozenset[str]:
-    """Keys that tuning changes: the maker's group of loop gains, filters, notches and stiffness."""
+    """Keys that tuning changes: the maker's groups of loop gains, of feed-forward and of filters as
+    the profile names them, notches and stiffness."""
     found: set[str] = set()
     if (gains := profile.gains) is not None:
         speed = profile.by_key.get(gains.speed or "")
-        if speed is not None and speed.group:
-            found |= {p.key for p in profile.parameters if p.group == speed.group}
+        groups = {*gains.groups, speed.group if speed is not None else ""} - {""}
+        found |= {p.key for p in profile.parameters if p.group in groups}
         found |= {
             key
             for key in (

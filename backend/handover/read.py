@@ -108,7 +108,7 @@ def _by_contents(data: bytes, profile: Profile, name: str, slave: int | None) ->
         return ControllerList("csv", tuple(_csv(text)))
     if any(_DOWNLOAD.match(line) for line in text.splitlines()):
         return ControllerList("igh", tuple(_igh(text)))
-    if re.search(r"^\s*(sdo|vendor_id)\s*:", text, re.M):
+    if re.search(r"^\s*(sdo|vendor_id|nodes)\s*:", text, re.M):
         return ControllerList("ros2", tuple(_ros2(text, profile, slave)))
     raise BadSet("handover.no-start-up-list", name=name)
 
@@ -300,10 +300,10 @@ def _ros2(text: str, profile: Profile, slave: int | None) -> Iterator[Listed]:
     content = yaml.safe_load(text)
     rows = content.get("sdo") if isinstance(content, dict) else None
     if rows is None and isinstance(content, dict):
-        nodes = [n for n in content.values() if isinstance(n, dict) and "sdo" in n]
+        nodes = _bus_nodes(content)
         chosen = (slave or 1) - 1
         known = chosen < len(nodes) and (slave is not None or len(nodes) == 1)
-        rows = nodes[chosen]["sdo"] if known else None
+        rows = nodes[chosen] if known else None
     for number, row in enumerate(rows if isinstance(rows, list) else [], 1):
         place = f"sdo {number}"
         if not isinstance(row, dict):
@@ -314,6 +314,21 @@ def _ros2(text: str, profile: Profile, slave: int | None) -> Iterator[Listed]:
             raise _Bad(f"{place}: type {str(kind)[:40]!r} is not known")
         data = _sized(value, _SIZE[kind], place)
         yield _listed(index, subindex, data, "PS", place)
+
+
+def _bus_nodes(content: dict[Any, Any]) -> list[Any]:
+    """Rows of each node of a bus.yml: under `nodes` with `defaults`, or each at the top."""
+    named = content.get("nodes")
+    if isinstance(named, list):
+        named = {
+            key: each for part in named if isinstance(part, dict) for key, each in part.items()
+        }
+    if isinstance(named, dict):
+        defaults = content.get("defaults")
+        shared = defaults.get("sdo") if isinstance(defaults, dict) else None
+        found = [each.get("sdo", shared) for each in named.values() if isinstance(each, dict)]
+        return [rows for rows in found if rows is not None]
+    return [each["sdo"] for each in content.values() if isinstance(each, dict) and "sdo" in each]
 
 
 def _profile_type(profile: Profile, index: int, subindex: int) -> str:

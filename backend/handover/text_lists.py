@@ -1,16 +1,13 @@
-"""Start-up lists as text: CODESYS, CSV, IgH shell script, ROS 2 YAML, DCF and a Python script."""
+"""Start-up lists as text: CODESYS, CSV, IgH shell script, DCF and a Python script."""
 
 from __future__ import annotations
 
 import csv
 import io
-import math
 import struct
-from collections.abc import Sequence
 from datetime import UTC, datetime
-from xml.sax.saxutils import escape
 
-from backend.handover.model import AxisHandover, MappedEntry, StartupWrite
+from backend.handover.model import AxisHandover, StartupWrite
 from profiles.importer import export_dcf
 from profiles.schema import Parameter, Raw
 
@@ -26,14 +23,6 @@ CSV_COLUMNS = (
 #: Neither ethercat_driver_ros2 nor all versions of `ethercat download` take a REAL32: its four
 #: bytes are handed over as a number, which is the same on the wire.
 _AS_NUMBER = {"REAL32": "uint32", "BOOL": "uint8"}
-_ROLES = {
-    "position_target": ("command_interface", "position"),
-    "velocity_target": ("command_interface", "velocity"),
-    "torque_target": ("command_interface", "effort"),
-    "position_actual": ("state_interface", "position"),
-    "velocity_actual": ("state_interface", "velocity"),
-    "torque_actual": ("state_interface", "effort"),
-}
 
 
 def number_type(write: StartupWrite) -> str:
@@ -41,18 +30,19 @@ def number_type(write: StartupWrite) -> str:
     return _AS_NUMBER.get(write.type, write.type.lower())
 
 
-def _number(write: StartupWrite) -> int:
+def number_of(write: StartupWrite) -> int:
+    """Value as a whole number of `number_type`."""
     return write.number if write.type in _AS_NUMBER else int(write.raw)
 
 
-def _line(text: str) -> str:
+def line_of(text: str) -> str:
     """One line of it without control characters: no value of a file may begin a line of its own."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def _cell(text: str) -> str:
     """A cell that no spreadsheet takes for a formula."""
-    text = _line(text)
+    text = line_of(text)
     return f"'{text}" if text[:1] in ("=", "+", "-", "@") else text
 
 
@@ -90,8 +80,8 @@ def igh(axis: AxisHandover) -> bytes:
     """Shell script of `ethercat download`; it ends at the first write that fails."""
     lines = [
         "#!/bin/sh",
-        f"# Start-up values of {_line(axis.name)}, to be written in Pre-Operational.",
-        *(f"# {_line(note)}" for note in axis.notes),
+        f"# Start-up values of {line_of(axis.name)}, to be written in Pre-Operational.",
+        *(f"# {line_of(note)}" for note in axis.notes),
         'POS="${1:?usage: $0 POSITION}"',
         "set -eu",
         "# The state is left as it is: taking a running axis out of Operational would stop it.",
@@ -100,140 +90,31 @@ def igh(axis: AxisHandover) -> bytes:
     ]
     for write in axis.writes:
         lines += [
-            f"# {write.key} {_line(write.name)}",
+            f"# {write.key} {line_of(write.name)}",
             f'ethercat download -p "$POS" -t {number_type(write)} 0x{write.index:04X} '
-            f"0x{write.subindex:02X} -- {_number(write)}",
+            f"0x{write.subindex:02X} -- {number_of(write)}",
         ]
     return "\n".join([*lines, ""]).encode()
 
 
-def ros2(axis: AxisHandover) -> bytes:
-    """Slave YAML of ethercat_driver_ros2.
-
-    Raises:
-        NotAllowed: identity unknown.
-    """
-    vendor, product = axis.identity()
-    lines = [
-        f"# {_line(axis.name)}; position factors stand only where the list sets the gearing",
-        f"vendor_id: 0x{vendor:08x}",
-        f"product_id: 0x{product:08x}",
-    ]
-    if axis.assign_activate:
-        known = "of the ESI file" if axis.controller is not None else "check with the ESI file"
-        lines.append(f"assign_activate: 0x{axis.assign_activate:04x}  # {known}")
-    lines += ["auto_fault_reset: false", "sdo:"]
-    lines += [
-        f"  - {{index: 0x{w.index:04x}, sub_index: {w.subindex}, type: {number_type(w)}, "
-        f"value: {_number(w)}}}  # {_line(w.name)}"
-        for w in axis.writes
-    ]
-    for direction, tag in (("rx", "rpdo"), ("tx", "tpdo")):
-        pdos = [p for p in axis.pdos if p.direction == direction]
-        lines += [f"{tag}:"] if pdos else []
-        for pdo in pdos:
-            lines += [f"  - index: 0x{pdo.index:04x}", "    channels:"]
-            lines += [f"      - {{{_channel(axis, entry)}}}" for entry in pdo.entries]
-    return "\n".join([*lines, ""]).encode()
-
-
-def _channel(axis: AxisHandover, entry: MappedEntry) -> str:
-    kind = f"bit{entry.bits}" if entry.type is None else entry.type.lower()
-    kind = "bool" if entry.type == "BOOL" else kind
-    text = f"index: 0x{entry.index:04x}, sub_index: {entry.subindex}, type: {kind}"
-    for signal in axis.profile.signals:
-        if signal.key == f"{entry.index:04X}:{entry.subindex:02X}" and signal.role in _ROLES:
-            field, word = _ROLES[signal.role]
-            text += f", {field}: {word}"
-            text += ", default: .nan" if field == "command_interface" and word == "position" else ""
-            per_radian = increments_per_radian(axis)
-            if word == "position" and per_radian:
-                down = field == "command_interface"
-                text += f", factor: {(per_radian if down else 1 / per_radian)!r}"
-    return text
-
-
-def increments_per_radian(axis: AxisHandover) -> float | None:
-    """Position increments per radian of the motor, None where it is not certain.
-
-    Certain only where the list itself sets the whole gearing to its defaults: a wrong factor
-    scales every motion of the controller.
-    """
-    units = axis.profile.units
-    gearing = {units.gear_numerator, units.gear_denominator, units.feed, units.feed_revolutions}
-    written = {write.key: write.raw for write in axis.writes}
-    for key in gearing - {None}:
-        parameter = axis.profile.by_key[key] if key is not None else None
-        if parameter is None or written.get(parameter.key) != parameter.default_raw:
-            return None
-    return units.counts_per_rev / (2 * math.pi) if units.counts_per_rev else None
-
-
-def bus_yml(axes: Sequence[AxisHandover], dcf_names: Sequence[str]) -> bytes:
-    """`bus.yml` of ros2_canopen, which names the DCFs beside it; node numbers are proposed."""
-    cycle_us = max(axis.cycle_us for axis in axes)
-    lines = [
-        "options:",
-        '  dcf_path: "@BUS_CONFIG_PATH@"',
-        "master:",
-        "  node_id: 1",
-        '  driver: "ros2_canopen::MasterDriver"',
-        '  package: "canopen_master_driver"',
-        f"  sync_period: {cycle_us}",
-    ]
-    for number, (axis, dcf_name) in enumerate(zip(axes, dcf_names, strict=True)):
-        lines += [
-            "drive:" if len(axes) == 1 else f"drive{number + 1}:",
-            f"  node_id: {number + 2}  # set the drive's own",
-            f'  dcf: "{dcf_name}"',
-            '  driver: "ros2_canopen::Cia402Driver"',
-            '  package: "canopen_402_driver"',
-            f"  period: {cycle_us // 1000}",
-            "  sdo:",
-            *(
-                f"    - {{index: 0x{w.index:04x}, sub_index: {w.subindex}, value: {_number(w)}}}"
-                f"  # {_line(w.name)}"
-                for w in axis.writes
-            ),
-        ]
-    return "\n".join([*lines, ""]).encode()
-
-
-def ros2_control(axes: Sequence[AxisHandover], slave_files: Sequence[str]) -> bytes:
-    """`ros2_control` of ethercat_driver_ros2 that names the slave files beside it."""
-    frequency = 1_000_000 // max(axis.cycle_us for axis in axes)
-    lines = [
-        '<ros2_control name="segment" type="system">',
-        "  <hardware>",
-        "    <plugin>ethercat_driver/EthercatDriver</plugin>",
-        '    <param name="master_id">0</param>',
-        f'    <param name="control_frequency">{frequency}</param>',
-        "  </hardware>",
-    ]
-    for position, file in enumerate(slave_files):
-        lines += [
-            f'  <joint name="joint_{position + 1}">',
-            '    <state_interface name="position"/>',
-            '    <command_interface name="position"/>',
-            f'    <ec_module name="drive{position + 1}">',
-            "      <plugin>ethercat_generic_plugins/EcCiA402Drive</plugin>",
-            '      <param name="alias">0</param>',
-            f'      <param name="position">{position}</param>',
-            '      <param name="mode_of_operation">8</param>',
-            f'      <param name="slave_config">{escape(file)}</param>',
-            "    </ec_module>",
-            "  </joint>",
-        ]
-    return "\n".join([*lines, "</ros2_control>", ""]).encode()
-
-
-def dcf(axis: AxisHandover, file_name: str, saved: datetime | None) -> bytes:
+def dcf(
+    axis: AxisHandover, file_name: str, saved: datetime | None, *, reals_as_bits: bool = False
+) -> bytes:
     """Device configuration file of CiA 306-1; dated as the set, so that it comes out the same."""
     values = {write.key: write.raw for write in axis.writes}
     created = saved or datetime(2000, 1, 1, tzinfo=UTC)
+    known = axis.profile.identity
+    identity = known.model_copy(
+        update={
+            "vendor_id": axis.vendor_id,
+            "product_code": axis.product_code,
+            "revision": axis.revision if axis.revision is not None else known.revision,
+        }
+    )
     return export_dcf(
-        axis.profile, values, created, file_name=file_name, node_name=_line(axis.name)
-    ).encode()
+        axis.profile.model_copy(update={"identity": identity}), values, created,
+        file_name=file_name, node_name=line_of(axis.name), reals_as_bits=reals_as_bits,
+    ).encode()  # fmt: skip
 
 
 def concise_dcf(axis: AxisHandover) -> bytes:
@@ -246,7 +127,7 @@ def concise_dcf(axis: AxisHandover) -> bytes:
 
 def python(axis: AxisHandover) -> bytes:
     """Script that writes over the command line's server and reads each value back."""
-    rows = "\n".join(f"    ({w.key!r}, {w.raw!r}),  # {_line(w.name)}" for w in axis.writes)
+    rows = "\n".join(f"    ({w.key!r}, {w.raw!r}),  # {line_of(w.name)}" for w in axis.writes)
     return f'''"""Write the values of a hand-over to a drive of a running servodeck and verify them.
 
 Usage: python FILE SERVER DRIVE_ID, as http://127.0.0.1:8420 and the id of the drive there.
@@ -308,7 +189,7 @@ def sheet(axis: AxisHandover) -> bytes:
     Only what the list itself writes is stated as a value: what it leaves is as the drive keeps it.
     """
     units = axis.profile.units
-    lines = [f"Hand-over of {_line(axis.name)} ({axis.profile.title})", "", "Scaling"]
+    lines = [f"Hand-over of {line_of(axis.name)} ({axis.profile.title})", "", "Scaling"]
     lines.append(
         f"  position unit {units.position}, velocity {units.velocity}, acceleration "
         f"{units.acceleration}, torque {units.torque}"
@@ -336,11 +217,11 @@ def sheet(axis: AxisHandover) -> bytes:
     lines += ["", "Process data"]
     lines += [
         f"  {pdo.index:04X}h {'to' if pdo.direction == 'rx' else 'from'} the drive: "
-        + ", ".join(f"{_line(e.name)} ({e.bits} bits)" for e in pdo.entries)
+        + ", ".join(f"{line_of(e.name)} ({e.bits} bits)" for e in pdo.entries)
         for pdo in axis.pdos
     ]
-    lines += ["", "To heed", *(f"  {_line(note)}" for note in axis.notes or ("nothing",))]
-    lines += ["", "Left out", *(f"  {e.key}: {_line(e.reason)}" for e in axis.left_out)]
+    lines += ["", "To heed", *(f"  {line_of(note)}" for note in axis.notes or ("nothing",))]
+    lines += ["", "Left out", *(f"  {e.key}: {line_of(e.reason)}" for e in axis.left_out)]
     return "\n".join([*lines, ""]).encode()
 
 

@@ -5,7 +5,8 @@ Source: CiA 306-1 v1.3.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import struct
+from collections.abc import Collection, Mapping
 from datetime import datetime
 
 from profiles.schema import DataType, Parameter, Profile, Raw
@@ -17,6 +18,7 @@ _CODE: dict[DataType, int] = {
 _MANDATORY = (0x1000, 0x1001, 0x1018)
 _BAUDRATES = (10, 20, 50, 125, 250, 500, 800, 1000)
 _RECORD, _VARIABLE = 9, 7
+_NUMBERS = ("DefaultValue", "ParameterValue", "LowLimit", "HighLimit")
 
 
 def export_eds(profile: Profile, created: datetime, file_name: str | None = None) -> str:
@@ -36,13 +38,35 @@ def export_dcf(
     file_name: str,
     node_name: str = "",
     node_id: int | None = None,
+    reals_as_bits: bool = False,
 ) -> str:
-    """The same with ``ParameterValue`` for each key of ``values`` (clause 5.3: a DCF)."""
+    """The same with ``ParameterValue`` for each key of ``values`` (clause 5.3: a DCF).
+
+    ``reals_as_bits`` writes a REAL32 as the hexadecimal number of its bits, which some tools
+    want; others want it decimal.
+    """
     commissioning = ["[DeviceComissioning]"]  # the standard spells it so
     if node_id is not None:
         commissioning.append(f"NodeID=0x{node_id:02X}")
     commissioning += [f"NodeName={_text(node_name)}", "CANopenManager=0", ""]
-    return _file(profile, created, file_name, commissioning, values)
+    text = _file(profile, created, file_name, commissioning, values)
+    return _with_bits(text) if reals_as_bits else text
+
+
+def _with_bits(text: str) -> str:
+    """Numbers of REAL32 objects as their bits, IEEE 754, in hexadecimal."""
+    lines, real = [], False
+    for line in text.split("\r\n"):
+        name, equals, value = line.partition("=")
+        if line.startswith("["):
+            real = False
+        elif name == "DataType":
+            real = int(value, 0) == _CODE["REAL32"]
+        elif real and value and name in _NUMBERS:
+            lines.append(f"{name}{equals}0x{struct.pack('>f', float(value)).hex().upper()}")
+            continue
+        lines.append(line)
+    return "\r\n".join(lines)
 
 
 def _file(
@@ -59,9 +83,10 @@ def _file(
     for members in objects.values():
         members.sort(key=lambda p: p.subindex or 0)
     lines = _head(profile, created, file_name, objects) + commissioning
-    lines += _lists(objects)
-    for index in sorted(objects):
-        lines += _object(index, objects[index], values)
+    lines += _lists({*objects, *_MANDATORY})
+    for index in sorted({*objects, *_MANDATORY}):
+        known = objects.get(index)
+        lines += _object(index, known, values) if known else _mandatory(index, profile)
     return "\r\n".join(lines) + "\r\n"
 
 
@@ -90,8 +115,8 @@ def _head(
     ]  # fmt: skip
 
 
-def _lists(objects: Iterable[int]) -> list[str]:
-    mandatory = [i for i in sorted(objects) if i in _MANDATORY]
+def _lists(objects: Collection[int]) -> list[str]:
+    mandatory = list(_MANDATORY)
     maker = [i for i in sorted(objects) if 0x2000 <= i < 0x6000]
     optional = [i for i in sorted(objects) if i not in mandatory and i not in maker]
     lines: list[str] = []
@@ -102,6 +127,37 @@ def _lists(objects: Iterable[int]) -> list[str]:
     ):
         lines += [f"[{title}]", f"SupportedObjects={len(indices)}"]
         lines += [f"{n}=0x{index:04X}" for n, index in enumerate(indices, start=1)] + [""]
+    return lines
+
+
+def _mandatory(index: int, profile: Profile) -> list[str]:
+    """Objects that every device has (CiA 301 clause 7.5.1), where the profile has none of its own.
+
+    Tools refuse a file without them. A default that is not known stays empty.
+    """
+
+    def entry(section: str, name: str, code: int, default: int | None) -> list[str]:
+        return [
+            f"[{section}]", f"ParameterName={name}", f"ObjectType=0x{_VARIABLE:X}",
+            f"DataType=0x{code:04X}", "AccessType=ro",
+            f"DefaultValue={'' if default is None else f'0x{default:X}'}", "PDOMapping=0", "",
+        ]  # fmt: skip
+
+    if index == 0x1000:
+        return entry("1000", "Device type", _CODE["UINT32"], None)
+    if index == 0x1001:
+        return entry("1001", "Error register", _CODE["UINT8"], None)
+    known = profile.identity
+    parts = (
+        ("Vendor ID", known.vendor_id), ("Product code", known.product_code),
+        ("Revision number", known.revision), ("Serial number", None),
+    )  # fmt: skip
+    lines = [
+        "[1018]", "ParameterName=Identity object", f"ObjectType=0x{_RECORD:X}", "SubNumber=5", "",
+        *entry("1018sub0", "Highest subindex", _CODE["UINT8"], 4),
+    ]  # fmt: skip
+    for number, (name, value) in enumerate(parts, 1):
+        lines += entry(f"1018sub{number}", name, _CODE["UINT32"], value)
     return lines
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+import struct
 
 from profiles.importer.report import ImportReport
 from profiles.schema import INTEGER_RANGE, Access, DataType, Raw
@@ -25,6 +26,7 @@ TYPE_BY_CODE: dict[int, DataType] = {
     0x36: "UINT8", 0x37: "UINT8",
 }  # fmt: skip
 
+_REAL_BITS = re.compile(r"0[xX]([0-9a-fA-F]{1,8})")
 _NAMED: dict[str, DataType] = {
     "BOOL": "BOOL", "BOOLEAN": "BOOL", "BIT": "BOOL", "BIT1": "BOOL",
     "SINT": "INT8", "INT8": "INT8", "INTEGER8": "INT8", "CHAR": "INT8",
@@ -187,6 +189,10 @@ def default_value(
         return text.strip() or None, ""
     if data_type == "OCTETS":
         return None, ""
+    bits = _REAL_BITS.fullmatch(text.strip())
+    if data_type == "REAL32" and bits is not None:
+        # Nobody writes a real number in hexadecimal: these are its bits.
+        return struct.unpack(">f", bytes.fromhex(bits.group(1).rjust(8, "0")))[0], ""
     number = parse_number(text, f"{place} default", report)
     return fit(number, data_type, "default", place, report), ""
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -51,6 +53,7 @@ def check_commands(tmp_path: Path, *where: str) -> None:
     # Nothing was changed yet: the list is what the drive holds.
     found = conflicts_of(str(listed), bus, "--set", str(held), *options)
     assert (found["conflicts"], found["findings"], found["restored"]) == ([], [], [])
+    assert found["not_read"] == []
     assert found["same"] > 50
     assert json.loads(call("handover", "watch", str(held), bus, *options, "--json")) == {
         "changed": [], "not_read": [],
@@ -135,7 +138,7 @@ def test_export_compare_and_changes(station: Station, x: str, held: str) -> None
     compare = f"/drives/{x}/handover/compare"
     query = {"file": "start.xml", "set_file": held}
     found = station.ok(station.http.post(compare, params=query, content=listed))
-    assert (found["conflicts"], found["defects"]) == ([], [])
+    assert (found["conflicts"], found["defects"], found["not_read"]) == ([], [], [])
     assert found["same"] == made["writes"]
 
     before = station.ok(station.http.get(f"/drives/{x}/parameters/{GAIN}"))["raw"]
@@ -162,6 +165,70 @@ def test_export_compare_and_changes(station: Station, x: str, held: str) -> None
     station.ok(station.http.put(f"/drives/{x}/parameters/{GAIN}", json={"raw": before}))
 
 
+def test_a_segment_is_one_list_and_noted_for_every_drive(
+    station: Station, x: str, held: str
+) -> None:
+    y = station.add(2, name="Y")
+    try:
+        check_segment(station, x, y, held)
+    finally:
+        station.remove(y)
+
+
+def check_segment(station: Station, x: str, y: str, held: str) -> None:
+    asked = {"file": "second", "overwrite": True}
+    second = station.ok(station.http.post(f"/drives/{y}/sets", json=asked))["file"]
+    pair = [{"drive_id": y, "set_file": second}, {"drive_id": x, "set_file": held}]
+    body: dict[str, object] = {"axes": pair, "format": "lcec", "file": "segment.xml"}
+    made = station.ok(station.http.post("/handover", json=body))
+    names = [each["name"] for each in made["files"]]
+    assert names == [
+        "segment.xml", "segment.xml.hal", "segment.xml.1.scaling.txt", "segment.xml.2.scaling.txt",
+    ]  # fmt: skip
+    listed = base64.b64decode(made["files"][0]["content"])
+    for drive, slave in ((y, 1), (x, 2)):
+        newest = station.ok(station.http.get(f"/drives/{drive}/handovers"))[0]
+        assert newest["sha256"] == hashlib.sha256(listed).hexdigest()
+        query: dict[str, str | int] = {"file": "segment.xml", "slave": slave}
+        path = f"/drives/{drive}/handover/compare"
+        found = station.ok(station.http.post(path, params=query, content=listed))
+        assert found["conflicts"] == []
+        assert found["same"] == newest["values"]
+    one = station.http.post("/handover", json=body | {"format": "twincat"})
+    assert one.status_code == 409
+    assert "one drive" in one.json()["detail"]
+    twice = station.http.post("/handover", json=body | {"axes": [pair[0], pair[0]]})
+    assert twice.status_code == 409
+    assert "twice" in twice.json()["detail"]
+    nobody = station.http.post(
+        "/handover", json=body | {"axes": [{"drive_id": "nobody", "set_file": held}]}
+    )
+    assert nobody.status_code == 404
+
+
+def test_the_script_writes_over_the_api(
+    station: Station, x: str, held: str, tmp_path: Path
+) -> None:
+    made = export(station, x, held, format="python", file="write.py", only=[GAIN, LIMIT])
+    script = tmp_path / "write.py"
+    script.write_bytes(base64.b64decode(made["files"][0]["content"]))
+    keys = (GAIN, LIMIT)
+
+    def now() -> list[int]:
+        return [station.ok(station.http.get(f"/drives/{x}/parameters/{k}"))["raw"] for k in keys]
+
+    before = now()
+    for key, raw in zip(keys, before, strict=True):
+        path = f"/drives/{x}/parameters/{key}"
+        station.ok(station.http.put(path, json={"raw": raw - 1}))
+    run = [sys.executable, str(script), station.url, x]
+    ended = subprocess.run(run, capture_output=True, text=True, timeout=60, check=False)
+    assert ended.stdout == "2 of 2 values written and read back\n", ended.stderr
+    assert now() == before
+    stranger = subprocess.run([*run[:3], "nobody"], capture_output=True, timeout=60, check=False)
+    assert stranger.returncode == 1
+
+
 @pytest.mark.parametrize(
     ("body", "status", "words"),
     [
@@ -169,8 +236,8 @@ def test_export_compare_and_changes(station: Station, x: str, held: str) -> None
         ({"format": "excel"}, 422, ""),
         ({"file": "../../etc/passwd"}, 422, ""),
         ({"only": ["9999:00"]}, 409, "9999:00"),
-        ({"format": "eni", "esi": "%%%"}, 409, "base64"),
-        ({"format": "eni", "esi": base64.b64encode(b"<a/>").decode()}, 409, "ESI"),
+        ({"format": "eni", "esi": ["%%%"]}, 409, "base64"),
+        ({"format": "eni", "esi": [base64.b64encode(b"<a/>").decode()]}, 409, "ESI"),
     ],
 )
 def test_bad_exports_are_explained(

@@ -17,20 +17,46 @@ DefectName = Literal[
 _MEGABYTES = 1 << 20
 
 
-class HandoverRequest(Message):
-    """Which values of a parameter set go into which controller's format."""
+#: One ESI file in base64, and of how many drives there may be one.
+_Esi = Annotated[str, Field(max_length=60 * _MEGABYTES)]
+_MOST_AXES = 64
 
-    set_file: str = Field(max_length=200, description="parameter set of the library")
-    version: int | None = Field(default=None, ge=1, description="of the set; the latest if null")
+
+class HandoverChoice(Message):
+    """Which values go into which controller's format."""
+
     format: FormatName
     file: str = Field(pattern=r"^[\w][\w .\-]{0,100}$", description="name of the list to make")
     choice: Literal["all", "tuned", "not_default"] = "all"
     only: list[Annotated[str, Field(max_length=40)]] = Field(default=[], max_length=5000)
     include_motor_individual: bool = False
-    esi: str | None = Field(
-        default=None, max_length=60 * _MEGABYTES,
-        description="the drive's ESI file (base64), for an ENI that a master can run",
+    esi: list[_Esi] = Field(
+        default=[], max_length=_MOST_AXES,
+        description="ESI files (base64) of the drives, for an ENI that a master can run",
     )  # fmt: skip
+
+
+class HandoverRequest(HandoverChoice):
+    """The values of one drive's parameter set."""
+
+    set_file: str = Field(max_length=200, description="parameter set of the library")
+    version: int | None = Field(default=None, ge=1, description="of the set; the latest if null")
+
+
+class SegmentAxis(Message):
+    """One drive of a segment with its parameter set."""
+
+    drive_id: str = Field(max_length=100)
+    set_file: str = Field(max_length=200, description="parameter set of the library")
+    version: int | None = Field(default=None, ge=1, description="of the set; the latest if null")
+
+
+class SegmentHandoverRequest(HandoverChoice):
+    """The values of several drives on one bus, as one list."""
+
+    axes: list[SegmentAxis] = Field(
+        min_length=1, max_length=_MOST_AXES, description="in the order of the cable"
+    )
 
 
 class HandoverFile(Message):
@@ -44,6 +70,7 @@ class HandoverFile(Message):
 class LeftOutRow(Message):
     """A row of the set that is not handed over, and why."""
 
+    drive: str = Field(description="name of its axis")
     key: str
     reason: str
 
@@ -91,6 +118,7 @@ class HandoverComparison(Message):
     not_written: list[str] = Field(description="of our set, not written by the controller")
     restored: list[str] = Field(description="changed in the drive; the controller writes ours")
     unknown_here: list[str] = Field(description="neither set nor drive gives a value")
+    not_read: list[str] = Field(description="the drive was asked and gave no value")
     same: int
 
 

@@ -5,17 +5,18 @@ from __future__ import annotations
 import asyncio
 import base64
 import binascii
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
 
-from backend.api.context import TheBench, TheDrive
+from backend.api.context import TheBench, TheDrive, member_of
 from backend.api.errors import NotFound
 from backend.api.handover.models import (
     HandedOverInfo,
     HandoverChanges,
+    HandoverChoice,
     HandoverComparison,
     HandoverConflict,
     HandoverDefect,
@@ -23,10 +24,12 @@ from backend.api.handover.models import (
     HandoverRequest,
     HandoverResult,
     LeftOutRow,
+    SegmentAxis,
+    SegmentHandoverRequest,
 )
 from backend.drive.drive import Drive
 from backend.handover.conflicts import Conflict, changed_since, compare
-from backend.handover.files import digest, files_of, remarks, with_controller
+from backend.handover.files import digest, files_of, fitting, remarks, with_controller
 from backend.handover.model import AxisHandover, hand_over
 from backend.handover.read import MAX_BYTES, read_list
 from backend.handover.record import HandedOver, HandoverLog
@@ -75,18 +78,41 @@ async def export_handover(
 
     Nothing is written to the drive.
     """
-    drive = connected.drive
-    content = await _set(bench, drive, request.set_file, request.version)
-    axis, files = await asyncio.to_thread(_made, content, drive.profile, request)
-    name = next(iter(files))
-    made = HandedOver(
-        datetime.now(UTC), acting_person(), request.format, name, digest(files[name]),
-        request.set_file, {write.key: write.raw for write in axis.writes},
-    )  # fmt: skip
-    await asyncio.to_thread(handover_log(bench).add, drive.id, made)
-    bench.journal.add(
-        f"{drive.name}: handed over {request.set_file} as {request.format}, {name}", drive=drive.id
+    given = SegmentAxis(
+        drive_id=connected.drive.id, set_file=request.set_file, version=request.version
     )
+    return await _export(bench, [given], request)
+
+
+@router.post("/handover", status_code=201)
+async def export_segment(bench: TheBench, request: SegmentHandoverRequest) -> HandoverResult:
+    """The same for several drives of one bus, in the order of the cable."""
+    return await _export(bench, request.axes, request)
+
+
+async def _export(
+    bench: Bench, given: Sequence[SegmentAxis], request: HandoverChoice
+) -> HandoverResult:
+    drives = [(await member_of(each.drive_id, bench)).drive for each in given]
+    twice = next((drive for n, drive in enumerate(drives) if drive in drives[:n]), None)
+    if twice is not None:
+        raise NotAllowed("api-handover.drive-twice", drive=twice.name)
+    contents = [
+        await _set(bench, drive, each.set_file, each.version)
+        for drive, each in zip(drives, given, strict=True)
+    ]
+    axes, files = await asyncio.to_thread(_made, contents, drives, request)
+    name = next(iter(files))
+    for drive, each, axis in zip(drives, given, axes, strict=True):
+        made = HandedOver(
+            datetime.now(UTC), acting_person(), request.format, name, digest(files[name]),
+            each.set_file, {write.key: write.raw for write in axis.writes},
+        )  # fmt: skip
+        await asyncio.to_thread(handover_log(bench).add, drive.id, made)
+        bench.journal.add(
+            f"{drive.name}: handed over {each.set_file} as {request.format}, {name}", drive=drive.id
+        )
+    several = len(axes) > 1
     return HandoverResult(
         files=[
             HandoverFile(
@@ -94,26 +120,42 @@ async def export_handover(
             )
             for each, data in files.items()
         ],
-        writes=len(axis.writes),
-        left_out=[LeftOutRow(key=each.key, reason=each.reason) for each in axis.left_out],
-        notes=[*axis.notes, *remarks([axis], request.format)],
+        writes=sum(len(axis.writes) for axis in axes),
+        left_out=[
+            LeftOutRow(drive=axis.name, key=each.key, reason=each.reason)
+            for axis in axes
+            for each in axis.left_out
+        ],
+        notes=[
+            *(f"{axis.name}: {note}" if several else note for axis in axes for note in axis.notes),
+            *remarks(axes, request.format),
+        ],
     )
 
 
 def _made(
-    content: ParameterSet, profile: Profile, request: HandoverRequest
-) -> tuple[AxisHandover, dict[str, bytes]]:
-    axis = hand_over(
-        content, profile, choice=request.choice, only=request.only,
-        motor_individual=request.include_motor_individual,
-    )  # fmt: skip
-    if request.esi is not None:
-        try:
-            data = base64.b64decode(request.esi, validate=True)
-        except binascii.Error as error:
-            raise BadSet("api-handover.esi-file-not-base64") from error
-        axis = with_controller(axis, [(data, "the ESI file")])
-    return axis, files_of(axis, request.format, request.file, content.saved)
+    contents: Sequence[ParameterSet], drives: Sequence[Drive], request: HandoverChoice
+) -> tuple[list[AxisHandover], dict[str, bytes]]:
+    axes = [
+        fitting(
+            hand_over(
+                content, drive.profile, choice=request.choice, only=request.only,
+                motor_individual=request.include_motor_individual,
+            ),
+            request.format,
+        )
+        for content, drive in zip(contents, drives, strict=True)
+    ]  # fmt: skip
+    try:
+        sources = [
+            (base64.b64decode(each, validate=True), f"ESI file {number}")
+            for number, each in enumerate(request.esi, 1)
+        ]
+    except binascii.Error as error:
+        raise BadSet("api-handover.esi-file-not-base64") from error
+    if sources:
+        axes = [with_controller(axis, sources) for axis in axes]
+    return axes, files_of(axes, request.format, request.file, contents[0].saved)
 
 
 @router.post(
@@ -158,6 +200,7 @@ async def compare_handover(
         not_written=list(verdict.not_written),
         restored=list(verdict.restored),
         unknown_here=list(verdict.unknown_here),
+        not_read=list(verdict.not_read),
         same=verdict.same,
     )
 

@@ -194,6 +194,7 @@ _API: dict[str, Need] = {
     "GET /drives/{drive_id}/diff": _LOOK,
     "GET /drives/{drive_id}/three-way": _LOOK,
     # Lists for the machine's controller: made of stored sets, noted in the report; comparing reads.
+    "POST /handover": _FILES_UPLOAD,
     "POST /drives/{drive_id}/handover": _FILES_UPLOAD,
     "POST /drives/{drive_id}/handover/compare": Need(Right.LOOK, body_bytes=9 << 20),
     "GET /drives/{drive_id}/handovers": _LOOK,

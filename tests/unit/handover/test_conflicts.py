@@ -175,6 +175,15 @@ def test_what_the_drive_holds_counts_where_the_set_has_nothing() -> None:
     assert alone.conflicts == ()
 
 
+def test_what_the_drive_did_not_give_is_named() -> None:
+    listed = twincat(init_command("6060:00", b"\x01"), init_command("6072:00", little(900, 2)))
+    # A drive that was too slow: its value may be any, also where list and set agree.
+    verdict = compare(PROFILE, listed, {"6072:00": 900}, {"6060:00": None})
+    assert verdict.not_read == ("6060:00", "6072:00")
+    assert verdict.unknown_here == ("6060:00",)
+    assert compare(PROFILE, listed, {"6072:00": 900}, None).not_read == ()
+
+
 def test_defects_of_a_foreign_list() -> None:
     listed = twincat(
         init_command("6041:00", little(0, 2)),

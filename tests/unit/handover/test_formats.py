@@ -18,7 +18,7 @@ from backend.drive.drive import Drive
 from backend.drive.readings import Reading
 from backend.handover.conflicts import resolved
 from backend.handover.files import FORMATS, Format, files_of
-from backend.handover.model import AxisHandover, hand_over
+from backend.handover.model import AxisHandover, gain_keys, hand_over
 from backend.handover.read import read_list
 from backend.parameters.set_file import BadSet, ParameterSet, dump, parse, storable
 from drivers.errors import NotAllowed
@@ -107,6 +107,25 @@ def test_motor_data_needs_consent() -> None:
     content = set_of(profile)
     with_consent = hand_over(content, profile, motor_individual=True)
     assert any(profile.by_key[w.key].motor_individual for w in with_consent.writes)
+
+
+@pytest.mark.parametrize(
+    ("family", "keys"),
+    [
+        # Feed-forward gains and filters stand in chapters of their own: 004:5836, 002, 006.
+        ("mms7", {"2004:04", "2004:06", "2005:01", "2007:02", "2008:02"}),
+        ("ep3e", {"2015:00", "2016:00"}),
+        ("m6l", {"2008:12", "2009:0C", "2009:20"}),
+        ("r6l", {"2006:12", "2007:0D", "2007:20"}),
+    ],
+)
+def test_what_tuning_sets(family: str, keys: set[str]) -> None:
+    profile = profile_of(family)
+    assert keys <= gain_keys(profile)
+    assert profile.gains is not None
+    assert set(profile.gains.groups) <= {p.group for p in profile.parameters}
+    tuned = hand_over(set_of(profile), profile, choice="tuned")
+    assert keys <= {write.key for write in tuned.writes}
 
 
 def test_units_come_before_limits_before_gains() -> None:
@@ -235,8 +254,9 @@ def test_ros2_follows_the_documented_fields(family: str) -> None:
     axis = axis_of(family)
     content = yaml.safe_load(made(family, "ros2"))
     if axis.profile.link("ethercat") is None:
-        assert content["drive"]["dcf"] == "list.dcf"
-        assert [row["index"] for row in content["drive"]["sdo"]] == [w.index for w in axis.writes]
+        drive = content["nodes"]["drive"]
+        assert drive["dcf"] == "list.dcf"
+        assert [row["index"] for row in drive["sdo"]] == [w.index for w in axis.writes]
         return
     assert set(content) <= ROS2_TOP
     assert (content["vendor_id"], content["product_id"]) == (VENDOR, PRODUCT)

@@ -15,77 +15,26 @@ from defusedxml.ElementTree import fromstring
 
 from backend.handover.eni import eni
 from backend.handover.esi import controller_of
-from backend.handover.model import AxisHandover, hand_over
+from backend.handover.model import hand_over
 from backend.parameters.set_file import BadSet
 from drivers.errors import NotAllowed
-from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
-from drivers.virtual.wires.ethercat.segment import Segment
-from drivers.virtual.wires.ethercat.slave import Slave
 from drivers.virtual.wires.netns import Namespace, unavailable
-from profiles.schema import Profile, Raw
+from tests.support.controllers.segment import Rig, with_esi
 from tests.support.eni_master import EniMaster, Refused
-from tests.support.esi_of_virtual import esi_of
 from tests.support.handed_over import (
     MAKERS,
     profile_of,
     set_of_device,
-    settings,
     tuned_device,
-    values,
 )
-from tests.wire.ethercat_slave.frames import ManualClock
 
 FAMILIES = ("mms7", "m6l", "r6l", "ep3e", "maker_a.xml", "maker_c.xml")
 
 
-def given(family: str) -> tuple[AxisHandover, dict[str, Raw]]:
-    """A tuned drive's hand-over with the ESI file of its virtual drive, and its values."""
-    profile = profile_of(family)
-    device = tuned_device(profile)
-    content = set_of_device(profile, device)
-    # The identity is that in the EEPROM, which a master compares.
-    slave = Slave(make_device(profile), ManualClock())
-    image = slave.controller.eeprom.image
-    vendor, product, revision = (
-        int.from_bytes(image[at : at + 4], "little") for at in (0x10, 0x14, 0x18)
-    )
-    axis = hand_over(
-        replace(content, vendor_id=vendor, product_code=product, revision=revision), profile
-    )
-    source = esi_of(profile, vendor, product, revision)
-    controller = controller_of(source, "v.xml", vendor, product, revision)
-    return replace(axis, controller=controller), {r.key: r.raw for r in content.rows if r.raw}
-
-
-class Rig:
-    """Fresh drives on a line without a wire; time passes with every frame."""
-
-    def __init__(self, *profiles: Profile) -> None:
-        self.clock = ManualClock()
-        self.profiles = profiles
-        self.devices = [make_device(profile) for profile in profiles]
-        self.segment = Segment([Slave(d, self.clock) for d in self.devices], self.clock)
-
-    def exchange(self, sent: bytes) -> bytes:
-        self.clock.time_ns += 250_000
-        back = self.segment.process_frame(sent)
-        assert back is not None
-        return bytes(back)
-
-    def check(self, axes: list[AxisHandover]) -> None:
-        for axis, profile, device in zip(axes, self.profiles, self.devices, strict=True):
-            now = values(device, settings(profile))
-            different = {w.key for w in axis.writes if now[w.key] != w.raw}
-            # What is mapped takes the controller's cyclic values, and the hand-over says so.
-            named = {key for note in axis.notes if "overwrite in every" in note for key in different
-                     if key in note}  # fmt: skip
-            assert different == named
-
-
 @pytest.mark.parametrize("family", FAMILIES)
 def test_every_family_runs_from_its_eni(family: str) -> None:
-    axis, _ = given(family)
+    axis = with_esi(family)
     rig = Rig(axis.profile)
     master = EniMaster(fromstring(eni([axis])), rig.exchange)
     master.start()
@@ -98,7 +47,7 @@ def test_every_family_runs_from_its_eni(family: str) -> None:
 
 
 def test_a_segment_of_three_makers_runs_from_one_eni() -> None:
-    axes = [given(family)[0] for family in ("mms7", "maker_a.xml", "m6l")]
+    axes = [with_esi(family) for family in ("mms7", "maker_a.xml", "m6l")]
     rig = Rig(*(axis.profile for axis in axes))
     root = fromstring(eni(axes))
     master = EniMaster(root, rig.exchange)
@@ -114,7 +63,7 @@ def test_a_segment_of_three_makers_runs_from_one_eni() -> None:
 
 
 def test_a_drive_of_another_maker_is_refused() -> None:
-    axis, _ = given("mms7")
+    axis = with_esi("mms7")
     rig = Rig(profile_of("maker_a.xml"))
     master = EniMaster(fromstring(eni([axis])), rig.exchange)
     with pytest.raises(Refused, match="vendor id"):
@@ -125,7 +74,7 @@ def test_the_segment_comes_up_over_a_real_wire(tmp_path: Path) -> None:
     why = unavailable()
     if why is not None:
         pytest.skip(why)
-    axes = [given(family)[0] for family in ("mms7", "r6l")]
+    axes = [with_esi(family) for family in ("mms7", "r6l")]
     path = tmp_path / "segment.xml"
     path.write_bytes(eni(axes))
     names = [axis.profile.drive for axis in axes]
@@ -211,7 +160,7 @@ def check_schema(element: Element) -> None:
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_elements_and_their_order_are_those_of_etg_2100(family: str) -> None:
-    root = fromstring(eni([given(family)[0]]))
+    root = fromstring(eni([with_esi(family)]))
     check_schema(root)
     assert [e.tag for e in root.findall("Config/*")] == [
         "Master",

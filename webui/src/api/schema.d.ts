@@ -1837,6 +1837,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/handover": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Export Segment
+         * @description The same for several drives of one bus, in the order of the cable.
+         */
+        post: operations["export_segment"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/health": {
         parameters: {
             query?: never;
@@ -5423,6 +5443,11 @@ export interface components {
             /** Format */
             format: string;
             /**
+             * Not Read
+             * @description the drive was asked and gave no value
+             */
+            not_read: string[];
+            /**
              * Not Written
              * @description of our set, not written by the controller
              */
@@ -5505,7 +5530,7 @@ export interface components {
         };
         /**
          * HandoverRequest
-         * @description Which values of a parameter set go into which controller's format.
+         * @description The values of one drive's parameter set.
          */
         HandoverRequest: {
             /**
@@ -5516,9 +5541,10 @@ export interface components {
             choice: "all" | "tuned" | "not_default";
             /**
              * Esi
-             * @description the drive's ESI file (base64), for an ENI that a master can run
+             * @description ESI files (base64) of the drives, for an ENI that a master can run
+             * @default []
              */
-            esi?: string | null;
+            esi: string[];
             /**
              * File
              * @description name of the list to make
@@ -6696,6 +6722,11 @@ export interface components {
          * @description A row of the set that is not handed over, and why.
          */
         LeftOutRow: {
+            /**
+             * Drive
+             * @description name of its axis
+             */
+            drive: string;
             /** Key */
             key: string;
             /** Reason */
@@ -8996,6 +9027,24 @@ export interface components {
             trace: string;
         };
         /**
+         * SegmentAxis
+         * @description One drive of a segment with its parameter set.
+         */
+        SegmentAxis: {
+            /** Drive Id */
+            drive_id: string;
+            /**
+             * Set File
+             * @description parameter set of the library
+             */
+            set_file: string;
+            /**
+             * Version
+             * @description of the set; the latest if null
+             */
+            version?: number | null;
+        };
+        /**
          * SegmentExchange
          * @description Figures of the running exchange, since its start.
          */
@@ -9029,6 +9078,49 @@ export interface components {
             overruns: number;
             /** Wkc Errors */
             wkc_errors: number;
+        };
+        /**
+         * SegmentHandoverRequest
+         * @description The values of several drives on one bus, as one list.
+         */
+        SegmentHandoverRequest: {
+            /**
+             * Axes
+             * @description in the order of the cable
+             */
+            axes: components["schemas"]["SegmentAxis"][];
+            /**
+             * Choice
+             * @default all
+             * @enum {string}
+             */
+            choice: "all" | "tuned" | "not_default";
+            /**
+             * Esi
+             * @description ESI files (base64) of the drives, for an ENI that a master can run
+             * @default []
+             */
+            esi: string[];
+            /**
+             * File
+             * @description name of the list to make
+             */
+            file: string;
+            /**
+             * Format
+             * @enum {string}
+             */
+            format: "twincat" | "codesys" | "eni" | "lcec" | "ros2" | "igh" | "dcf" | "csv" | "python";
+            /**
+             * Include Motor Individual
+             * @default false
+             */
+            include_motor_individual: boolean;
+            /**
+             * Only
+             * @default []
+             */
+            only: string[];
         };
         /**
          * SegmentPort
@@ -10406,7 +10498,9 @@ export type ScopeStart = components['schemas']['ScopeStart'];
 export type ScopeStop = components['schemas']['ScopeStop'];
 export type ScopeTrace = components['schemas']['ScopeTrace'];
 export type ScopeTrigger = components['schemas']['ScopeTrigger'];
+export type SegmentAxis = components['schemas']['SegmentAxis'];
 export type SegmentExchange = components['schemas']['SegmentExchange'];
+export type SegmentHandoverRequest = components['schemas']['SegmentHandoverRequest'];
 export type SegmentPort = components['schemas']['SegmentPort'];
 export type SegmentStation = components['schemas']['SegmentStation'];
 export type SequenceRequest = components['schemas']['SequenceRequest'];
@@ -25049,6 +25143,147 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Session"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    export_segment: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SegmentHandoverRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HandoverResult"];
                 };
             };
             /** @description Not a request of this interface */

@@ -1,5 +1,7 @@
 api-handover_drive = { $value } is of a { $profile } drive, { $drive } is a { $profile_drive }
     .remedy = choose a set of the same drive family
+api-handover_drive-twice = { $drive } is named twice in the segment
+    .remedy = name each drive once, in the order of the cable
 api-handover_esi-file-not-base64 = the ESI file is not base64
     .remedy = send it again
 api-handover_larger-bytes = { $file } is larger than { $max_bytes } bytes

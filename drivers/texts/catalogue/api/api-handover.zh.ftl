@@ -1,5 +1,7 @@
 api-handover_drive = { $value } 属于 { $profile } 驱动器，而 { $drive } 是 { $profile_drive }
     .remedy = 请选择同系列驱动器的参数集
+api-handover_drive-twice = 网段中 { $drive } 出现了两次
+    .remedy = 请按电缆顺序将每个驱动器列出一次
 api-handover_esi-file-not-base64 = ESI 文件不是 base64 编码
     .remedy = 请重新发送
 api-handover_larger-bytes = { $file } 大于 { $max_bytes } 字节

@@ -1,3 +1,5 @@
+handover_carries-no-value = nothing of { $drive } fits this format: { $key } and others are larger than it carries
+    .remedy = choose another format
 handover_damaged = { $name } is damaged: { $shorten }
     .remedy = export the list again
 handover_defines-xml-entities-no = { $name } defines XML entities, which no start-up list needs and an attack does

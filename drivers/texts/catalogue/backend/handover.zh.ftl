@@ -1,3 +1,5 @@
+handover_carries-no-value = { $drive } 没有任何值适合此格式：{ $key } 等超出其可表示的范围
+    .remedy = 请选择其他格式
 handover_damaged = { $name } 已损坏：{ $shorten }
     .remedy = 请重新导出列表
 handover_defines-xml-entities-no = { $name } 定义了 XML 实体，启动列表不需要，只有攻击才会使用

@@ -34,11 +34,19 @@ export const handover = {
   'handover.individual': ['Also values that belong to one motor', '包括仅属于某一电机的值'],
   'handover.file': ['Name of the file', '文件名'],
   'handover.fileBad': ['Letters, digits, space, dot, dash', '仅限字母、数字、空格、点、短横'],
-  'handover.esi': ["The drive's ESI file", '驱动器的 ESI 文件'],
+  'handover.esi': ["The drives' ESI files", '驱动器的 ESI 文件'],
   'handover.esiHelp': [
     'With it mailboxes, sync managers, clock and frames are complete. Without it an ENI cannot be run by a master.',
     '提供后，邮箱、同步管理器、时钟和帧完整。若不提供，主站无法运行该 ENI。',
   ],
+  'handover.segment': [
+    'Drives of the list, in the order of the cable',
+    '列表中的驱动器，按电缆顺序',
+  ],
+  'handover.segmentSet': ['Parameter set', '参数集'],
+  'handover.segmentAdd': ['Add a drive', '添加驱动器'],
+  'handover.segmentUp': ['Move {name} one place forward', '将 {name} 前移一位'],
+  'handover.segmentRemove': ['Remove {name} from the list', '从列表中移除 {name}'],
   'handover.export': ['Make the files', '生成文件'],
   'handover.made': [
     '{writes} {writes|value|values} handed over, {left} left out.',
@@ -70,6 +78,10 @@ export const handover = {
   'handover.unknownHere': [
     'Not compared, because neither the set nor the drive gives a value: {keys}',
     '因参数集和驱动器均无值而未比较：{keys}',
+  ],
+  'handover.unreadNow': [
+    'The drive gave no value of these, so whether the controller changes them there is not known; compare again: {keys}',
+    '驱动器未给出以下参数的值，因此不知道控制器是否会更改它们，请重新比较：{keys}',
   ],
   'handover.notWritten': [
     '{count} {count|value|values} of the set are not written by the controller and stay as the drive keeps them.',

@@ -99,6 +99,9 @@ function Verdict({ list, found }: { list: string; found: HandoverComparison }) {
       {found.unknown_here.length > 0 && (
         <p className="dim">{t('handover.unknownHere', { keys: found.unknown_here.join(', ') })}</p>
       )}
+      {found.not_read.length > 0 && (
+        <p className="warn-text">{t('handover.unreadNow', { keys: found.not_read.join(', ') })}</p>
+      )}
       {found.not_written.length > 0 && (
         <p className="dim">{t('handover.notWritten', { count: found.not_written.length })}</p>
       )}

@@ -36,7 +36,12 @@ export function HandOver({ entry, onClose }: { entry: LibraryEntry; onClose: () 
         <p className="empty">{t('three.noAxis')}</p>
       ) : (
         <>
-          <HandOverExport drive={drive} entry={entry} onMade={() => setMade(made + 1)} />
+          <HandOverExport
+            key={drive.id}
+            drive={drive}
+            entry={entry}
+            onMade={() => setMade(made + 1)}
+          />
           <ControllerList key={drive.id} drive={drive} file={entry.name} />
           <EarlierHandovers key={`${drive.id} ${made}`} drive={drive} />
         </>

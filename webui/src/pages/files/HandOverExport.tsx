@@ -1,10 +1,17 @@
 import { Button, Checkbox, FileInput, NativeSelect, TextInput } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
-import type { DriveSummary, HandoverRequest, HandoverResult, LibraryEntry } from '../../api/schema'
+import type {
+  DriveSummary,
+  HandoverRequest,
+  HandoverResult,
+  LibraryEntry,
+  SegmentAxis,
+} from '../../api/schema'
 import { useT } from '../../i18n'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
+import { SegmentAxes } from './SegmentAxes'
 import { offerDownload } from './sets'
 
 type Format = HandoverRequest['format']
@@ -25,6 +32,8 @@ const FORMATS: Record<Format, string> = {
 const ROWS: Rows[] = ['all', 'tuned', 'not_default', 'chosen']
 /** Formats in which the ESI file says more than the set. */
 const WITH_ESI: ReadonlySet<Format> = new Set(['eni', 'lcec', 'ros2'])
+/** Formats that hold several drives of one bus. */
+const OF_SEGMENTS: ReadonlySet<Format> = new Set(['eni', 'lcec', 'ros2'])
 /** Names the server takes (HandoverRequest.file). */
 const NAME = /^\w[\w .-]{0,100}$/
 
@@ -45,24 +54,26 @@ export function HandOverExport({
   const [rows, setRows] = useState<Rows>('all')
   const [keys, setKeys] = useState('')
   const [individual, setIndividual] = useState(false)
-  const [esi, setEsi] = useState<File | null>(null)
+  const [esi, setEsi] = useState<File[]>([])
+  const [segment, setSegment] = useState<SegmentAxis[] | null>(null)
+  const axes = segment ?? [{ drive_id: drive.id, set_file: entry.name }]
   const [result, setResult] = useState<HandoverResult | null>(null)
   const act = useAction()
   const make = () =>
     act.run(async () => {
       setResult(null)
       const only = keys.split(/[\s,;]+/).filter(Boolean)
+      const whole = OF_SEGMENTS.has(format)
       const made = await ask(
-        api.POST('/api/v1/drives/{drive_id}/handover', {
-          params: { path: { drive_id: drive.id } },
+        api.POST('/api/v1/handover', {
           body: {
-            set_file: entry.name,
+            axes: whole ? axes : [{ drive_id: drive.id, set_file: entry.name }],
             format,
             file,
             choice: rows === 'chosen' ? 'all' : rows,
             only: rows === 'chosen' ? only.map((key) => key.toUpperCase()) : [],
             include_motor_individual: individual,
-            esi: esi && WITH_ESI.has(format) ? await base64(esi) : null,
+            esi: WITH_ESI.has(format) ? await Promise.all(esi.map(base64)) : [],
           },
         }),
       )
@@ -110,11 +121,13 @@ export function HandOverExport({
             description={t('handover.esiHelp')}
             accept=".xml,text/xml"
             clearable
+            multiple
             value={esi}
             onChange={setEsi}
           />
         )}
       </div>
+      {OF_SEGMENTS.has(format) && <SegmentAxes axes={axes} onChange={setSegment} />}
       <Checkbox
         label={t('handover.individual')}
         checked={individual}
@@ -138,6 +151,7 @@ export function HandOverExport({
 
 function Made({ result }: { result: HandoverResult }) {
   const t = useT()
+  const several = new Set(result.left_out.map((row) => row.drive)).size > 1
   return (
     <div className="note" role="status">
       <p>{t('handover.made', { writes: result.writes, left: result.left_out.length })}</p>
@@ -171,7 +185,8 @@ function Made({ result }: { result: HandoverResult }) {
           <summary>{t('handover.leftOut')}</summary>
           <ul>
             {result.left_out.map((row) => (
-              <li key={row.key}>
+              <li key={`${row.drive} ${row.key}`}>
+                {several && `${row.drive} `}
                 <span className="mono">{row.key}</span> {row.reason}
               </li>
             ))}

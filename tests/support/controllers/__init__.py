@@ -1,0 +1,1 @@
+"""What controllers make of our lists: readers written from their documentation, not from ours."""
