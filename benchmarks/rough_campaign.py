@@ -23,7 +23,6 @@ import asyncio
 import json
 import subprocess
 import time
-from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, fields
@@ -66,7 +65,7 @@ class Tally:
     refused: list[str] = field(default_factory=list)
     db: list[float] = field(default_factory=list)
     deg: list[float] = field(default_factory=list)
-    held: dict[str, list[bool]] = field(default_factory=lambda: defaultdict(list))
+    held: dict[str, list[bool]] = field(default_factory=dict)
     kept: int = 0
     false: list[str] = field(default_factory=list)
     sound: int = 0
@@ -78,13 +77,13 @@ class Tally:
             mine, theirs = getattr(self, each.name), getattr(other, each.name)
             if isinstance(mine, dict):
                 for name, rows in theirs.items():
-                    self.held[name] += rows
+                    self.held.setdefault(name, []).extend(rows)
             else:
                 setattr(self, each.name, mine + theirs)
 
     def share(self, name: str) -> float | None:
         """Of intervals that hold the truth; None without any."""
-        rows = self.held[name]
+        rows = self.held.get(name)
         return float(np.mean(rows)) if rows else None
 
 
@@ -105,15 +104,15 @@ def lines_of(result: SweepResult, spec: MechanicsSpec, tally: Tally) -> None:
     db, deg = 20 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))
     tally.db.append(float(np.median(np.abs(db))))
     tally.deg.append(float(np.median(np.abs(deg))))
-    tally.held["magnitude"] += (np.abs(db) <= _CI95 * frf.std_db[use]).tolist()
-    tally.held["phase"] += (np.abs(deg) <= _CI95 * frf.std_deg[use]).tolist()
+    tally.held.setdefault("magnitude", []).extend((np.abs(db) <= _CI95 * frf.std_db[use]).tolist())
+    tally.held.setdefault("phase", []).extend((np.abs(deg) <= _CI95 * frf.std_deg[use]).tolist())
     truth = true_modes(spec)
     for r in result.resonances:
         if r.kind != "resonance":
             continue
         hz, damping = min(truth, key=lambda m: abs(np.log(m[0] / r.frequency_hz)), default=(0, 0))
         if not hz or abs(hz / r.frequency_hz - 1) > 0.2:
-            tally.held["mode"].append(False)
+            tally.held.setdefault("mode", []).append(False)
             tally.seen.append(f"a mode at {r.frequency_hz:.1f} Hz that is none")
             continue
         hold(tally, "mode", hz, r.frequency_ci95_hz)
@@ -125,7 +124,7 @@ def hold(tally: Tally, name: str, truth: float, interval: tuple[float, float] | 
     if interval is None:
         return
     low, high = interval
-    tally.held[name].append(bool(low <= truth <= high))
+    tally.held.setdefault(name, []).append(bool(low <= truth <= high))
     mark = "" if low <= truth <= high else "!"
     tally.seen.append(f"{name}{mark} {truth:.5g} in {low:.5g}…{high:.5g}")
 
@@ -307,7 +306,7 @@ def _row(kind: str, tally: Tally) -> str:
         if share is None:
             cells.append(f"{'–':>9}")
         else:
-            count = "" if name in _LINES else f"/{len(tally.held[name])}"
+            count = "" if name in _LINES else f"/{len(tally.held.get(name, []))}"
             cells.append(f"{share:.0%}{'!' if share < _HELD else ''}{count}")
     counts = f" {tally.kept:5} {len(tally.false):5} {len(tally.refused):7} "
     counts += f"{f'{len(tally.rejected)}/{tally.sound}':>9}"
