@@ -55,6 +55,17 @@ def test_margins_within_the_band_are_those_of_the_loop() -> None:
     assert not found.missed(Goals(9.0, 60.0, 1.8), 1.0, 1.0, 1.03)
 
 
+def test_a_loop_whose_crossover_is_not_seen_is_predicted_by_what_its_lines_tell() -> None:
+    """L = w e^(-s d)/s with 100 Hz and 0.5 ms: 72°; a delay known to 5 µs costs 30 µs, 1.1°."""
+    nominal = loop_of(DENSE, 100.0, 0.5e-3)
+    known = judge(None, DENSE, nominal[None, :], nominal, late_s=(0.0, 5e-6), size=(0.0, 0.01))
+    unknown = judge(None, DENSE, nominal[None, :], nominal)
+    assert known.coverage == unknown.coverage == "predicted"
+    assert known.worst.phase_margin_deg == pytest.approx(72.0 - 1.1 - 0.9, abs=0.4)
+    # Nothing known: 200 µs and 1.5 dB, with which it crosses at 118 Hz: 90 - 118 * 0.7 ms * 360.
+    assert unknown.worst.phase_margin_deg == pytest.approx(90.0 - 0.36 * 118.5 * 0.7, abs=0.5)
+
+
 def test_a_crossover_above_the_band_keeps_no_design() -> None:
     found = verdict_of(474.0, 0.1e-3, 246.0)
     assert found.coverage == "predicted"

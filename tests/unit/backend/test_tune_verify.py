@@ -16,6 +16,7 @@ from backend.axis.axis import Envelope
 from backend.tools.autotune import verify as tune_verify
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.autotune.time_budget import TimeLeft
+from backend.tools.autotune.verdict import sharp_lines, telling_lines
 from backend.tools.autotune.verify import (
     Check,
     Verified,
@@ -97,6 +98,20 @@ def test_a_loop_that_is_seen_above_its_crossover_only_tells_no_margins(from_hz: 
     swept = loop_swept(1.0)
     blurred = np.where(swept.frf.frequency_hz < from_hz, 10.0, 1.0)
     assert sharp_margins(replace(swept, frf=replace(swept.frf, std_deg=blurred))) == {}
+
+
+def test_lines_above_the_crossover_tell_the_loop_but_not_its_margins() -> None:
+    """Of a loop whose bandwidth is 60 Hz, seen from 80 Hz on."""
+    frf = loop_swept(1.0).frf
+    blurred = replace(frf, std_deg=np.where(frf.frequency_hz < 80.0, 10.0, 1.0))
+    assert sharp_lines(blurred) is None
+    told = telling_lines(blurred)
+    assert told is not None
+    assert told.frequency_hz[0] == pytest.approx(80.0)
+    assert sharp_lines(frf) is not None
+    # Ten lines tell neither.
+    few = replace(frf, std_deg=np.where(np.arange(frf.frequency_hz.size) < 70, 10.0, 1.0))
+    assert telling_lines(few) is None
 
 
 @pytest.mark.parametrize(
