@@ -103,9 +103,12 @@ def verdict_of(
 
     dense = plant.frequency_hz
     every, nominal = loops(dense, plant.shifted()), loops(dense, plant.response())
+    beside = None
+    if facts.motor_inertia_kgm2:
+        beside = loops(dense, plant.motor_alone_above(facts.motor_inertia_kgm2))[None, :]
     seen = telling_lines(frf)
     if seen is None:
-        return judge(None, dense, every, nominal, shown_gain_db=shown_gain_db)
+        return judge(None, dense, every, nominal, shown_gain_db=shown_gain_db, beside=beside)
     crossing = sharp_lines(frf) is not None
     f = seen.frequency_hz
     expected = loops(f, plant.on(f).response())
@@ -117,6 +120,7 @@ def verdict_of(
         judge(
             Lines(f, path.closed, seen.deviation) if crossing else None, dense, every, nominal,
             shown_gain_db=shown_gain_db, late_s=path.loop_late_s, size=path.loop_size,
+            beside=beside,
         )
         for path in paths
     ]  # fmt: skip
