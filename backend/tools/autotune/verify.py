@@ -256,8 +256,12 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
     if np.abs(closed[0]) < WITHIN:
         return {}
     found = sweep_evaluation.margins_of(f, open_from_closed(closed))
-    if found["phase_margin_deg"] is None:
+    phase = found["phase_margin_deg"]
+    if not isinstance(phase, float):
         return {}
+    # It stood and was measured closed, so it is stable: what counts is how near it comes to the
+    # critical point, on either side. Too few lines may count its turns wrongly.
+    found["phase_margin_deg"] = abs(phase)
     width = bandwidth(f, closed)
     if width.minus_3db_hz is None:
         # It may fall into an antiresonance, where its lines are weak.

@@ -92,6 +92,18 @@ def test_margins_are_read_from_lines_that_noise_hardly_moves() -> None:
     assert sharp_margins(loop_swept(10.0)) == {}
 
 
+def test_a_crossing_that_leads_is_as_far_from_the_critical_point_as_it_is() -> None:
+    """A passive loop around a mode at 60 Hz, measured closed: 96° on either side, none missed."""
+    swept = loop_swept(1.0)
+    f = swept.frf.frequency_hz
+    s, w = 2j * np.pi * f, 2 * np.pi * 60.0
+    loop = 10 * 0.1 * w * s / (s**2 + 0.1 * w * s + w**2) + 2 * np.pi * 8.0 / s
+    found = sharp_margins(replace(swept, frf=replace(swept.frf, response=loop / (1 + loop))))
+    assert isinstance(found["phase_margin_deg"], float)
+    assert found["phase_margin_deg"] > 60.0
+    assert not any("phase" in each.code for each in worse_than(PROMISED, found))
+
+
 @pytest.mark.parametrize("from_hz", [80.0, 45.0])
 def test_a_loop_that_is_seen_above_its_crossover_only_tells_no_margins(from_hz: float) -> None:
     # Its bandwidth is 60 Hz and its crossover 39 Hz: without them the rest says nothing.
