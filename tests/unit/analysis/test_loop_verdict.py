@@ -175,8 +175,14 @@ def test_a_motor_that_may_be_alone_above_the_band_widens_what_is_stated() -> Non
     """Three times the loop's size from 400 Hz on: its gain margin is 9.5 dB less."""
     nominal = loop_of(DENSE, 60.0, 0.35e-3)
     alone = nominal * np.where(DENSE > 400.0, 3.0, 1.0)
-    given = {"late_s": (0.0, 5e-6), "size": (0.0, 0.01), "beside": alone[None, :]}
-    raised = judge(None, DENSE, nominal[None, :], nominal, shown_gain_db=7.0, **given)
+
+    def judged(shown_gain_db: float | None) -> LoopVerdict:
+        return judge(
+            None, DENSE, nominal[None, :], nominal, shown_gain_db=shown_gain_db,
+            late_s=(0.0, 5e-6), size=(0.0, 0.01), beside=alone[None, :],
+        )  # fmt: skip
+
+    raised = judged(7.0)
     assert raised.predicted is not None
     assert raised.designed is not None
     stated, designed = raised.predicted.gain_margin_db, raised.designed.gain_margin_db
@@ -187,8 +193,8 @@ def test_a_motor_that_may_be_alone_above_the_band_widens_what_is_stated() -> Non
     # 20 log10(1/(4 · 60 Hz · 0.35 ms)) is 21.5 dB: the design is kept by that, not by the motor's.
     assert not raised.missed(Goals(15.0, 48.0, 1.8), 1.0, 1.0, 1.03)
     # A gain that was raised by 14 dB excludes it.
-    far = judge(None, DENSE, nominal[None, :], nominal, shown_gain_db=14.0, **given)
+    far = judged(14.0)
     assert far.predicted == far.designed
     # Without a raised gain the loop is not kept, and nothing is widened.
-    unseen = judge(None, DENSE, nominal[None, :], nominal, **given)
+    unseen = judged(None)
     assert unseen.predicted == unseen.designed
