@@ -261,9 +261,9 @@ def run(cases: list[Case], tune: float, until_s: float, store: Path | None) -> l
             f"{row['cpu_s']:5.1f} s {error:6.2f} dB {row['word'][:300]}",
             flush=True,
         )
-        told = [*tally["seen"], *tally["rejected"], *tally["false"]]
-        if told:
-            print("     " + "; ".join(told), flush=True)
+        reported = [*tally["seen"], *tally["rejected"], *tally["false"]]
+        if reported:
+            print("     " + "; ".join(reported), flush=True)
     return rows
 
 
@@ -292,9 +292,9 @@ def table(rows: list[dict[str, Any]]) -> str:
         whole.add(tally)
         lines.append(_row(kind, tally))
     lines.append(_row("all", whole))
-    told = [f"FALSE {each}" for each in whole.false]
-    told += [f"REJECTED THOUGH SOUND {each}" for each in whole.rejected]
-    return "\n".join([*lines, *told])
+    reported = [f"FALSE {each}" for each in whole.false]
+    reported += [f"REJECTED THOUGH SOUND {each}" for each in whole.rejected]
+    return "\n".join([*lines, *reported])
 
 
 def _row(kind: str, tally: Tally) -> str:

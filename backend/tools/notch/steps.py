@@ -40,7 +40,7 @@ def attenuation_steps(parameter: Parameter) -> IntegerRange:
 
     Raises:
         Unsuitable: its unit is not dB, or its limits have either sign, so that which one it is
-            cannot be told.
+            cannot be known.
     """
     if parameter.unit not in ("", "dB"):
         raise Unsuitable(text("notch.unit-of-depth", parameter=parameter.key, unit=parameter.unit))
