@@ -1,6 +1,7 @@
 """Rough drives: error, calibration and false verdicts over drawn axes, in one command.
 
     python -m benchmarks.rough_campaign [--axes 300] [--minutes M] [--seed 0] [--tune 0.5]
+        [--store ROWS.jsonl] [--only CLASS …]
 
 Every axis is drawn: family (an unlisted drive included), mechanics, and one or more nuisances of
 `RoughTorqueSpec`, whose structure the analysis does not assume. The product's own tools run beside
@@ -10,18 +11,22 @@ frequency and damping of modes, margins); and false verdicts of autotune: kept d
 margins (analytic loop, all frequencies) are more than 5° or 1 dB below the promise, stated
 figures above the truth by more than their interval, and sound designs (the true loop keeps the
 whole promise) that were rejected, of all verifications of sound ones. It ends after ``--minutes``
-with what it has; 90 to 99 % is aimed at, and what misses is marked ``!``.
+with what it has; 90 to 99 % is aimed at, and what misses is marked ``!``. With ``--store`` each
+axis becomes a row of that file, axes that have one are not run again, and the table is that of all
+its rows, so that an interrupted campaign goes on where it ended.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
+import json
+import subprocess
 import time
-from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
@@ -36,11 +41,11 @@ from backend.tools.inertia.run import inertia
 from backend.tools.sweep.evaluation import SweepResult, SweepSettings
 from backend.tools.sweep.run import sweep
 from backend.work.jobs import Progress
+from benchmarks._rough_cases import CLASSES, Case, case_of
 from benchmarks._true_loop import true_margins
 from benchmarks._tune_figures import true_modes
-from benchmarks.tune_accuracy import drawn
 from drivers.errors import DriveError
-from drivers.virtual.mechanics import MechanicsSpec, RoughTorqueSpec, analytic_response
+from drivers.virtual.mechanics import MechanicsSpec, analytic_response
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE
 
@@ -49,53 +54,6 @@ _CI95 = 1.96
 _HELD = 0.9
 #: An axis that takes longer is given up.
 _LONGEST_S = 150.0
-FAMILIES = ("mms7", "m6l", "r6l", "generic402")
-#: One class of behaviour each: how it is drawn.
-CLASSES: dict[str, dict[str, tuple[float, float] | bool | str]] = {
-    "as assumed": {},
-    "held setpoints": {"holds_torque": True, "holds_speed": True},
-    "filtered 6077h": {"reported_filter_s": (3e-4, 2e-3)},
-    "6077h is the demand": {"reported": "demand"},
-    "torque low-pass": {"torque_filter_s": (2e-4, 8e-4)},
-    "loop period": {"loop_period_s": (62.5e-6, 250e-6)},
-    "torque constant": {"torque_constant": (0.9, 1.1)},
-    "cogging, pre-sliding": {"cogging_nm": (0.005, 0.03), "presliding_rad": (2e-4, 3e-3)},
-    "cable drag": {"drag_nm": (0.01, 0.06), "drag_rad": (0.2, 2.0)},
-    "inertia by place": {"inertia_share": (0.02, 0.15)},
-    "stiffness by place": {"stiffness_share": (0.02, 0.2)},
-    "belt slip": {"slip_per_s": (0.5, 20.0)},
-    "supply dip": {"dip_share": (0.2, 0.8), "dip_s": (5e-3, 3e-2), "dip_every_s": (0.4, 1.5)},
-    "encoder interpolation": {"interpolation_rad": (2e-6, 3e-5)},
-    "jitter": {"jitter_s": (50e-6, 150e-6)},
-}
-
-
-@dataclass(frozen=True)
-class Case:
-    """One drawn axis."""
-
-    number: int
-    kind: str
-    drive: str
-    spec: MechanicsSpec
-
-
-def case_of(number: int) -> Case:
-    """The axis of this number; classes and families come in turn."""
-    rng = np.random.default_rng(7919 * number + 13)
-    kind = list(CLASSES)[number % len(CLASSES)]
-    turn, place = divmod(number, len(CLASSES))
-    drive = FAMILIES[(turn + place) % len(FAMILIES)]
-    options: dict[str, Any] = {}
-    for name, given in CLASSES[kind].items():
-        options[name] = float(rng.uniform(*given)) if isinstance(given, tuple) else given
-    # Vertical axes (every fifth) need a brake by family; here all turn freely.
-    base = drawn(100_000 + 5 * number + int(rng.integers(0, 4)))
-    base = base.model_copy(
-        update={"friction": base.friction.model_copy(update={"gravity_nm": 0.0})}
-    )
-    rough = RoughTorqueSpec(**options)
-    return Case(number, kind, drive, base.model_copy(update={"rough_torque": rough}))
 
 
 @dataclass
@@ -103,18 +61,29 @@ class Tally:
     """Counts of one class."""
 
     axes: int = 0
+    seen: list[str] = field(default_factory=list)
     refused: list[str] = field(default_factory=list)
     db: list[float] = field(default_factory=list)
     deg: list[float] = field(default_factory=list)
-    held: dict[str, list[bool]] = field(default_factory=lambda: defaultdict(list))
+    held: dict[str, list[bool]] = field(default_factory=dict)
     kept: int = 0
     false: list[str] = field(default_factory=list)
     sound: int = 0
     rejected: list[str] = field(default_factory=list)
 
+    def add(self, other: Tally) -> None:
+        """Count another one's axes as well."""
+        for each in fields(self):
+            mine, theirs = getattr(self, each.name), getattr(other, each.name)
+            if isinstance(mine, dict):
+                for name, rows in theirs.items():
+                    self.held.setdefault(name, []).extend(rows)
+            else:
+                setattr(self, each.name, mine + theirs)
+
     def share(self, name: str) -> float | None:
         """Of intervals that hold the truth; None without any."""
-        rows = self.held[name]
+        rows = self.held.get(name)
         return float(np.mean(rows)) if rows else None
 
 
@@ -123,6 +92,9 @@ def lines_of(result: SweepResult, spec: MechanicsSpec, tally: Tally) -> None:
 
     Figures rest on the rated torque: an error of the torque constant is the drive's, and stated.
     """
+    if any(load.backlash_rad for load in spec.load):
+        # Play has no linear truth (`benchmarks._best_linear`).
+        return
     frf = result.frf
     use = frf.in_band & (frf.coherence >= 0.9) & np.isfinite(frf.std_db)
     if not np.any(use):
@@ -132,22 +104,29 @@ def lines_of(result: SweepResult, spec: MechanicsSpec, tally: Tally) -> None:
     db, deg = 20 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))
     tally.db.append(float(np.median(np.abs(db))))
     tally.deg.append(float(np.median(np.abs(deg))))
-    tally.held["magnitude"] += (np.abs(db) <= _CI95 * frf.std_db[use]).tolist()
-    tally.held["phase"] += (np.abs(deg) <= _CI95 * frf.std_deg[use]).tolist()
+    tally.held.setdefault("magnitude", []).extend((np.abs(db) <= _CI95 * frf.std_db[use]).tolist())
+    tally.held.setdefault("phase", []).extend((np.abs(deg) <= _CI95 * frf.std_deg[use]).tolist())
     truth = true_modes(spec)
     for r in result.resonances:
         if r.kind != "resonance":
             continue
         hz, damping = min(truth, key=lambda m: abs(np.log(m[0] / r.frequency_hz)), default=(0, 0))
         if not hz or abs(hz / r.frequency_hz - 1) > 0.2:
-            tally.held["mode"].append(False)
+            tally.held.setdefault("mode", []).append(False)
+            tally.seen.append(f"a mode at {r.frequency_hz:.1f} Hz that is none")
             continue
-        if r.frequency_ci95_hz:
-            low, high = r.frequency_ci95_hz
-            tally.held["mode"].append(bool(low <= hz <= high))
-        if r.damping_ci95:
-            low, high = r.damping_ci95
-            tally.held["damping"].append(bool(low <= damping <= high))
+        hold(tally, "mode", hz, r.frequency_ci95_hz)
+        hold(tally, "damping", damping, r.damping_ci95)
+
+
+def hold(tally: Tally, name: str, truth: float, interval: tuple[float, float] | None) -> None:
+    """Count whether a stated interval holds the truth, and note both."""
+    if interval is None:
+        return
+    low, high = interval
+    tally.held.setdefault(name, []).append(bool(low <= truth <= high))
+    mark = "" if low <= truth <= high else "!"
+    tally.seen.append(f"{name}{mark} {truth:.5g} in {low:.5g}…{high:.5g}")
 
 
 async def measured(case: Case, tally: Tally) -> None:
@@ -166,7 +145,7 @@ async def measured(case: Case, tally: Tally) -> None:
             for name, interval, truth in (
                 ("J", found.inertia_kgm2, j / constant), ("Tc", found.coulomb_nm, tc / constant)
             ):  # fmt: skip
-                tally.held[name].append(bool(interval.low <= truth <= interval.high))
+                hold(tally, name, truth, (interval.low, interval.high))
         result = await sweep(
             d.axis, d.session, SweepSettings(WIDE, rated_torque_nm=rated), _silent()
         )
@@ -226,68 +205,91 @@ def judged(found: AutotuneResult, device: Any, case: Case, tally: Tally) -> None
             f"{promised.gain_margin_db:.0f} dB, true {true.phase_margin_deg:.0f}° "
             f"{true.gain_margin_db:.1f} dB Ms {true.ms:.2f}"
         )
-    worst = verdict.worst
-    tally.held["PM"].append(bool(true.phase_margin_deg >= worst.phase_margin_deg))
-    tally.held["GM"].append(bool(true.gain_margin_db >= worst.gain_margin_db))
-    tally.held["Ms"].append(bool(true.ms <= worst.ms))
+    worst, most = verdict.worst, float("inf")
+    hold(tally, "PM", true.phase_margin_deg, (worst.phase_margin_deg, most))
+    hold(tally, "GM", true.gain_margin_db, (worst.gain_margin_db, most))
+    hold(tally, "Ms", true.ms, (1.0, worst.ms))
+    tally.seen.append(f"{verdict.coverage}, last crossover {verdict.last_crossover_hz:.0f} Hz")
 
 
 def _silent() -> Progress:
     return Progress(lambda: None)
 
 
-async def run(cases: list[Case], tune: float, until_s: float) -> dict[str, Tally]:
-    """All cases until the time is up; a ``tune`` share of them is tuned, the others measured."""
-    tallies: dict[str, Tally] = {kind: Tally() for kind in CLASSES}
-    for place, case in enumerate(cases):
+def row_of(case: Case, tune: float) -> dict[str, Any]:
+    """Run one axis; what it gave as a row of the store."""
+    tally = Tally(axes=1)
+    work = tuned if case.tunes(tune) else measured
+    begun = time.process_time()
+    word = "ok"
+    try:
+        # By the drive's clock, which `direct` makes the program's.
+        asyncio.run(asyncio.wait_for(work(case, tally), _LONGEST_S))
+    except TimeoutError:
+        word = f"no answer within {_LONGEST_S:.0f} s of the drive's time"
+    except (DriveError, ValueError) as error:
+        word = getattr(error, "message", str(error))
+    if word != "ok":
+        tally.refused.append(f"{case.number} {case.drive}: {word}")
+    return {
+        "number": case.number, "kind": case.kind, "drive": case.drive, "work": work.__name__,
+        "cpu_s": time.process_time() - begun, "version": _version(), "word": word,
+        "tally": asdict(tally),
+    }  # fmt: skip
+
+
+def run(cases: list[Case], tune: float, until_s: float, store: Path | None) -> list[dict[str, Any]]:
+    """All cases until the time is up, after those that the store has; a ``tune`` share is tuned."""
+    rows = []
+    if store is not None and store.exists():
+        rows = [json.loads(line) for line in store.read_text("utf-8").splitlines()]
+    known = {row["number"] for row in rows}
+    for case in cases:
+        if case.number in known:
+            continue
         if time.time() > until_s:
             break
-        tally = tallies[case.kind]
-        tally.axes += 1
-        tunes = int((place + 1) * tune) > int(place * tune)
-        work = tuned if tunes and case.drive != "generic402" else measured
-        begun = time.process_time()
-        try:
-            # By the drive's clock, which `direct` makes the program's.
-            await asyncio.wait_for(work(case, tally), _LONGEST_S)
-            word = "ok"
-        except TimeoutError:
-            word = f"refused: no answer within {_LONGEST_S:.0f} s of the drive's time"
-            tally.refused.append(f"{case.number} {case.drive}: {word}")
-        except (DriveError, ValueError) as error:
-            word = f"refused: {getattr(error, 'message', str(error))}"
-            tally.refused.append(f"{case.number} {case.drive}: {word}")
-        took = time.process_time() - begun
+        row = row_of(case, tune)
+        rows.append(row)
+        if store is not None:
+            with store.open("a", encoding="utf-8") as out:
+                out.write(json.dumps(row) + "\n")
+        tally = row["tally"]
+        error = tally["db"][-1] if tally["db"] else float("nan")
         print(
-            f"{case.number:4} {case.kind:22} {case.drive:11} {work.__name__:8} {took:5.1f} s "
-            f"{tally.db[-1] if tally.db and work is measured else float('nan'):6.2f} dB "
-            f"{word[:300]}",
+            f"{case.number:4} {case.kind:22} {case.drive:11} {row['work']:8} "
+            f"{row['cpu_s']:5.1f} s {error:6.2f} dB {row['word'][:300]}",
             flush=True,
         )
-    return tallies
+        reported = [*tally["seen"], *tally["rejected"], *tally["false"]]
+        if reported:
+            print("     " + "; ".join(reported), flush=True)
+    return rows
+
+
+def _version() -> str:
+    """The commit that measured, with + where files differ from it."""
+    said = subprocess.run(
+        ["git", "describe", "--always", "--dirty=+"], capture_output=True, text=True, check=False
+    )
+    return said.stdout.strip()
 
 
 _QUANTITIES = ("magnitude", "phase", "J", "Tc", "mode", "damping", "PM", "GM", "Ms")
 
 
-def table(tallies: dict[str, Tally]) -> str:
+def table(rows: list[dict[str, Any]]) -> str:
     """Errors, calibration and false verdicts by class."""
+    tallies: dict[str, Tally] = {kind: Tally() for kind in CLASSES}
+    for row in rows:
+        tallies[row["kind"]].add(Tally(**row["tally"]))
     head = f"{'class':22} {'axes':>4} {'dB':>6} {'deg':>6} " + " ".join(
         f"{name[:9]:>9}" for name in _QUANTITIES
     )
     lines = [head + f" {'kept':>5} {'false':>5} {'refused':>7} {'rejected':>9}"]
     whole = Tally()
     for kind, tally in tallies.items():
-        whole.axes += tally.axes
-        whole.kept += tally.kept
-        whole.db += tally.db
-        whole.deg += tally.deg
-        whole.false += tally.false
-        whole.refused += tally.refused
-        whole.sound += tally.sound
-        whole.rejected += tally.rejected
-        for name, rows in tally.held.items():
-            whole.held[name] += rows
+        whole.add(tally)
         lines.append(_row(kind, tally))
     lines.append(_row("all", whole))
     reported = [f"FALSE {each}" for each in whole.false]
@@ -304,7 +306,7 @@ def _row(kind: str, tally: Tally) -> str:
         if share is None:
             cells.append(f"{'–':>9}")
         else:
-            count = "" if name in _LINES else f"/{len(tally.held[name])}"
+            count = "" if name in _LINES else f"/{len(tally.held.get(name, []))}"
             cells.append(f"{share:.0%}{'!' if share < _HELD else ''}{count}")
     counts = f" {tally.kept:5} {len(tally.false):5} {len(tally.refused):7} "
     counts += f"{f'{len(tally.rejected)}/{tally.sound}':>9}"
@@ -321,10 +323,14 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=float("inf"))
     parser.add_argument("--seed", type=int, default=0, help="number of the first axis")
     parser.add_argument("--tune", type=float, default=0.5, help="share of the axes that is tuned")
+    parser.add_argument("--store", type=Path, help="rows of axes that were run, and are not again")
+    parser.add_argument("--only", nargs="+", choices=CLASSES, help="these classes")
     options = parser.parse_args()
-    cases = [case_of(number) for number in range(options.seed, options.seed + options.axes)]
+    numbers = range(options.seed, options.seed + options.axes)
+    cases = [case_of(number) for number in numbers]
+    cases = [case for case in cases if options.only is None or case.kind in options.only]
     until_s = time.time() + 60.0 * options.minutes
-    print(table(asyncio.run(run(cases, options.tune, until_s))))
+    print(table(run(cases, options.tune, until_s, options.store)))
 
 
 if __name__ == "__main__":

@@ -85,6 +85,7 @@ class LoopVerdict:
     ``shown_gain_db``; or they are predicted, which keeps no design. ``stated`` are the worst
     figures of both bands, ``worst`` the ends of their intervals; None where no crossing is known.
     ``delay_s`` and ``gain_db`` are what the measured lines add to the prediction.
+    ``designed`` is `predicted` for what the design counts on alone, by which it is kept or not.
     ``contradicted``: the loop was stable with a raised gain with which none of the possible ones
     is, so that nothing is known beyond the band.
     """
@@ -100,6 +101,7 @@ class LoopVerdict:
     delay_s: Interval
     gain_db: Interval
     contradicted: bool = False
+    designed: BandVerdict | None = None
 
     def missed(
         self, promised: Goals, margin_deg: float, margin_db: float, ms_ratio: float
@@ -128,7 +130,7 @@ class LoopVerdict:
             found.append(Missed("peak_sensitivity", self.stated.ms, promised.ms))
         reported = {each.what for each in found}
         ends = (*_short(self.measured, "measured", promised),
-                *_short(self.predicted, "predicted", promised))  # fmt: skip
+                *_short(self.designed, "predicted", promised))  # fmt: skip
         return (*found, *(each for each in ends if each.what not in reported))
 
 
@@ -165,13 +167,16 @@ def judge(
     shown_gain_db: float | None = None,
     late_s: tuple[float, float] | None = None,
     size: tuple[float, float] | None = None,
+    beside: ComplexArray | None = None,
 ) -> LoopVerdict:
     """The verdict on a loop.
 
     ``loops`` [m, n] on the dense grid ``frequency_hz`` are all that the loop may be, ``nominal``
     [n] the one that was measured as predicted. ``lines`` None: nothing was measured. ``late_s`` and
     ``size`` (logarithm) are what the measured lines show the loop to have beyond its prediction,
-    each with its deviation; None where they tell nothing.
+    each with its deviation; None where they tell nothing. ``beside`` [k, n] are loops that no
+    design counts on and no measurement excludes above its band: where a raised gain excludes none
+    of them either, they widen what is stated there.
     """
     measured, top = None, 0.0
     if lines is not None and lines.frequency_hz.size >= _FEW:
@@ -195,10 +200,16 @@ def judge(
         coverage = "gain_steps"
     beyond = _beyond(frequency_hz, possible, _moved_once(frequency_hz, nominal, gain, delay), top)
     sound = bool(np.all(stable(possible)))
+    designed = beyond
+    if beside is not None and shown_gain_db is not None:
+        others = _moved(frequency_hz, beside, gain, delay)
+        others = others[np.asarray(stable(others * 10 ** (shown_gain_db / 20.0)))]
+        nominal_only = _moved_once(frequency_hz, nominal, gain, delay)
+        beyond = _beyond(frequency_hz, np.concatenate([possible, others]), nominal_only, top)
     stated, worst = _worst(measured, beyond)
     return LoopVerdict(
         measured, beyond, last, coverage, shown_gain_db, stated, worst, sound,
-        delay, _in_db(gain), contradicted,
+        delay, _in_db(gain), contradicted, designed,
     )  # fmt: skip
 
 

@@ -41,7 +41,8 @@ class Margins:
     """Margins of an open loop; None where the data hold no such crossing.
 
     ``crossover_hz`` is the last fall through 0 dB. ``phase_margin_deg`` is the smallest over all
-    crossings of 0 dB; ``gain_margin_db`` the smallest *increase* of gain that reaches the
+    crossings of 0 dB: below zero only where the loop is not stable, as a loop may pass the critical
+    point on either side; ``gain_margin_db`` the smallest *increase* of gain that reaches the
     critical point. ``ms`` is the peak of |S| at ``ms_hz``.
     """
 
@@ -126,6 +127,9 @@ def margins(frequency_hz: FloatArray, loop: ComplexArray) -> Margins:
     worst = int(np.argmax(s))
     smallest_phase = min(phase_margins, key=lambda x: abs(x[0])) if phase_margins else None
     smallest_gain = min(gain_margins) if gain_margins else None
+    steady = is_stable(frequency_hz, loop)
+    if steady and smallest_phase is not None:
+        smallest_phase = (abs(smallest_phase[0]), smallest_phase[1])
     return Margins(
         crossover_hz=falls[-1] if falls else None,
         phase_margin_deg=smallest_phase[0] if smallest_phase else None,
@@ -134,5 +138,5 @@ def margins(frequency_hz: FloatArray, loop: ComplexArray) -> Margins:
         gain_margin_hz=smallest_gain[1] if smallest_gain else None,
         ms=float(s[worst]),
         ms_hz=float(frequency_hz[worst]),
-        stable=is_stable(frequency_hz, loop),
+        stable=steady,
     )

@@ -17,6 +17,8 @@ DAMPING_FACTORS = (0.6, 1.0, 1.4)
 #: A mode is known a little way beyond the highest line. The factor of frequency counts twice up to
 #: here, and four times above, where a mode stands for whatever is stiffer than what was measured.
 BEYOND = 1.25
+#: The motor is alone from so far above the highest line on.
+_LET_GO = 1.26
 #: A line that is known to this (one deviation of its logarithm) tells as much as the model there:
 #: so much does a mode that is off by a per cent turn the lines beside it.
 AS_THE_MODEL = np.radians(10.0)
@@ -63,6 +65,19 @@ class MeasuredPlant:
         rows = [self.response(*move) for move in moves]
         rows += [v.response(self.frequency_hz) for v in self.variants]
         return np.array([*rows, *(self.also if self.also is not None else ())])
+
+    def motor_alone_above(self, motor_inertia_kgm2: float) -> ComplexArray:
+        """The response where the motor turns alone above the highest measured line.
+
+        Whatever hangs on it lets go of it there: no mode above the band is known to be one.
+        """
+        f = self.frequency_hz
+        nominal = self.response()
+        if self.measured_hz <= 0.0:
+            return nominal
+        alone = 1.0 / (2j * np.pi * f * motor_inertia_kgm2)
+        share = np.clip(np.log(f / self.measured_hz) / np.log(_LET_GO), 0.0, 1.0)
+        return np.asarray(nominal * np.exp(share * np.log(alone / nominal)))
 
     def on(self, frequency_hz: FloatArray) -> MeasuredPlant:
         """The same on other lines, ascending; without what it is under other conditions."""

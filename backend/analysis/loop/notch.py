@@ -161,18 +161,33 @@ def realised(raw: NotchCoefficients, sample_time_s: float) -> RealisedNotch:
 
 @dataclass(frozen=True)
 class IntegerRange:
-    """Limits of a raw parameter, inclusive, from the drive's profile."""
+    """Limits of a raw parameter, inclusive, from the drive's profile, and what its steps mean.
+
+    A value is ``raw * scale + offset``: in Hz for frequencies and widths, in dB of attenuation for
+    depths, a level by itself.
+    """
 
     low: int
     high: int
+    scale: float = 1.0
+    offset: float = 0.0
+
+    def step(self, value: float) -> int:
+        """Nearest step, allowed or not."""
+        return int(np.floor((value - self.offset) / self.scale + 0.5))
 
     def nearest(self, value: float) -> int:
         """Nearest allowed step."""
-        return int(min(max(np.floor(value + 0.5), self.low), self.high))
+        return min(max(self.step(value), self.low), self.high)
+
+    def value(self, raw: float) -> float:
+        """What a raw value means."""
+        # Scales such as 0.1 are not exact in binary.
+        return float(f"{raw * self.scale + self.offset:.12g}")
 
 
 def encode_hz_width(notch: Notch, frequency: IntegerRange, width: IntegerRange) -> tuple[int, int]:
-    """M6-L: frequency and width in whole Hz; depth cannot be chosen.
+    """M6-L: frequency and width in steps of Hz; depth cannot be chosen.
 
     A centre outside the range raises ValueError; the width is moved to the nearest allowed one.
     """
@@ -182,7 +197,7 @@ def encode_hz_width(notch: Notch, frequency: IntegerRange, width: IntegerRange) 
 def encode_hz_width_db(
     notch: Notch, frequency: IntegerRange, width: IntegerRange, depth: IntegerRange
 ) -> tuple[int, int, int]:
-    """DS_C: frequency and width in Hz, depth in positive dB."""
+    """DS_C: frequency and width in Hz, depth as attenuation in dB."""
     return (
         _frequency(notch, frequency),
         width.nearest(notch.width_hz),
@@ -190,9 +205,15 @@ def encode_hz_width_db(
     )
 
 
-def decode_hz_width_db(frequency_raw: int, width_raw: int, depth_raw: int) -> Notch:
-    """Back from Hz, Hz, positive dB."""
-    return Notch(float(frequency_raw), float(width_raw), -float(depth_raw))
+def decode_hz_width_db(
+    raw: tuple[int, int, int], frequency: IntegerRange, width: IntegerRange, depth: IntegerRange
+) -> Notch:
+    """Back from Hz, Hz, dB of attenuation.
+
+    Raises ValueError for values that are no notch.
+    """
+    hz, wide, deep = raw
+    return Notch(frequency.value(hz), width.value(wide), -depth.value(deep))
 
 
 @dataclass(frozen=True)
@@ -216,24 +237,26 @@ def encode_hz_levels(
 ) -> tuple[int, int, int]:
     """R6L: frequency in Hz and the levels whose measured effect is nearest to what is asked."""
     centre = _frequency(notch, frequency)
-    ratio = _nearest_level(calibration.width_ratio, notch.width_hz / centre, width)
+    share = notch.width_hz / frequency.value(centre)
+    ratio = _nearest_level(calibration.width_ratio, share, width)
     return centre, ratio, _nearest_level(calibration.depth_db, notch.depth_db, depth)
 
 
 def decode_hz_levels(
-    frequency_raw: int, width_level: int, depth_level: int, calibration: LevelCalibration
+    centre_hz: float, width_level: int, depth_level: int, calibration: LevelCalibration
 ) -> Notch:
     """Notch that these levels were measured to make."""
     ratio = _interpolated(calibration.width_ratio, width_level)
     depth = min(0.0, _interpolated(calibration.depth_db, depth_level))
-    return Notch(float(frequency_raw), ratio * frequency_raw, depth)
+    return Notch(centre_hz, ratio * centre_hz, depth)
 
 
 def _frequency(notch: Notch, allowed: IntegerRange) -> int:
-    value = int(np.floor(notch.center_hz + 0.5))
-    if not allowed.low <= value <= allowed.high:
-        raise ValueError(f"{notch.center_hz:g} Hz is outside {allowed.low} to {allowed.high} Hz")
-    return value
+    raw = allowed.step(notch.center_hz)
+    if not allowed.low <= raw <= allowed.high:
+        low, high = sorted((allowed.value(allowed.low), allowed.value(allowed.high)))
+        raise ValueError(f"{notch.center_hz:g} Hz is outside {low:g} to {high:g} Hz")
+    return raw
 
 
 def _interpolated(points: tuple[tuple[int, float], ...], level: float) -> float:

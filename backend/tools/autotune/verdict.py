@@ -64,10 +64,20 @@ def fixed_of(
 
 
 def sharp_lines(frf: Frf) -> Lines | None:
-    """The lines that noise hardly moves, up to the first gap; None where they tell no loop."""
+    """The lines that margins are read from; None where they begin above the loop's bandwidth."""
+    found = telling_lines(frf)
+    return None if found is None or np.abs(found.closed[0]) < WITHIN else found
+
+
+def telling_lines(frf: Frf) -> Lines | None:
+    """The lines that noise hardly moves, up to the first gap; None where there are too few.
+
+    Of a slow loop they lie above its crossover: they tell its size and its delay all the same,
+    though not the margins of that crossover.
+    """
     use = frf.in_band & (frf.coherence > COHERENT) & ~(frf.std_deg > BLURRED_DEG)
     f, closed = frf.frequency_hz[use], frf.response[use]
-    if f.size < LINES or np.abs(closed[0]) < WITHIN:
+    if f.size < LINES:
         return None
     parts = (np.log(10.0) / 20.0 * frf.std_db[use], np.radians(frf.std_deg[use]))
     deviation = np.sqrt(0.5 * sum(np.nan_to_num(part, nan=0.0) ** 2 for part in parts))
@@ -93,9 +103,13 @@ def verdict_of(
 
     dense = plant.frequency_hz
     every, nominal = loops(dense, plant.shifted()), loops(dense, plant.response())
-    seen = sharp_lines(frf)
+    beside = None
+    if facts.motor_inertia_kgm2:
+        beside = loops(dense, plant.motor_alone_above(facts.motor_inertia_kgm2))[None, :]
+    seen = telling_lines(frf)
     if seen is None:
-        return judge(None, dense, every, nominal, shown_gain_db=shown_gain_db)
+        return judge(None, dense, every, nominal, shown_gain_db=shown_gain_db, beside=beside)
+    crossing = sharp_lines(frf) is not None
     f = seen.frequency_hz
     expected = loops(f, plant.on(f).response())
     paths = reference_paths(
@@ -104,8 +118,9 @@ def verdict_of(
     )  # fmt: skip
     found = [
         judge(
-            Lines(f, path.closed, seen.deviation), dense, every, nominal,
+            Lines(f, path.closed, seen.deviation) if crossing else None, dense, every, nominal,
             shown_gain_db=shown_gain_db, late_s=path.loop_late_s, size=path.loop_size,
+            beside=beside,
         )
         for path in paths
     ]  # fmt: skip

@@ -203,9 +203,7 @@ def _verdict(
     """None where there is no plant to predict from: a design always has one."""
     if check.plant is None:
         return None
-    return verdict_of(
-        axis, check.facts, check.plant, candidate, swept.frf, check.hold, shown_db
-    )  # fmt: skip
+    return verdict_of(axis, check.facts, check.plant, candidate, swept.frf, check.hold, shown_db)
 
 
 def _misses(verdict: LoopVerdict | None, promised: Goals) -> tuple[Missed, ...]:
@@ -256,7 +254,7 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
     if np.abs(closed[0]) < WITHIN:
         return {}
     found = sweep_evaluation.margins_of(f, open_from_closed(closed))
-    if found["phase_margin_deg"] is None:
+    if not isinstance(phase := found["phase_margin_deg"], float):
         return {}
     width = bandwidth(f, closed)
     if width.minus_3db_hz is None:
@@ -265,6 +263,8 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
         width = bandwidth(frf.frequency_hz[seen], frf.response[seen])
     return {
         **found,
+        # Measured closed, it is stable: its distance to the critical point on either side counts.
+        "phase_margin_deg": abs(phase),
         "bandwidth_hz": width.minus_3db_hz,
         "bandwidth_90deg_hz": width.minus_90deg_hz,
     }

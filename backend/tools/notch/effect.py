@@ -170,7 +170,7 @@ async def tried_with(
             away_rev = units.position(await axis.position_raw() - home)
             if abs(away_rev) > near_rev:
                 await go_back(axis, session, home, envelope, facts)
-            async with temporary(axis, off | raw_of(slot, centre, trial)):
+            async with temporary(axis, off | raw_of(drive, slot, centre, trial)):
                 try:
                     effects.append((trial, await player.notched(reported)))
                 except ValueError:

@@ -28,12 +28,15 @@ from backend.axis.axis import Axis
 from backend.drive.drive import Drive
 from backend.tools.measuring.temporary import write_settings
 from backend.tools.notch.meaning import NotchMeaning
+from backend.tools.notch.steps import attenuation_steps, hz_steps, level_steps
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import Text, Unsuitable, cause_of, text
 from profiles.schema import NotchSlot, NotchSpec, Parameter, Profile
 
 #: Depth shown for families whose manual prints none; the effect has to be measured.
 UNKNOWN_DEPTH_DB = -40.0
+#: A notch that is read back this far from its centre is another one.
+_ELSEWHERE = 0.1
 
 
 @dataclass(frozen=True)
@@ -84,9 +87,22 @@ def _value_keys(slot: NotchSlot) -> tuple[str, ...]:
     return tuple(key for key in keys if key is not None)
 
 
-def _range(parameter: Parameter) -> IntegerRange:
-    low, high = parameter.raw_limits
-    return IntegerRange(int(low or 0), int(high if high is not None else 0xFFFF))
+def _hz_width_db(
+    profile: Profile, slot: NotchSlot
+) -> tuple[IntegerRange, IntegerRange, IntegerRange]:
+    """Steps of frequency, width and attenuation.
+
+    Raises:
+        Unsuitable: what a step means is not known.
+    """
+    keys = profile.by_key
+    frequency, width = keys[slot.frequency_key or ""], keys[slot.width_key or ""]
+    return hz_steps(frequency), hz_steps(width), attenuation_steps(keys[slot.depth_key or ""])
+
+
+def _width_steps(slot: NotchSlot, width: Parameter) -> IntegerRange:
+    """Steps of a width whose meaning is measured: Hz, or levels where depth is one as well."""
+    return hz_steps(width) if slot.depth_key is None else level_steps(width)
 
 
 def _coefficients(slot: NotchSlot, raw: Mapping[str, int]) -> NotchCoefficients:
@@ -124,7 +140,32 @@ def encode(
                 cause=cause_of(error),
             ) from error
     raw |= _enable(profile, slot, notch is not None, enable_now)
+    _require_meant(profile, drive, number, notch, raw, meaning)
     return Preview(number, notch, raw, made, note)
+
+
+def _require_meant(
+    profile: Profile, drive: str, number: int, notch: Notch | None, raw: Mapping[str, int],
+    meaning: NotchMeaning | None,
+) -> None:  # fmt: skip
+    """Raise OutOfRange where these values, read back, are no notch or one elsewhere."""
+    spec = spec_of(profile, drive)
+    if notch is None or spec.encoding == "coefficients":
+        # Coefficients show their own response, coarse as it may be.
+        return
+    slot = spec.slots[number]
+    on = slot.enable_key is not None or slot.frequency_key is None
+    on = on or raw[slot.frequency_key or ""] != off_raw(profile, slot.frequency_key or "")
+    try:
+        got = _decoded(profile, spec, slot, number, raw, on, meaning).notch if on else None
+    except ValueError:
+        got = None
+    if got is None or abs(got.center_hz / notch.center_hz - 1.0) > _ELSEWHERE:
+        raise OutOfRange(
+            "notch.read-back-other", drive=drive, value=f"{notch.center_hz:g} Hz",
+            limit="a notch at that frequency", number=number + 1,
+            read_hz=0.0 if got is None else got.center_hz,
+        )  # fmt: skip
 
 
 def _enable(profile: Profile, slot: NotchSlot, on: bool, enable_now: int | None) -> dict[str, int]:
@@ -156,7 +197,6 @@ def off_raw(profile: Profile, frequency_key: str) -> int:
 def _encoded(
     profile: Profile, spec: NotchSpec, slot: NotchSlot, notch: Notch, meaning: NotchMeaning | None
 ) -> tuple[dict[str, int], RealisedNotch | None, Text | None]:
-    keys = profile.by_key
     if spec.encoding == "coefficients":
         if spec.sample_time_s is None:
             raise Unsuitable(text("notch.loop-period-unknown"))
@@ -167,13 +207,12 @@ def _encoded(
         return raw, realised(stored, spec.sample_time_s), None
     if slot.frequency_key is None or slot.width_key is None:
         raise Unsuitable(text("notch.parameters-not-named"))
-    frequency, width = keys[slot.frequency_key], keys[slot.width_key]
     if spec.encoding in ("hz_width", "hz_levels"):
         return _by_measure(profile, slot, notch, meaning)
     if spec.encoding == "hz_width_db" and slot.depth_key is not None:
-        depth = keys[slot.depth_key]
-        hz, wide, db = encode_hz_width_db(notch, _range(frequency), _range(width), _range(depth))
-        shown = decode_hz_width_db(hz, wide, db)
+        steps = _hz_width_db(profile, slot)
+        hz, wide, db = encode_hz_width_db(notch, *steps)
+        shown = decode_hz_width_db((hz, wide, db), *steps)
         made = RealisedNotch(shown.center_hz, shown.width_hz, shown.depth_db, 0.0, True)
         return {slot.frequency_key: hz, slot.width_key: wide, slot.depth_key: db}, made, None
     raise Unsuitable(text("notch.parameters-not-named"))
@@ -185,17 +224,18 @@ def _by_measure(
     """Values that no manual explains, by what was measured of them."""
     keys = profile.by_key
     frequency, width = keys[slot.frequency_key or ""], keys[slot.width_key or ""]
-    depth = None if slot.depth_key is None else _range(keys[slot.depth_key])
+    depth = None if slot.depth_key is None else level_steps(keys[slot.depth_key])
+    steps = hz_steps(frequency), _width_steps(slot, width)
     if meaning is None and depth is not None:
         raise Unsuitable(text("notch.levels-not-explained"))
     made = meaning or NotchMeaning(notch.center_hz)
-    hz, wide, deep = made.encoded(notch, _range(frequency), _range(width), depth)
+    hz, wide, deep = made.encoded(notch, *steps, depth)
     raw = {frequency.key: hz, width.key: wide}
     if slot.depth_key is not None and deep is not None:
         raw[slot.depth_key] = deep
     if meaning is None:
         return raw, None, text("notch.no-depth-measure")
-    got = meaning.decoded(hz, wide, deep)
+    got = meaning.decoded((hz, wide, deep), *steps)
     shown = RealisedNotch(got.center_hz, got.width_hz, got.depth_db, 0.0, True)
     return raw, shown, text("notch.as-measured")
 
@@ -215,13 +255,10 @@ def response(
         stored = encode_coefficients(notch, spec.sample_time_s)
         return coefficients_response(stored, frequency_hz, spec.sample_time_s)
     if spec.encoding == "hz_width_db":
-        encoded = _possible(profile, notch, None)
-        slot = spec.slots[0]
-        hz, wide, db = (
-            encoded.raw[k] for k in (slot.frequency_key, slot.width_key, slot.depth_key) if k
-        )
-        return decode_hz_width_db(hz, wide, db).response(frequency_hz)
-    if meaning is not None:
+        made = _possible(profile, notch, None).realised
+        if made is not None:
+            notch = Notch(made.center_hz, made.width_hz, made.depth_db)
+    elif meaning is not None:
         made = _possible(profile, notch, meaning).realised
         if made is not None:
             notch = Notch(made.center_hz, made.width_hz, made.depth_db)
@@ -259,31 +296,36 @@ async def _read(
     elif slot.frequency_key is not None:
         enabled = raw[slot.frequency_key] != off_raw(drive.profile, slot.frequency_key)
     try:
-        return _decoded(spec, slot, number, raw, enabled, meaning)
+        return _decoded(drive.profile, spec, slot, number, raw, enabled, meaning)
     except ValueError as error:
         return SlotState(number, enabled, None, None, raw, cause_of(error) if enabled else None)
 
 
 def _decoded(
-    spec: NotchSpec, slot: NotchSlot, number: int, raw: dict[str, int],
+    profile: Profile, spec: NotchSpec, slot: NotchSlot, number: int, raw: Mapping[str, int],
     enabled: bool, meaning: NotchMeaning | None,
 ) -> SlotState:  # fmt: skip
     if spec.encoding == "coefficients" and spec.sample_time_s is not None:
         stored = _coefficients(slot, raw)
         notch = decode_coefficients(stored, spec.sample_time_s)
         return SlotState(number, enabled, notch, realised(stored, spec.sample_time_s), raw)
-    frequency = raw.get(slot.frequency_key or "", 0)
-    width, depth = raw.get(slot.width_key or "", 0), raw.get(slot.depth_key or "", 0)
-    if spec.encoding == "hz_width_db":
-        notch = decode_hz_width_db(frequency, width, depth)
+    hz = raw.get(slot.frequency_key or "", 0)
+    wide, deep = raw.get(slot.width_key or "", 0), raw.get(slot.depth_key or "", 0)
+    if spec.encoding == "hz_width_db" and slot.depth_key is not None:
+        notch = decode_hz_width_db((hz, wide, deep), *_hz_width_db(profile, slot))
         made = RealisedNotch(notch.center_hz, notch.width_hz, notch.depth_db, 0.0, True)
         return SlotState(number, enabled, notch, made, raw)
+    if slot.frequency_key is None or slot.width_key is None:
+        return SlotState(number, enabled, None, None, raw, text("notch.parameters-not-named"))
+    frequency = hz_steps(profile.by_key[slot.frequency_key])
+    width = _width_steps(slot, profile.by_key[slot.width_key])
     if meaning is not None:
-        notch = meaning.decoded(frequency, width, depth if slot.depth_key is not None else None)
+        given = (hz, wide, deep if slot.depth_key is not None else None)
+        notch = meaning.decoded(given, frequency, width)
         made = RealisedNotch(notch.center_hz, notch.width_hz, notch.depth_db, 0.0, True)
         return SlotState(number, enabled, notch, made, raw, text("notch.as-measured"))
     if spec.encoding == "hz_width":
-        notch = Notch(float(frequency), float(max(width, 1)), UNKNOWN_DEPTH_DB)
+        notch = Notch(frequency.value(hz), width.value(max(wide, 1)), UNKNOWN_DEPTH_DB)
         return SlotState(number, enabled, notch, None, raw, text("notch.no-depth"))
     return SlotState(number, enabled, None, None, raw, text("notch.no-meaning"))
 

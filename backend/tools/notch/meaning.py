@@ -40,6 +40,7 @@ class NotchMeaning:
         """
         if self.levels is not None and depth is not None:
             return encode_hz_levels(notch, frequency, width, self._known(depth), self.levels)
+        # What was measured is a factor of the width that the value says.
         asked = Notch(notch.center_hz, notch.width_hz / self.width_scale, notch.depth_db)
         return *encode_hz_width(asked, frequency, width), None
 
@@ -49,11 +50,19 @@ class NotchMeaning:
         tried = [level for level, _db in self.levels.depth_db]
         return IntegerRange(max(depth.low, min(tried)), min(depth.high, max(tried)))
 
-    def decoded(self, frequency: int, width: int, depth: int | None) -> Notch:
-        """The notch that these raw values make."""
-        if self.levels is not None and depth is not None:
-            return decode_hz_levels(frequency, width, depth, self.levels)
-        return Notch(float(frequency), max(width, 1) * self.width_scale, self.depth_db)
+    def decoded(
+        self, raw: tuple[int, int, int | None], frequency: IntegerRange, width: IntegerRange
+    ) -> Notch:
+        """The notch that these raw values make.
+
+        Raises:
+            ValueError: they make none.
+        """
+        hz, wide, deep = raw
+        centre_hz = frequency.value(hz)
+        if self.levels is not None and deep is not None:
+            return decode_hz_levels(centre_hz, wide, deep, self.levels)
+        return Notch(centre_hz, width.value(max(wide, 1)) * self.width_scale, self.depth_db)
 
 
 #: What was measured of the drives of this program, until it ends.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from backend.drive.drive import Drive
+from backend.tools.notch.steps import hz_steps
 from profiles.schema import NotchSlot
 
 #: Widths in shares of the centre (Hz), or level pairs (width, depth).
@@ -64,8 +65,19 @@ def limits_of(drive: Drive, key: str | None) -> tuple[int, int]:
     return int(low or 0), int(high or 0)
 
 
-def raw_of(slot: NotchSlot, centre: int, trial: Trial) -> dict[str, int]:
-    """The raw values that make it."""
-    pairs = ((slot.frequency_key, centre), (slot.width_key, trial.width),
-             (slot.depth_key, trial.depth))  # fmt: skip
-    return {key: value for key, value in pairs if key is not None and value is not None}
+def raw_of(drive: Drive, slot: NotchSlot, centre_hz: int, trial: Trial) -> dict[str, int]:
+    """The raw values that make it.
+
+    Raises:
+        Unsuitable: what a step of its frequency or width means is not known.
+    """
+    raw: dict[str, int] = {}
+    if slot.frequency_key is not None:
+        raw[slot.frequency_key] = hz_steps(drive.parameter(slot.frequency_key)).nearest(centre_hz)
+    if slot.width_key is not None:
+        in_hz = slot.depth_key is None
+        steps = hz_steps(drive.parameter(slot.width_key)) if in_hz else None
+        raw[slot.width_key] = steps.nearest(trial.width) if steps else trial.width
+    if slot.depth_key is not None and trial.depth is not None:
+        raw[slot.depth_key] = trial.depth
+    return raw

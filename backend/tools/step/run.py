@@ -69,7 +69,8 @@ class StepResult:
     torque_peak_percent: float
     torque_rms_percent: float
     noise: float = 0.0
-    """Of a speed that is held: its standard deviation about its trend, in rpm; 0 for a move."""
+    """Standard deviation about the trend of a speed that is held, in rpm, or of the position at the
+    end of a move, in rev."""
     window: float | None = None
     """The settling window, in rpm or rev."""
     widened: bool = False
@@ -174,7 +175,10 @@ def evaluate(
         )  # fmt: skip
     else:
         actual = (recording.position_rad - recording.position_rad[0]) / _TURN
-        window = window or 0.02 * abs(settings.size)
+        noise = _noise(actual[-round(0.5 * settings.hold_s * rate) :])
+        if window is None:
+            usual = 0.02 * abs(settings.size)
+            window, widened = max(usual, _NOISES * noise), _NOISES * noise > usual
         move = move_metrics(time, demand, actual, window=window, torque=torque)
     return StepResult(
         settings.kind, time, demand, actual, torque, step, move,

@@ -109,3 +109,24 @@ def test_density_of_white_noise_integrates_to_its_power():
     x = np.random.default_rng(1).normal(0, 2.0, 40_000)
     s = power_density(x, 1000.0)
     assert np.mean(s.value[1:-1]) == pytest.approx(4.0 / 500.0, rel=0.03)
+
+
+def test_a_stable_loop_that_leads_has_a_positive_phase_margin():
+    """L = 2ζw·10·s/(s² + 2ζws + w²) lies on the circle over [0, 10], right of the critical point.
+
+    |L| is 1 where cos φ = 1/10, on both sides of the resonance: 180° - 84.26° away from -1.
+    """
+    f = np.geomspace(1.0, 1000.0, 4000)
+    s, w = 2j * np.pi * f, TURN * 60.0
+    loop = 10 * 0.1 * w * s / (s**2 + 0.1 * w * s + w**2)
+    found = margins(f, loop)
+    assert found.stable
+    assert found.phase_margin_deg == pytest.approx(180.0 - np.degrees(np.arccos(0.1)), abs=0.2)
+
+
+def test_an_unstable_loop_keeps_its_negative_phase_margin():
+    """w_c e^(-s d)/s with w_c d of 126°: 36° beyond the critical point."""
+    s = 2j * np.pi * F
+    found = margins(F, TURN * 70.0 * np.exp(-s * 5e-3) / s)
+    assert not found.stable
+    assert found.phase_margin_deg == pytest.approx(90.0 - 360.0 * 70.0 * 5e-3, abs=0.5)

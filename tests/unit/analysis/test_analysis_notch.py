@@ -108,9 +108,10 @@ def test_whole_hertz_encodings():
     assert encode_hz_width(Notch(433.4, 3.0, -20.0), hz, width) == (433, 10)
     with pytest.raises(ValueError, match="outside 50 to 4000"):
         encode_hz_width(Notch(4400.0, 100.0, -20.0), hz, width)
-    raw = encode_hz_width_db(Notch(433.4, 86.4, -17.6), hz, width, IntegerRange(0, 60))
+    depth = IntegerRange(0, 60)
+    raw = encode_hz_width_db(Notch(433.4, 86.4, -17.6), hz, width, depth)
     assert raw == (433, 86, 18)
-    assert decode_hz_width_db(*raw) == Notch(433.0, 86.0, -18.0)
+    assert decode_hz_width_db(raw, hz, width, depth) == Notch(433.0, 86.0, -18.0)
 
 
 def test_levels_need_a_measured_calibration():

@@ -55,6 +55,17 @@ def test_margins_within_the_band_are_those_of_the_loop() -> None:
     assert not found.missed(Goals(9.0, 60.0, 1.8), 1.0, 1.0, 1.03)
 
 
+def test_a_loop_whose_crossover_is_not_seen_is_predicted_by_what_its_lines_tell() -> None:
+    """L = w e^(-s d)/s with 100 Hz and 0.5 ms: 72°; a delay known to 5 µs costs 30 µs, 1.1°."""
+    nominal = loop_of(DENSE, 100.0, 0.5e-3)
+    known = judge(None, DENSE, nominal[None, :], nominal, late_s=(0.0, 5e-6), size=(0.0, 0.01))
+    unknown = judge(None, DENSE, nominal[None, :], nominal)
+    assert known.coverage == unknown.coverage == "predicted"
+    assert known.worst.phase_margin_deg == pytest.approx(72.0 - 1.1 - 0.9, abs=0.4)
+    # Nothing known: 200 µs and 1.5 dB, with which it crosses at 118 Hz: 90 - 118 * 0.7 ms * 360.
+    assert unknown.worst.phase_margin_deg == pytest.approx(90.0 - 0.36 * 118.5 * 0.7, abs=0.5)
+
+
 def test_a_crossover_above_the_band_keeps_no_design() -> None:
     found = verdict_of(474.0, 0.1e-3, 246.0)
     assert found.coverage == "predicted"
@@ -158,3 +169,32 @@ def test_delay_of_loop_and_of_reference_are_distinguished() -> None:
     )
     assert best.late_s == pytest.approx(150e-6, abs=40e-6)
     assert best.loop_late_s[0] == pytest.approx(200e-6, abs=40e-6)
+
+
+def test_a_motor_that_may_be_alone_above_the_band_widens_what_is_stated() -> None:
+    """Three times the loop's size from 400 Hz on: its gain margin is 9.5 dB less."""
+    nominal = loop_of(DENSE, 60.0, 0.35e-3)
+    alone = nominal * np.where(DENSE > 400.0, 3.0, 1.0)
+
+    def judged(shown_gain_db: float | None) -> LoopVerdict:
+        return judge(
+            None, DENSE, nominal[None, :], nominal, shown_gain_db=shown_gain_db,
+            late_s=(0.0, 5e-6), size=(0.0, 0.01), beside=alone[None, :],
+        )  # fmt: skip
+
+    raised = judged(7.0)
+    assert raised.predicted is not None
+    assert raised.designed is not None
+    stated, designed = raised.predicted.gain_margin_db, raised.designed.gain_margin_db
+    assert stated is not None
+    assert designed is not None
+    assert designed.low - stated.low == pytest.approx(20 * np.log10(3.0), abs=0.3)
+    assert raised.worst.gain_margin_db == stated.low
+    # 20 log10(1/(4 · 60 Hz · 0.35 ms)) is 21.5 dB: the design is kept by that, not by the motor's.
+    assert not raised.missed(Goals(15.0, 48.0, 1.8), 1.0, 1.0, 1.03)
+    # A gain that was raised by 14 dB excludes it.
+    far = judged(14.0)
+    assert far.predicted == far.designed
+    # Without a raised gain the loop is not kept, and nothing is widened.
+    unseen = judged(None)
+    assert unseen.predicted == unseen.designed

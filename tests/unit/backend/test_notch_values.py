@@ -17,6 +17,7 @@ from backend.tools.notch.filters import encode, off_raw, response
 from backend.tools.notch.meaning import NotchMeaning
 from drivers.errors import OutOfRange
 from profiles.loader import load_profile
+from profiles.schema import Parameter, Profile
 
 MMS7, M6L, R6L, DSC = (load_profile(name) for name in ("mms7", "m6l", "r6l", "ds_c"))
 COEFFICIENTS = ("2008:02", "2008:03", "2008:04", "2008:05")
@@ -75,6 +76,68 @@ def test_ds_c_has_whole_hertz_and_decibels() -> None:
     assert made.raw == {"PA_50": 433, "PA_51": 87, "PA_52": 18, "PA_4B": 0x10}
     assert made.realised is not None
     assert (made.realised.center_hz, made.realised.depth_db) == (433.0, -18.0)
+
+
+def _dsc(**changes: dict[str, object]) -> Profile:
+    """DS_C with other units, scales and limits of frequency PA_50, width PA_51, depth PA_52."""
+    parameters = tuple(
+        p.model_copy(update=changes[p.key]) if p.key in changes else p for p in DSC.parameters
+    )
+    return _with(DSC, parameters)
+
+
+def _with(profile: Profile, parameters: tuple[Parameter, ...]) -> Profile:
+    fields = {name: getattr(profile, name) for name in Profile.model_fields}
+    return Profile.model_construct(**fields | {"parameters": parameters})
+
+
+def test_scale_and_sign_of_a_notch_are_those_of_the_profile() -> None:
+    """Steps of 0.1 Hz and 0.5 Hz, and a gain at the centre in steps of -0.1 dB."""
+    profile = _dsc(
+        PA_50={"scale": 0.1}, PA_51={"scale": 0.5}, PA_52={"scale": -0.1, "max_raw": 600}
+    )
+    made = encode(profile, "X", 0, Notch(433.4, 86.5, -17.6), 0)
+    assert made.raw == {"PA_50": 4334, "PA_51": 173, "PA_52": 176, "PA_4B": 0x10}
+    assert made.realised is not None
+    assert (made.realised.center_hz, made.realised.width_hz) == (433.4, 86.5)
+    assert made.realised.depth_db == -17.6
+    seen = np.abs(response(profile, Notch(433.4, 86.5, -17.6), np.array([433.4])))
+    assert 20 * np.log10(seen[0]) == pytest.approx(-17.6, abs=0.01)
+    # A gain that is stored as it is: raw -18 is -18 dB.
+    signed = {"type": "INT16", "min_raw": -60, "max_raw": 0}
+    made = encode(_dsc(PA_52=signed), "X", 0, Notch(433.0, 86.0, -18.0), 0)
+    assert made.raw["PA_52"] == -18
+    # Kilohertz, as attenuation.
+    made = encode(_dsc(PA_50={"unit": "kHz", "scale": 1e-3}), "X", 0, Notch(433.0, 86.0, -18.0), 0)
+    assert (made.raw["PA_50"], made.raw["PA_52"]) == (433, 18)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"PA_52": {"type": "INT16", "min_raw": -60, "max_raw": 60}}, "sign-of-depth"),
+        ({"PA_50": {"unit": "%"}}, "unit-of-frequency"),
+        ({"PA_52": {"unit": "%"}}, "unit-of-depth"),
+    ],
+)
+def test_a_notch_of_unknown_unit_or_sign_is_refused(
+    changes: dict[str, dict[str, object]], said: str
+) -> None:
+    with pytest.raises(OutOfRange) as refused:
+        encode(_dsc(**changes), "X", 0, Notch(433.0, 86.0, -18.0), 0)
+    assert said in repr(refused.value.text)
+
+
+def test_a_notch_that_would_be_off_is_not_written() -> None:
+    """M6-L: where its highest frequency means off, the notch would vanish in silence."""
+    parameters = tuple(
+        p.model_copy(update={"default_raw": 300, "max_raw": 300}) if p.key == "2009:0B" else p
+        for p in M6L.parameters
+    )
+    profile = _with(M6L, parameters)
+    with pytest.raises(OutOfRange) as refused:
+        encode(profile, "X", 0, Notch(300.0, 80.0, -40.0), None)
+    assert refused.value.code == "notch.read-back-other"
 
 
 def test_levels_become_what_was_measured() -> None:

@@ -69,6 +69,22 @@ def test_a_step_of_significant_size_needs_no_wider_window() -> None:
     assert again.noise <= 0.02 * 1.1 * size / 10.0
 
 
+@pytest.mark.parametrize(("noise_rev", "widened"), [(1e-6, False), (2e-3, True)])
+def test_the_window_of_a_move_is_ten_times_its_noise(noise_rev: float, widened: bool) -> None:
+    """A move of 0.5 rev: 2 % are 0.01 rev, ten times 2e-3 rev are twice as much."""
+    settings = StepSettings(ENVELOPE, kind="move", size=0.5)
+    way = np.concatenate([np.zeros(50), np.linspace(0.0, 0.5, 200), np.full(250, 0.5)])
+    actual = way + np.random.default_rng(4).normal(size=way.size) * noise_rev
+    turn = 2 * np.pi
+    recording = Recording(
+        RATE, turn * actual, turn * RATE * np.gradient(way), np.zeros(way.size), turn * way,
+        np.zeros(way.size), np.ones(way.size, dtype=bool),
+    )  # fmt: skip
+    found = evaluate(recording, way, settings, 1.0)
+    assert found.widened is widened
+    assert found.window == pytest.approx(max(0.01, 10 * noise_rev), rel=0.25)
+
+
 def torques(*parts: tuple[float, float, float]) -> FloatArray:
     """Nm over time from (size, frequency in Hz, growth per s)."""
     t = np.arange(round((LEAD_S + 0.5) * RATE)) / RATE
