@@ -494,7 +494,7 @@ async def test_what_fails_at_the_end_of_the_server_keeps_nothing_else_from_its_e
 async def test_a_measurement_is_answered_although_its_exchange_is_never_set_up(
     bench: Bench, x: ConnectedDrive, http: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A segment that was killed as it was set up left a request without answer for half a minute."""
+    """A segment that was killed as it was set up left a request unanswered for half a minute."""
     monkeypatch.setattr("backend.station.measuring.SET_UP_S", 0.1)
     begun: list[str] = []
 
