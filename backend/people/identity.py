@@ -55,7 +55,7 @@ arrived_s: ContextVar[float | None] = ContextVar("arrived_s", default=None)
 def by_itself() -> Context:
     """A context of work that outlives the request that began it: nobody is named for what it does.
 
-    Else what a drive does hours later is told of the person who connected it.
+    Else what a drive does hours later is informed of the person who connected it.
     """
     context = copy_context()
     context.run(acting.set, None)

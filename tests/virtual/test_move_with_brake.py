@@ -1,6 +1,6 @@
 """The first motion of an axis whose holding brake is still opening: 000:1377, 002:8117.
 
-A drive loses what it is told meanwhile. Judged by the shaft.
+A drive loses what it is reported meanwhile. Judged by the shaft.
 """
 
 from __future__ import annotations

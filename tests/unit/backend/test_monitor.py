@@ -1,4 +1,4 @@
-"""What is told of an axis beside a cyclic exchange: process data, and the drive itself in time."""
+"""What an axis reports beside a cyclic exchange: process data, and the drive itself."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ async def test_what_every_cycle_brings_is_not_asked_for(
     assert x.drive.readings[POSITION_KEY].raw == 12_345, "the parameter table shows it, too"
 
 
-async def test_a_dead_mailbox_is_told_although_process_data_go_on(
+async def test_a_dead_mailbox_is_reported_although_process_data_go_on(
     x: ConnectedDrive, servo: Servo, exchange: Exchange, clock: Clock
 ) -> None:
     servo.mute = True
@@ -149,8 +149,8 @@ async def test_a_monitor_that_is_hurried_as_it_is_closed_ends(x: ConnectedDrive)
     """
     for turns in range(6):
         seen = asyncio.Event()
-        told = partial(_set, seen)
-        monitor = watching.Monitor(x.axis, Journal(), told, lambda: None)
+        reported = partial(_set, seen)
+        monitor = watching.Monitor(x.axis, Journal(), reported, lambda: None)
         monitor.start()
         await seen.wait()
         for _ in range(20):
