@@ -41,6 +41,19 @@ class HaltCause(Enum):
     """Two measured quantities contradict each other, such as 606Ch and differences of 6064h."""
 
 
+class LeftBy(Enum):
+    """What took the drive out of Operation enabled, by its status word."""
+
+    FAULT = "fault"
+    """It has a fault, or reacts to one."""
+    QUICK_STOP = "quick_stop"
+    """A quick stop that the loop did not command: a terminal, another master, the drive itself."""
+    VOLTAGE = "voltage"
+    """Bit 4 is 0: main power or STO is gone (CiA 402-2 table 30)."""
+    OTHERS = "others"
+    """None of these: another master, a terminal or the drive's panel took the power away."""
+
+
 #: Causes that are a limit of the envelope.
 ENVELOPE_CAUSES = frozenset(
     {HaltCause.POSITION, HaltCause.SPEED, HaltCause.TORQUE, HaltCause.FOLLOWING}
@@ -59,8 +72,8 @@ class Halted:
 
     ``quantity`` is what was watched, ``value`` and ``limit`` are in raw drive units; all three are
     None where the cause is no limit. Of a contradiction, ``value`` is what 606Ch says and ``limit``
-    what the position says, both in raw units of 606Ch. ``note`` holds what else is known, for
-    people only.
+    what the position says, both in raw units of 606Ch. ``left_by`` is known of a drive that left
+    Operation enabled under the loop. ``note`` holds what else is known, for people only.
     """
 
     cause: HaltCause
@@ -68,6 +81,7 @@ class Halted:
     value: float | None = None
     limit: float | None = None
     note: str | Text = ""
+    left_by: LeftBy | None = None
 
     @classmethod
     def beyond(cls, quantity: Quantity, value: float, limit: float) -> Halted:
@@ -86,7 +100,8 @@ class Halted:
         if self.cause is HaltCause.EXPIRED:
             return text("motion.expired")
         if self.cause is HaltCause.LEFT_ENABLED:
-            return text("motion.left-enabled", note=note)
+            by = "" if self.left_by is None else self.left_by.value
+            return text("motion.left-enabled", note=note, by=by)
         if self.cause is HaltCause.CONTRADICTION and self.value is not None:
             return text(
                 "motion.contradiction", speed=self.value, from_position=self.limit or 0.0, note=note
@@ -106,6 +121,7 @@ class Halted:
             "value": self.value,
             "limit": self.limit,
             "note": self.note.to_wire() if isinstance(self.note, Text) else self.note,
+            "left_by": None if self.left_by is None else self.left_by.value,
         }
 
     @classmethod
@@ -115,10 +131,11 @@ class Halted:
         Raises:
             ValueError, KeyError: the map is none that `to_wire` made.
         """
-        note = wire["note"]
+        note, left_by = wire["note"], wire["left_by"]
         return cls(
             HaltCause(wire["cause"]), wire["quantity"], wire["value"], wire["limit"],
             Text.from_wire(note) if isinstance(note, Mapping) else note,
+            None if left_by is None else LeftBy(left_by),
         )  # fmt: skip
 
 

@@ -116,7 +116,8 @@ class AuditLog:
             done: Future[None] = Future()
             queue.waiting.append((queue.added, done))
         try:
-            await asyncio.wait_for(asyncio.wrap_future(done), timeout_s)
+            async with asyncio.timeout(timeout_s):
+                await asyncio.wrap_future(done)
         except TimeoutError:
             return False
         return True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import time
 from contextlib import AbstractContextManager
 from functools import partial
@@ -22,6 +23,7 @@ from backend.motion.authority import Ended
 from backend.motion.envelope import Envelope
 from backend.motion.grant import Grant
 from backend.motion.stopping import stops
+from backend.people.identity import arrived_s
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.codec import encode
@@ -53,9 +55,14 @@ class PowerState:
         self.stopped = False
         #: How many commands of people have permitted motion so far.
         self.permits = 0
+        #: When STOP was pressed last (`time.monotonic`).
+        self.stop_pressed_s = -math.inf
         #: A stop did not reach the drive; `repeat_stop` sends it again once the drive answers.
         self.stop_pending = False
         self._repeating = asyncio.Lock()
+        #: A quick stop went out, and no word since that enables. Halt has the bits that enable, so
+        #: it must not follow: the drive would leave the quick stop (CiA 402-2, transition 16).
+        self.quick_stop_out = False
         #: What STOP has done since it was pressed, and when that was (monotonic).
         self.stop_steps: list[StopStep] = []
         self._stop_began_s = time.monotonic()
@@ -66,8 +73,15 @@ class PowerState:
         """A person gave a new command: enabling is allowed again, until the next STOP.
 
         Never called by work in progress, so that nothing enables again what was stopped.
+
+        Raises:
+            NotAllowed: STOP was pressed after the command had been given; it waited meanwhile, for
+                its turn, the rest of its body or the start of an exchange.
         """
-        self.stopped = False
+        given_s = arrived_s.get()
+        if given_s is not None and given_s <= self.stop_pressed_s:
+            raise NotAllowed("axis.stop-pressed-since", drive=self.drive.name)
+        self.stopped = self.quick_stop_out = False
         self.permits += 1
 
     async def status_word(self) -> int:
@@ -88,7 +102,7 @@ class PowerState:
         if self.cyclic_power() is not None:
             raise NotAllowed("axis.cyclic-exchange-writes-control", drive=self.drive.name)
         if word == cia402.QUICK_STOP:
-            word = self._stop_word
+            word, self.quick_stop_out = self._stop_word, True
         key = self.drive.require("control_word")
         if not stops(self.drive.profile, self.drive.parameter(key), word):
             await self._control_with_grant(key, word)
@@ -101,7 +115,10 @@ class PowerState:
         if self.stopped:
             raise NotAllowed("axis.stop-pressed", drive=self.drive.name)
         self.drive.require_identity()
-        await self.drive.command(key, word, self.grant(key))
+        grant = self.grant(key)
+        self.drive.require_grant(grant, key)
+        self.quick_stop_out = False
+        await self.drive.command(key, word, grant)
         self.control_word = word
 
     def grant(self, key: str | None = None) -> Grant:
@@ -322,9 +339,14 @@ class PowerState:
                 )
             await asyncio.sleep(_POLL_S)
 
+    def forbid(self) -> None:
+        """STOP was pressed: nothing in progress, or asked for before, may enable the axis again."""
+        self.stopped = True
+        self.stop_pressed_s = time.monotonic()
+
     async def stop(self) -> None:
         """STOP by a person: quick stop, and nothing in progress may enable the axis again."""
-        self.stopped = True
+        self.forbid()
         self.stop_steps, self._stop_began_s = [], time.monotonic()
         await self.quick_stop()
 

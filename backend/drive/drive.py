@@ -351,10 +351,13 @@ class Drive:
             NotGranted: the grant is not for this object, or has ended.
         """
         parameter, raw = self._to_be_written(key, raw, raw=True)
-        self.require_grant(
-            grant, parameter.key, restores=self.pending_restores.restores(parameter.key, raw)
-        )
-        return await self._written(parameter, raw)
+
+        def permitted() -> None:
+            restores = self.pending_restores.restores(parameter.key, raw)
+            self.require_grant(grant, parameter.key, restores=restores)
+
+        permitted()
+        return await self._written(parameter, raw, permitted)
 
     async def put_back(self, key: str, raw: Raw) -> Reading:
         """Write a borrowed value back, of whatever class, by the work that had borrowed it.
@@ -421,7 +424,10 @@ class Drive:
             )
         await self._require_no_power(parameter)
 
-    async def _written(self, parameter: Parameter, value: Raw) -> Reading:
+    async def _written(
+        self, parameter: Parameter, value: Raw, permitted: Callable[[], None] = lambda: None
+    ) -> Reading:
+        """``permitted`` raises where it may not be sent; asked once more at the last moment."""
         port = self.port_for(parameter)
         if parameter.settable == "stopped":
             await self._require_no_power(parameter)
@@ -429,7 +435,7 @@ class Drive:
         known = self.readings.get(parameter.key)
         before = known.raw if known else None
         try:
-            reading = await self._send_and_read(port, parameter, value)
+            reading = await self._send_and_read(port, parameter, value, permitted)
         except BaseException as error:
             # A cancelled write may have reached the drive as well.
             problem = error.message if isinstance(error, DriveError) else "interrupted"
@@ -438,8 +444,13 @@ class Drive:
         self._tell_write(parameter, before, value, reading.raw)
         return reading
 
-    async def _send_and_read(self, port: Port, parameter: Parameter, value: Raw) -> Reading:
+    async def _send_and_read(
+        self, port: Port, parameter: Parameter, value: Raw, permitted: Callable[[], None]
+    ) -> Reading:
         async with self.exclusive.asking():
+            # STOP may have ended the grant while something was read, or the drive was left alone:
+            # nothing is awaited between this and the link, which keeps the order of writes.
+            permitted()
             return await self._sent_and_read(port, parameter, value)
 
     async def _sent_and_read(self, port: Port, parameter: Parameter, value: Raw) -> Reading:

@@ -106,7 +106,7 @@ class MotionAuthority:
         record = self._record(grant)
         if grant.drive != drive or record is None or not grant.covers(key):
             raise NotGranted("motion.move-axis-permission-hand", drive=name, parameter=key)
-        why = record.why or (_TIME_OVER if time.monotonic() > grant.until else None)
+        why = self._ended(grant)
         if why is not None and not restores:
             raise NotGranted(
                 "motion.permission-move-ended",
@@ -137,6 +137,7 @@ class MotionAuthority:
 
         Raises:
             Busy: other work has a grant for this axis.
+            NotGranted: the calling work holds a grant of it that has ended, by STOP or otherwise.
         """
         grant = self._issue(drive, name, purpose, envelope, keys, lasts_s, ended)
         _held.set((*_held.get(), grant))
@@ -209,6 +210,11 @@ class MotionAuthority:
         ended: Ended | None,
     ) -> Grant:
         outer = self.held(drive)
+        if outer is not None and (why := self._ended(outer)) is not None:
+            # Work that STOP has ended does not get anew what was taken from it.
+            raise NotGranted(
+                "motion.permission-move-ended", drive=name, purpose=outer.purpose, why=why
+            )
         mine = set(_held.get())
         for other in self._live(drive):
             if other.standing or other in mine:
@@ -242,6 +248,13 @@ class MotionAuthority:
         now = time.monotonic()
         records = self._records.get(drive, ())
         return [r.grant for r in records if not r.why and now <= r.grant.until]
+
+    def _ended(self, grant: Grant) -> Text | None:
+        """Why this grant is not live any more; None while it is."""
+        record = self._record(grant)
+        if record is None or time.monotonic() > grant.until:
+            return _TIME_OVER if record is None else record.why or _TIME_OVER
+        return record.why
 
     def _record(self, grant: Grant) -> _Record | None:
         records = self._records.get(grant.drive, ())

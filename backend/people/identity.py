@@ -47,6 +47,11 @@ class Actor:
 acting: ContextVar[Actor | None] = ContextVar("acting", default=None)
 
 
+#: When the request or message arrived that is being carried out (`time.monotonic`); None where the
+#: program acts by itself. STOP that was pressed later takes precedence, however long it waited.
+arrived_s: ContextVar[float | None] = ContextVar("arrived_s", default=None)
+
+
 def by_itself() -> Context:
     """A context of work that outlives the request that began it: nobody is named for what it does.
 
@@ -54,6 +59,7 @@ def by_itself() -> Context:
     """
     context = copy_context()
     context.run(acting.set, None)
+    context.run(arrived_s.set, None)
     return context
 
 

@@ -12,10 +12,13 @@ from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.sweep import profile_speed
 from backend.work.jobs import Job
-from drivers.errors import DriveError
+from drivers.errors import DriveError, LinkTimeout
 
 #: Ending an exchange, and starting the one that had to give way.
 EXCHANGE_ENDS_S = 60.0
+#: Setting one up for a measurement; its request is answered then, within the 30 s that pages and
+#: programs wait, also where a segment falls silent in the middle and ending it takes 15 s more.
+SET_UP_S = 14.0
 
 
 @dataclass
@@ -79,7 +82,18 @@ async def exchange_for(bench: Bench, connected: ConnectedDrive, cycle_s: float) 
     Raises:
         Busy: a drive of the bus is moved.
         NotAllowed: no cyclic data on this bus, or a drive refuses.
+        LinkTimeout: it is not set up within `SET_UP_S`, and is not going to be.
     """
+    try:
+        async with asyncio.timeout(SET_UP_S):
+            return await _exchange_for(bench, connected, cycle_s)
+    except TimeoutError as error:
+        raise LinkTimeout(
+            "station.exchange-not-set-up", drive=connected.drive.name, limit_s=SET_UP_S
+        ) from error
+
+
+async def _exchange_for(bench: Bench, connected: ConnectedDrive, cycle_s: float) -> Exchange:
     port = port_of(connected)
     drive, url = connected.drive.id, bench.buses.url_of(port)
     by_speed = {drive} if profile_speed.needed(connected.drive, port.link) else set[str]()

@@ -147,7 +147,8 @@ class Monitor:
             self._wake.clear()
             period = WATCHED_S if self.watchers else IDLE_S
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._wake.wait(), self._until_due(period))
+                async with asyncio.timeout(self._until_due(period)):
+                    await self._wake.wait()
 
     def _until_due(self, period_s: float) -> float:
         """Seconds to this monitor's own place in the period."""

@@ -83,6 +83,7 @@ class Motion:
 
         Raises:
             Busy: the exchange of its bus is being started or ended, or it leaves the bench.
+            NotAllowed: STOP was pressed after the command had been given.
         """
         connected = self._bench.connected(drive_id)
         self.require_stays(connected)
@@ -133,7 +134,7 @@ class Motion:
         connected_drives = [self._bench.connected(drive_id) for drive_id in drive_ids]
         for connected in connected_drives:
             # Before anything else runs: nothing in progress may enable the axis from here on.
-            connected.axis.stopped = True
+            connected.axis.forbid()
             self._bench.authority.revoke(connected.drive.id, text("motion.stop-was-pressed"))
             job = self._bench.jobs.moving(connected.drive.id)
             if job is not None and job.stoppable and job.task is not None:

@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
-from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted
+from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted, LeftBy
 from drivers.motion.guard import SpeedGuard
 from drivers.motion.setpoint_plan import (
     ACTUAL_POSITION,
@@ -79,7 +79,7 @@ class AxisLoop:
         self.state = State.UNKNOWN
         self.goal: State | None = None
         self.halted: Halted | None = None
-        """Why the last motion was ended by force."""
+        """Why the last motion was ended by force, or why the drive is not enabled any more."""
         self._in = inputs
         self._out = outputs
         self._report = report
@@ -230,10 +230,10 @@ class AxisLoop:
         place = self._in.get(MODE_SHOWN)
         if place is not None:
             self._mode = values[place]
-        place = self._in.get(STATUS)
-        if place is not None:
+        place_of_status = self._in.get(STATUS)
+        if place_of_status is not None:
             self.state = cia402.decode_state(
-                values[place], echoes_control=self._dialect.echoes_control
+                values[place_of_status], echoes_control=self._dialect.echoes_control
             )
         place = self._in.get(ACTUAL_POSITION)
         if place is not None:
@@ -242,7 +242,7 @@ class AxisLoop:
             self._last_position = position
         enabled = self.state is State.OPERATION_ENABLED
         if self._was_enabled and not enabled:
-            self._fell_out()
+            self._fell_out(0 if place_of_status is None else values[place_of_status])
         self._was_enabled = enabled and not self._stale
         self._stale = max(self._stale - 1, 0)
         if self.phase in (Phase.PLAYING, Phase.HOLDING):
@@ -270,16 +270,25 @@ class AxisLoop:
         self._cycles += cycles
         self._speed_guard.gap()
 
-    def _fell_out(self) -> None:
+    def _fell_out(self, word: int) -> None:
         if self.goal is State.OPERATION_ENABLED:
             self.goal = State.SWITCH_ON_DISABLED
-            fell_out = Halted(HaltCause.LEFT_ENABLED, note=self.state.value)
-            self._report(self.station, fell_out.words)
-            if self.phase is not Phase.IDLE:
-                self.halted = fell_out
+            self.halted = Halted(
+                HaltCause.LEFT_ENABLED, note=self.state.value, left_by=self._left_by(word)
+            )
+            self._report(self.station, self.halted.words)
         self.phase = Phase.IDLE
         self._motion = None
         self._clear_offsets()
+
+    def _left_by(self, word: int) -> LeftBy:
+        if self.state in (State.FAULT, State.FAULT_REACTION):
+            return LeftBy.FAULT
+        if self.state is State.QUICK_STOP_ACTIVE:
+            return LeftBy.QUICK_STOP
+        if not self._dialect.echoes_control and not word & cia402.STATUS_VOLTAGE_ENABLED:
+            return LeftBy.VOLTAGE
+        return LeftBy.OTHERS
 
     def _guard(self, values: Sequence[int]) -> None:
         """Envelope and expiry; a violation begins to brake in this very cycle."""
@@ -455,11 +464,15 @@ class AxisLoop:
         where = f"station {self.station}"
         motion.require_mapped(self._out, where)
         if self.state is not State.OPERATION_ENABLED or self.goal is not State.OPERATION_ENABLED:
+            if self.halted is not None:
+                raise NotAllowed(
+                    "cyclic.motion-needs-enabled-again",
+                    where=where,
+                    state=self.state.value,
+                    cause=self.halted.text,
+                )
             raise NotAllowed(
-                "cyclic.motion-needs-operation-enabled",
-                remedy=self._why or "enable the axis first",
-                where=where,
-                state=self.state.value,
+                "cyclic.motion-needs-operation-enabled", where=where, state=self.state.value
             )
         wanted = cia402.Mode(self._dialect.mode(MODE_OF[motion.target]))
         if self._mode is not None and self._mode != wanted:

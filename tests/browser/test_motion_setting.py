@@ -48,6 +48,11 @@ def test_a_setting_that_can_move_needs_reason_and_consent(laptop: Page, bench: B
     value = dialog.get_by_label("New value")
     expect(value).to_have_value("0")
     value.select_option("1")
+    # What for (the reason below), until when, and within what limits the permission is given.
+    for label, fact in (("Until when", "for this one write"), ("Within what limits", "0.001 rev")):
+        term = dialog.get_by_role("term").filter(has_text=label)
+        expect(term).to_be_visible()
+        expect(term.locator("xpath=following-sibling::dd[1]")).to_contain_text(fact)
     write = dialog.get_by_role("button", name="Write this setting")
     write.click(force=True)  # dim, and a press says why
     expect(dialog).to_contain_text("Give a reason.")

@@ -5,19 +5,30 @@ from __future__ import annotations
 from fastapi import APIRouter
 
 from backend.api import convert
-from backend.api.context import Controlled, TheBench
+from backend.api.context import Controlled, Me, TheBench, ThePeople
 from backend.api.models import JobInfo
+from backend.api.security.gate import require_right
 from backend.api.station.models import DriveSummary
+from backend.motion.classes import motion_of
+from backend.people.rights import Right
 from drivers.errors import NotAllowed
 
 router = APIRouter(prefix="/drives/{drive_id}")
 
 
 @router.post("/jobs/put-back", status_code=202)
-async def put_back(bench: TheBench, connected: Controlled) -> JobInfo:
-    """Restore every pending value of the drive, while its axis stands."""
-    if not connected.drive.pending_restores:
-        raise NotAllowed("api-drive.nothing-put-back", drive=connected.drive.name)
+async def put_back(bench: TheBench, people: ThePeople, me: Me, connected: Controlled) -> JobInfo:
+    """Restore every pending value of the drive, while its axis stands.
+
+    Where one of them can put energy into the motor (a mode, the function of a terminal), the right
+    to move is needed, too.
+    """
+    drive = connected.drive
+    if not drive.pending_restores:
+        raise NotAllowed("api-drive.nothing-put-back", drive=drive.name)
+    entries = drive.pending_restores.entries
+    if any(motion_of(drive.parameter(entry.key)) == "energises" for entry in entries):
+        require_right(people, me, Right.MOTION, drive.id)
     return convert.job(bench.reconnection.start(connected, asked=True))
 
 

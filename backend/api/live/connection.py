@@ -47,7 +47,7 @@ from backend.api.live.scope import ScopeStreams
 from backend.api.live.shared import Shared, only
 from backend.api.security.messages import require_message
 from backend.audit.asked import Asked, asked
-from backend.people.identity import Actor, Identity, acting
+from backend.people.identity import Actor, Identity, acting, arrived_s
 from backend.people.station import People
 from backend.station.bench import Bench
 from drivers.errors import DriveError
@@ -191,6 +191,7 @@ class Connection:
                 text = message.get("text")
                 # Not silent while a request takes its time.
                 self.heard = math.inf
+                arrived_s.set(time.monotonic())
                 await self._handle(text if isinstance(text, str) else "")
                 self.heard = time.monotonic()
 

@@ -8,6 +8,7 @@ What passes runs with `acting` set, so that whatever it starts knows whose it is
 from __future__ import annotations
 
 import logging
+import time
 from dataclasses import dataclass
 from http.cookies import CookieError, SimpleCookie
 
@@ -23,7 +24,7 @@ from backend.api.security.rights import Matched, Policy
 from backend.api.security.socket import GuardedSocket, OpenSockets
 from backend.people.credentials import csrf_of, same_text
 from backend.people.errors import Forbidden, NotLoggedIn, TooOften
-from backend.people.identity import Actor, Identity, acting
+from backend.people.identity import Actor, Identity, acting, arrived_s
 from backend.people.lease import Leases
 from backend.people.rights import Right
 from backend.people.station import People
@@ -145,6 +146,8 @@ class Gate:
 
     async def _http(self, scope: Scope, receive: Receive, send: Send) -> None:
         begun = False
+        # Before it waits for its turn or its body: STOP goes past both.
+        arrived_s.set(time.monotonic())
 
         async def dressed(message: Message) -> None:
             nonlocal begun

@@ -39,8 +39,8 @@ async def brake_then_quick_stop(power: PowerState) -> None:
             await power.send_quick_stop()
             power.stop_step(StepCode.QUICK_STOP)
             return
-    elif known_settings(drive).halt_brakes and _seen_enabled(drive):
-        # Over an axis that is not enabled this word would enable it.
+    elif known_settings(drive).halt_brakes and _seen_enabled(drive) and not power.quick_stop_out:
+        # Over an axis that is not enabled, or after a quick stop, this word would enable it.
         halt = cia402.ENABLE_OPERATION | cia402.HALT
         await drive.stop_by(drive.require("control_word"), halt)
         power.stop_step(StepCode.HALT)

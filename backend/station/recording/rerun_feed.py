@@ -79,7 +79,8 @@ class FeedClient:
         if not self.first and not self.queue:
             self.ready.clear()
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self.ready.wait(), timeout_s)
+                async with asyncio.timeout(timeout_s):
+                    await self.ready.wait()
         blobs = ([self.first] if self.first else []) + list(self.queue)
         head = _HEAD.pack(MAGIC, self.session, len(blobs), self.dropped)
         self.first, self.waiting_bytes, self.dropped = b"", 0, 0

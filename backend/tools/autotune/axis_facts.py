@@ -77,6 +77,18 @@ async def si(drive: Drive, key: str | None) -> float | None:
     return None if not isinstance(value, (int, float)) else si_value(parameter, value)
 
 
+async def brake_opens_s(drive: Drive) -> float:
+    """How long the drive waits for its brake before it takes commands, by its parameters [s].
+
+    0 where its family prints no such time; it counts from Operation enabled.
+    """
+    timing = drive.profile.functions.brake
+    if timing is None:
+        return 0.0
+    found = [await si(drive, key) for key in (timing.open_delay_key, timing.command_delay_key)]
+    return sum(each for each in found if each) + (timing.open_fixed_ms or 0.0) / 1e3
+
+
 async def read_facts(
     axis: Axis, rated_torque_nm: float | None = None, motor_inertia_kgm2: float | None = None
 ) -> AxisFacts:

@@ -21,7 +21,7 @@ from backend.axis.axis import Axis
 from backend.axis.cyclic import channel
 from backend.functions.closed_brake import forcing_keys, kept_closed, obstacle_of
 from backend.scales.units import AxisUnits
-from backend.tools.autotune.axis_facts import AxisFacts, read_facts, si
+from backend.tools.autotune.axis_facts import AxisFacts, brake_opens_s, read_facts
 from backend.tools.brake.evaluate import PRELOAD, Phase, Trial, Trials, evaluate, reevaluate
 from backend.tools.brake.result import BrakeResult, Means, Obstacle
 from backend.tools.brake.settings import BrakeSettings
@@ -210,7 +210,7 @@ async def _trial(
     """
     axis, session = run.axis, run.session
     rate = 1.0 / cycle_s(session)
-    lead_s = _LEAD_S + await _opens_s(axis)
+    lead_s = _LEAD_S + await brake_opens_s(axis.drive)
     values, phases = sequence(direction * percent, settings.ramp_s, lead_s, rate)
     raw = np.array([units.torque_raw(value) for value in values], np.int64)
     begins = int(np.flatnonzero(phases == Phase.RAMP)[0])
@@ -259,17 +259,6 @@ def _joined(parts: Sequence[Trial]) -> Trial:
         direction=parts[0].direction, position_rad=of("position_rad"), torque_nm=of("torque_nm"),
         sent_nm=of("sent_nm"), phase=of("phase"), valid=of("valid"), halted=parts[-1].halted,
     )  # fmt: skip
-
-
-async def _opens_s(axis: Axis) -> float:
-    """How long the drive waits for its brake before it takes commands, by its parameters [s]."""
-    timing = axis.drive.profile.functions.brake
-    if timing is None:
-        return 0.0
-    found = [
-        await si(axis.drive, key) for key in (timing.open_delay_key, timing.command_delay_key)
-    ]  # fmt: skip
-    return sum(each for each in found if each) + (timing.open_fixed_ms or 0.0) / 1e3
 
 
 def _placed(

@@ -10,6 +10,7 @@ from backend.axis.axis import Axis, Envelope
 from backend.axis.polled import PolledGuard
 from backend.drive.readings import Reading
 from backend.scales.units import ramp_raw
+from backend.tools.autotune.axis_facts import brake_opens_s
 from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
@@ -67,7 +68,11 @@ async def home(axis: Axis, settings: HomingSettings, progress: Progress) -> JobR
     progress(0.0, text("moves.preparing"))
     for key, raw in writes.items():
         await drive.write(key, raw)
+    opens_s = await brake_opens_s(drive)
     async with axis.enabled(Mode.HM, settings.envelope):
+        # A start is lost while the brake opens (000:1377, 002:8117), and the status word would
+        # show the verdict of an earlier homing.
+        await asyncio.sleep(opens_s)
         await axis.control(cia402.ENABLE_OPERATION | _START_HOMING)
         await _attained(axis, settings, progress)
         await axis.control(cia402.ENABLE_OPERATION)

@@ -11,6 +11,7 @@ from backend.axis.axis import Axis, Envelope
 from backend.axis.polled import PolledGuard
 from backend.drive.optional import ramp_keys
 from backend.scales.units import AxisUnits, ramp_raw
+from backend.tools.autotune.axis_facts import brake_opens_s
 from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
@@ -89,12 +90,13 @@ async def move(axis: Axis, settings: MoveSettings, progress: Progress) -> JobRes
             )
         else:
             _require_inside(axis, units, settings)
+        opens_s = await brake_opens_s(axis.drive)
         async with axis.enabled(Mode[settings.mode], settings.envelope):
             start = await axis.position_raw()
             if settings.mode == "PP":
                 target = _target(units, settings, start)
                 watch = _watch(axis, units, start, settings.envelope)
-                await _to(axis, target, watch, progress)
+                await _to(axis, target, watch, progress, opens_s)
             else:
                 await _hold(axis, settings, start, progress)
             end = await axis.position_raw()
@@ -123,6 +125,7 @@ async def sequence(axis: Axis, settings: SequenceSettings, progress: Progress) -
         start = await axis.position_raw()
         for place in (settings.first, settings.second):
             _require_reachable(axis, units, units.position_raw(place), start, settings.envelope)
+        opens_s = await brake_opens_s(axis.drive)
         async with axis.enabled(Mode.PP, settings.envelope):
             watch = _watch(axis, units, await axis.position_raw(), settings.envelope)
             for number in range(settings.count):
@@ -133,7 +136,8 @@ async def sequence(axis: Axis, settings: SequenceSettings, progress: Progress) -
                     )
                     began = time.monotonic()
                     target = units.position_raw(place)
-                    await _to(axis, target, watch, None)
+                    await _to(axis, target, watch, None, opens_s)
+                    opens_s = 0.0
                     times.append(time.monotonic() - began)
                     await _dwell(axis, settings.dwell_s, watch)
     return {"cycles": settings.count, "mean_move_s": sum(times) / len(times)}
@@ -213,8 +217,13 @@ async def _dwell(axis: Axis, dwell_s: float, watch: _Watch) -> None:
         await _still_inside(axis, watch)
 
 
-async def _to(axis: Axis, target: int, watch: _Watch, progress: Progress | None) -> None:
-    """Setpoint handshake (CiA 402-2 clause 10.3.3), then wait for target reached."""
+async def _to(
+    axis: Axis, target: int, watch: _Watch, progress: Progress | None, opens_s: float = 0.0
+) -> None:
+    """Setpoint handshake (CiA 402-2 clause 10.3.3), then wait for target reached.
+
+    ``opens_s`` is how long the brake of an axis that was just enabled may still be opening.
+    """
     drive, units = axis.drive, await axis.units()
     start, envelope = watch.start, watch.envelope
     _require_reachable(axis, units, target, start, envelope)
@@ -224,11 +233,10 @@ async def _to(axis: Axis, target: int, watch: _Watch, progress: Progress | None)
     await axis.control(word)
     key = drive.require("position_target")
     await drive.command(key, target, axis.grant(key))
-    await axis.control(word | cia402.NEW_SET_POINT)
+    await _handed_over(axis, word, opens_s)
     own = drive.profile.quirk("own_status_word") is not None
     reached_bit = 1 << 15 if own else cia402.STATUS_TARGET_REACHED
     deadline = time.monotonic() + envelope.time_s
-    await _acknowledged(axis)
     await axis.control(word)
     while True:
         status = await _still_inside(axis, watch)
@@ -247,8 +255,23 @@ async def _to(axis: Axis, target: int, watch: _Watch, progress: Progress | None)
         await asyncio.sleep(_POLL_S)
 
 
-async def _acknowledged(axis: Axis) -> None:
-    """Give the drive time to take the setpoint (CiA 402: bit 12).
+async def _handed_over(axis: Axis, word: int, opens_s: float) -> None:
+    """Raise the bit of a new setpoint, again while the brake opens and none is acknowledged.
+
+    A drive loses what comes while its brake opens (000:1377, 002:8117): without this the axis
+    would stand, enabled, until the time of the move is over.
+    """
+    opened = time.monotonic() + opens_s
+    while True:
+        is_open = time.monotonic() >= opened
+        await axis.control(word | cia402.NEW_SET_POINT)
+        if await _acknowledged(axis) or is_open:
+            return
+        await axis.control(word)
+
+
+async def _acknowledged(axis: Axis) -> bool:
+    """Give the drive time to take the setpoint (CiA 402: bit 12); whether it has said so.
 
     Families print the acknowledge in different bits (004:3765 has it in 13), so its absence
     is no error here; whether the axis arrives is judged afterwards.
@@ -256,8 +279,9 @@ async def _acknowledged(axis: Axis) -> None:
     deadline = time.monotonic() + _ACKNOWLEDGE_S
     while not await axis.status_word() & cia402.STATUS_SET_POINT_ACKNOWLEDGE:
         if time.monotonic() > deadline:
-            return
+            return False
         await asyncio.sleep(_POLL_S / 2)
+    return True
 
 
 def _require_inside(axis: Axis, units: AxisUnits, settings: MoveSettings) -> tuple[str, int]:

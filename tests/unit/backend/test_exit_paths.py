@@ -489,3 +489,52 @@ async def test_what_fails_at_the_end_of_the_server_keeps_nothing_else_from_its_e
     monkeypatch.undo()
     assert servo.number(STATUS) != ENABLED
     assert closed == [True]
+
+
+async def test_a_measurement_is_answered_although_its_exchange_is_never_set_up(
+    bench: Bench, x: ConnectedDrive, http: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A segment that was killed as it was set up left a request unanswered for half a minute."""
+    monkeypatch.setattr("backend.station.measuring.SET_UP_S", 0.1)
+    begun: list[str] = []
+
+    async def never(_session: object, _cycle_s: float) -> None:
+        begun.append("set up")
+        await asyncio.Event().wait()
+
+    monkeypatch.setattr("backend.axis.cyclic.CyclicSession.__init__", lambda *_args: None)
+    monkeypatch.setattr("backend.axis.cyclic.CyclicSession.start", never)
+    limits = {"travel_limit": 3, "speed_limit": 300, "torque_limit": 60, "time_limit_s": 20}
+    for _ in range(2):
+        answer = await http.post("/drives/x/jobs/inertia", json=limits)
+        assert answer.status_code == 504
+        assert answer.json()["code"] == "station.exchange-not-set-up"
+    assert len(begun) == 2, "the bus is not kept by the first"
+    assert bench.jobs.moving("x") is None
+    bench.exchanges.require_calm("X", [URL])
+
+
+async def test_a_measurement_does_not_begin_when_stop_was_pressed_as_its_exchange_was_set_up(
+    bench: Bench, x: ConnectedDrive, http: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _y, loop = await two_axes(bench, x)
+    begins, goes_on = asyncio.Event(), asyncio.Event()
+
+    async def slowly(bench: Bench, _connected: object, _cycle_s: float) -> Exchange:
+        begins.set()
+        await goes_on.wait()
+        return Exchange(loop, bench, "x", URL, own=True)
+
+    monkeypatch.setattr("backend.api.tuning.measure.exchange_for", slowly)
+    monkeypatch.setattr("backend.tools.sweep.profile_speed.require_consent", lambda *_args: None)
+    limits = {"travel_limit": 3, "speed_limit": 300, "torque_limit": 60, "time_limit_s": 20}
+    measuring = asyncio.create_task(http.post("/drives/x/jobs/inertia", json=limits))
+    await begins.wait()
+    x.axis.session = None
+    await bench.motion.stop(["x"])
+    goes_on.set()
+    answer = await measuring
+    assert answer.status_code == 409
+    assert answer.json()["code"] == "axis.stop-pressed-since"
+    assert bench.jobs.moving("x") is None
+    assert loop.stopped == 1, "the exchange that was set up for it is ended"

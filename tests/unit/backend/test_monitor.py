@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 from collections.abc import Sequence
+from functools import partial
 from typing import cast
 
 import pytest
@@ -137,3 +139,28 @@ def test_axes_are_asked_one_after_the_other(x: ConnectedDrive, clock: Clock) -> 
         # Five evenly spread ones would be 0.2 apart; by the golden ratio the nearest are 0.14.
         around = [*places, places[0] + period_s]
         assert min(b - a for a, b in itertools.pairwise(around)) > 0.1 * period_s
+
+
+async def test_a_monitor_that_is_hurried_as_it_is_closed_ends(x: ConnectedDrive) -> None:
+    """Else whoever removes the drive waits for ever: found by chaos, as a removal without answer.
+
+    The wake-up reaches the waiting task some turns of the event loop after `hurry`; a cancellation
+    in each of them must end it.
+    """
+    for turns in range(6):
+        seen = asyncio.Event()
+        reported = partial(_set, seen)
+        monitor = watching.Monitor(x.axis, Journal(), reported, lambda: None)
+        monitor.start()
+        await seen.wait()
+        for _ in range(20):
+            await asyncio.sleep(0)
+        monitor.hurry()
+        for _ in range(turns):
+            await asyncio.sleep(0)
+        async with asyncio.timeout(5):
+            await monitor.close()
+
+
+def _set(event: asyncio.Event, _snapshot: object) -> None:
+    event.set()

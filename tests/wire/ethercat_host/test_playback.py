@@ -10,7 +10,7 @@ import pytest
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
 from drivers.feedback import FeedbackScale
-from drivers.halt import HaltCause, Halted
+from drivers.halt import HaltCause, Halted, LeftBy
 from drivers.motion.playback import LET_GO_S, STOP_S, AxisLoop
 from drivers.motion.setpoint_plan import Limits, Motion, Phase
 
@@ -343,6 +343,55 @@ def test_a_drive_that_leaves_operation_enabled_is_not_enabled_again_by_itself() 
     bench.obey(10)
     assert bench.status == DISABLED
     assert "left Operation enabled" in bench.reported[0]
+
+
+@pytest.mark.parametrize(
+    ("status", "by", "word"),
+    [
+        (0x0218, LeftBy.FAULT, "has a fault"),
+        (0x021F, LeftBy.FAULT, "has a fault"),
+        (0x0217, LeftBy.QUICK_STOP, "quick stop"),
+        # CiA 402-2 table 30: bit 4 is 0 where no high voltage is applied to the drive.
+        (0x0240, LeftBy.VOLTAGE, "main power"),
+        (0x0223, LeftBy.VOLTAGE, "main power"),
+        (0x0233, LeftBy.OTHERS, "another master"),
+        (0x0250, LeftBy.OTHERS, "another master"),
+    ],
+)
+def test_a_drive_that_left_operation_enabled_between_motions_has_a_cause(
+    status: int, by: LeftBy, word: str
+) -> None:
+    """Between two motions, too: the next one is refused with it, in both languages."""
+    bench = Bench().enabled()
+    assert bench.axis.phase is Phase.IDLE
+    bench.status = status
+    bench.step(3)
+    halted = bench.axis.halted
+    assert halted is not None
+    assert (halted.cause, halted.left_by) == (HaltCause.LEFT_ENABLED, by)
+    assert Halted.from_wire(halted.to_wire()) == halted
+    with pytest.raises(NotAllowed, match=word) as refused:
+        bench.play([500])
+    assert "enable the axis again" in refused.value.remedy
+    for text_ in (refused.value.text, halted.text):
+        assert text_.words("zh") != text_.words("en")
+
+
+def test_an_axis_that_was_never_enabled_is_refused_without_such_a_cause() -> None:
+    bench = Bench()
+    bench.step()
+    with pytest.raises(NotAllowed) as refused:
+        bench.play([500])
+    assert refused.value.remedy == "enable the axis first"
+
+
+def test_an_axis_that_is_enabled_anew_no_longer_says_why_it_was_not() -> None:
+    bench = Bench().enabled()
+    bench.status = DISABLED
+    bench.step(2)
+    assert bench.axis.halted is not None
+    bench.axis.drive_to(State.OPERATION_ENABLED, 8)
+    assert bench.axis.halted is None
 
 
 def test_cycles_without_trusted_inputs_go_on_but_conclude_nothing() -> None:

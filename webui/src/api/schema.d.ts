@@ -1096,6 +1096,9 @@ export interface paths {
         /**
          * Put Back
          * @description Restore every pending value of the drive, while its axis stands.
+         *
+         *     Where one of them can put energy into the motor (a mode, the function of a terminal), the right
+         *     to move is needed, too.
          */
         post: operations["put_back"];
         delete?: never;

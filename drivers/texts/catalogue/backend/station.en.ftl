@@ -11,6 +11,8 @@ station_drive-station-cannot-list = the drive at station { $station } cannot lis
 station_drive-station-carries-eds = the drive at station { $station } carries its EDS in the maker's own format (1022h = { $packed })
 station_drive-station-not-hold = the drive at station { $station } of { $url } does not hold the settings of { $drive }: { $parameter } { $key } is { $value } there and { $here } here ({ $different_count } of { $shared_count } differ)
     .remedy = check which drive each cable goes to; if it is the same drive, accept the difference
+station_exchange-not-set-up = { $drive }: the exchange of process data for the measurement was not set up within { NUM($limit_s, format: "g") } s; nothing moved
+    .remedy = see the bus's state on the Buses page; where its drives are that slow, start the exchange there and measure then
 station_fault = { $kind ->
         [fault] fault
        *[other] warning

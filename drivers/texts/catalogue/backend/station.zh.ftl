@@ -11,6 +11,8 @@ station_drive-station-cannot-list = 站 { $station } 的驱动器不能列出自
 station_drive-station-carries-eds = 站 { $station } 的驱动器以厂家自有格式存储 EDS（1022h = { $packed }）
 station_drive-station-not-hold = { $url } 站 { $station } 的驱动器与 { $drive } 的设置不符：{ $parameter } { $key } 在驱动器中为 { $value }，此处为 { $here }（{ $shared_count } 项中有 { $different_count } 项不同）
     .remedy = 请检查各电缆所接的驱动器；若是同一驱动器，请接受差异
+station_exchange-not-set-up = { $drive }：测量所需的过程数据交换未能在 { NUM($limit_s, format: "g") } s 内建立；没有任何运动
+    .remedy = 请在“总线”页面查看总线状态；如果驱动器确实这么慢，请先在那里启动交换再测量
 station_fault = { $kind ->
         [fault] 故障
        *[other] 警告

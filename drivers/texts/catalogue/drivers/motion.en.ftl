@@ -23,7 +23,19 @@ motion_door-set = somebody with the right to move sets it, with the axis disable
 motion_expired = the setpoints were not renewed in time: the axis is braked and disabled
 motion_following = the following error is beyond its limit
 motion_halted = { $where }: { $cause }
-motion_left-enabled = the drive left Operation enabled: { $note }
+motion_left-enabled = the drive left Operation enabled: { $by ->
+        [fault] it has a fault
+        [quick_stop] a quick stop that was not commanded here (a terminal, another master or the drive itself)
+        [voltage] main power is gone, or STO is open
+        [others] another master, a terminal or the panel of the drive took its power away
+       *[other] { "" }
+    }{ $by ->
+        [fault] { " (" }{ $note })
+        [quick_stop] { " (" }{ $note })
+        [voltage] { " (" }{ $note })
+        [others] { " (" }{ $note })
+       *[other] { $note }
+    }
 motion_lost = the cyclic data stopped coming
 motion_measured-contradict = measured position and speed contradict each other
 motion_move-axis-permission-hand = { $drive }: { $parameter } can move the axis, and the permission at hand is not for it

@@ -23,7 +23,19 @@ motion_door-set = 由具有运动权限的人员在轴断使能时设置
 motion_expired = 设定值未及时更新：轴已制动并断使能
 motion_following = 跟随误差超出限值
 motion_halted = { $where }：{ $cause }
-motion_left-enabled = 驱动器退出了“运行使能”：{ $note }
+motion_left-enabled = 驱动器退出了“运行使能”：{ $by ->
+        [fault] 驱动器有故障
+        [quick_stop] 并非由此处命令的快速停止（端子、另一主站或驱动器自身）
+        [voltage] 主电源已断开，或 STO 已打开
+        [others] 另一主站、端子或驱动器面板切断了其动力
+       *[other] { "" }
+    }{ $by ->
+        [fault] （{ $note }）
+        [quick_stop] （{ $note }）
+        [voltage] （{ $note }）
+        [others] （{ $note }）
+       *[other] { $note }
+    }
 motion_lost = 循环数据中断
 motion_measured-contradict = 测得的位置与速度相互矛盾
 motion_move-axis-permission-hand = { $drive }：{ $parameter } 可使轴运动，而现有许可不适用

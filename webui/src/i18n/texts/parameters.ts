@@ -118,6 +118,12 @@ export const parameters = {
     'The permission is for this one write and ends with it. The value stays in the drive until it is set again.',
     '许可仅限本次写入，写入后即失效。该值在驱动器中保持，直到再次设置。',
   ],
+  'motion.untilLabel': ['Until when', '有效期限'],
+  'motion.withinLabel': ['Within what limits', '允许范围'],
+  'motion.within': [
+    'No power at the motor, and a shaft that turns by at most 0.001 rev in 0.3 s.',
+    '电机不得电，且轴在 0.3 秒内转动不超过 0.001 转。',
+  ],
   'motion.consent': [
     'Nobody is in the danger zone of the axis, and a hand is on the emergency stop.',
     '轴的危险区域内无人，且手在急停按钮上。',

@@ -91,7 +91,12 @@ export function MotionSetting({
           value={reason}
           onChange={(event) => setReason(event.currentTarget.value)}
         />
-        <p className="dim">{t('motion.until')}</p>
+        <dl className="facts">
+          <dt>{t('motion.untilLabel')}</dt>
+          <dd>{t('motion.until')}</dd>
+          <dt>{t('motion.withinLabel')}</dt>
+          <dd>{t('motion.within')}</dd>
+        </dl>
         <Checkbox
           label={t('motion.consent')}
           checked={agreed}
