@@ -42,6 +42,7 @@ RULES = {
 }
 _BASE = {"SINT": "INT8", "USINT": "UINT8", "INT": "INT16", "UINT": "UINT16", "DINT": "INT32",
          "UDINT": "UINT32"}  # fmt: skip
+_MEAN_S = 0.02
 _SLOW = 0.6
 """Of the time that the file allows."""
 
@@ -196,6 +197,13 @@ class FileDevice(ServoDevice):
     def __init__(self, file: File) -> None:
         self.file = file
         super().__init__(_profile(file))
+
+    def _move(self, dt: float) -> None:
+        """While positions are followed the speed is a mean: SYNC0 may be faster than they come."""
+        before = self.speed
+        super()._move(dt)
+        if super()._get(0x6060) == 8 and self.status == 0x0237:
+            self.speed = before + (self.speed - before) * min(dt / _MEAN_S, 1.0)
 
     def _put(self, index: int, value: float) -> None:
         """Speeds in rpm (60A9h of the files), 10000 increments per revolution (608Fh)."""

@@ -8,13 +8,6 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
-from backend.tools.jog.cyclic import jog_cyclic
-from backend.tools.jog.hold import Hold
-from backend.tools.jog.run import JogSettings
 from drivers.cia402 import State
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Address, CyclicSignal, ScopeBlock
@@ -22,7 +15,6 @@ from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import Namespace, unavailable
 from profiles.importer import import_file
 from profiles.schema import DataType, Profile
-from tests.virtual.tools.rig import silent
 from tests.wire.makers_files.samples import SAMPLES
 
 _FACTORY = "tests.wire.makers_files.strict_slave:make_device"
@@ -40,8 +32,9 @@ def namespace() -> Iterator[Namespace]:
 
 @asynccontextmanager
 async def brought(
-    namespace: Namespace, name: str
+    namespace: Namespace, name: str, haste: float = 1.0
 ) -> AsyncIterator[tuple[EthercatLink, VirtualSegment]]:
+    """``haste``: how many times as fast as real time a lockstep wire may run."""
     # A slave that takes its time takes real time: that of a lockstep wire stands without frames.
     lockstep = "slow" not in name
     arguments = ["--factory", _FACTORY, "--slave", _SLAVE, "--sdo-ms", "0.3", "--drive", name]
@@ -49,7 +42,7 @@ async def brought(
     segment = VirtualSegment.start("ec0s", arguments, namespace)
     link = EthercatLink(
         "ec0m", url="ethercat://virtual0", launcher=namespace.command([]),
-        lockstep=1.0 if lockstep else 0.0,
+        lockstep=haste if lockstep else 0.0,
     )  # fmt: skip
     await link.open()
     try:
@@ -105,44 +98,3 @@ async def test_from_the_file_to_process_data(namespace: Namespace, name: str) ->
         mode = bytes.fromhex(segment.command("read", slave=0, index=0x6060))
         assert mode == b"\x09", "the output that was written has arrived"
         await cyclic.stop()
-
-
-_JOG = JogSettings(
-    direction=1, speed_rpm=60.0, acceleration_rpm_s=600.0, travel_rev=5.0, torque_percent=100.0
-)
-
-
-@pytest.mark.parametrize("name", ["mandatory_and_free", "shifted_clock"])
-async def test_jog_with_the_file_alone(namespace: Namespace, name: str) -> None:
-    """60 rpm are one revolution, 10000 increments by 608Fh of the file, in a second."""
-    profile = profile_of(name)
-    async with brought(namespace, name) as (link, segment):
-        link.attach(1, profile)
-        spec = profile.link("ethercat")
-        assert spec is not None
-        axis = Axis(Drive("x", "X", profile, [Port(link, 1, spec)]))
-        session = CyclicSession(link, [axis.drive])
-        await session.start(1e-3)
-        axis.session = session
-        # The page's time, which a busy computer does not interrupt.
-        page_s = [0.0]
-        hold = Hold(clock=lambda: page_s[0])
-
-        async def held() -> None:
-            for _ in range(40):
-                page_s[0] += 0.05
-                hold.renew()
-                await asyncio.sleep(0.05)
-            hold.release("released")
-
-        holding = asyncio.create_task(held())
-        try:
-            result = await jog_cyclic(axis, session, _JOG, hold, silent())
-        finally:
-            holding.cancel()
-            await session.stop()
-        truth = bytes.fromhex(segment.command("read", slave=0, index=0x6064))
-    moved = int.from_bytes(truth, "little", signed=True) - 1000
-    assert result["reason"] == "released", result
-    assert result["moved_rev"] == pytest.approx(moved / 10_000, abs=1e-3)
-    assert moved > 2000
