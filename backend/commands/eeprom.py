@@ -240,8 +240,6 @@ async def _contents(url: str, station: int, size: int | None, server: str | None
     if at := server_for(url, server):
         from backend.commands.remote import remote
 
-        query = {"url": url, "station": str(station)} | (
-            {} if size is None else {"size": str(size)}
         query = {"url": url, "station": str(station)}
         query |= {} if size is None else {"size": str(size)}
         async with remote(at) as asked:
