@@ -148,7 +148,7 @@ def test_an_eeprom_is_saved_compared_and_restored_after_two_confirmations(
     done = station.ok(eeprom(station, "restore", saved, digest=plan["digest"], confirmed=True))
     assert done["words"] == 1
     assert segment.command("eeprom", slave=1)["data"] == saved.hex()
-    rows = station.ok(station.http.get("/audit"))["facts"]
+    rows = station.ok(station.http.get("/audit"))["events"]
     (row,) = [each for each in rows if each["target"] == "/ethercat/eeprom/restore"][:1]
     assert plan["digest"] in row["new"]
     assert not station.ok(eeprom(station, "plan", saved))["changes"]

@@ -18,7 +18,7 @@ HEADER_BYTES, UNIT_BYTES = 0x80, 0x80
 MOST_BYTES = 1 << 20
 VENDOR_WORD, SERIAL_WORD, SIZE_WORD = 0x08, 0x0E, 0x3E
 _END = 0xFFFF
-_BLANK = (0, 0xFFFFFFFF)
+_BLANK = 0xFFFFFFFF
 
 #: Fields of the header: name, first word, words.
 FIELDS: tuple[tuple[str, int, int], ...] = (
@@ -72,41 +72,41 @@ class Image:
 
     data: bytes
 
-    def words(self, word: int, count: int) -> bytes:
+    def part(self, word: int, count: int) -> bytes:
         """Bytes of ``count`` words."""
         return self.data[2 * word : 2 * (word + count)]
 
     @property
     def checksum_right(self) -> bool:
         """Whether word 7 fits the words before it; a controller ignores the contents if not."""
-        words = self.words(0, CONFIG_WORDS + 1)
-        return len(words) == 16 and words[14] == checksum(words)
+        head = self.part(0, CONFIG_WORDS + 1)
+        return len(head) == 16 and head[14] == checksum(head)
 
     @property
     def identity(self) -> SlaveIdentity:
         """Vendor, product and revision."""
-        return SlaveIdentity(*struct.unpack("<III", self.words(VENDOR_WORD, 6)))
+        return SlaveIdentity(*struct.unpack("<III", self.part(VENDOR_WORD, 6)))
 
     @property
     def has_identity(self) -> bool:
         """Whether vendor and product were ever written."""
-        return not {*self.identity[:2]} & {*_BLANK}
+        return _BLANK not in self.identity[:2]
 
     @property
     def serial(self) -> int | None:
         """The serial number; None where there is none."""
-        (serial,) = struct.unpack("<I", self.words(SERIAL_WORD, 2))
-        return None if serial in _BLANK else int(serial)
+        (serial,) = struct.unpack("<I", self.part(SERIAL_WORD, 2))
+        return None if serial in (0, _BLANK) else int(serial)
 
     @property
     def alias(self) -> int:
         """The station alias."""
-        return int.from_bytes(self.words(ALIAS_WORD, 1), "little")
+        return int.from_bytes(self.part(ALIAS_WORD, 1), "little")
 
     @property
     def stated_bytes(self) -> int:
         """The size that it states for itself."""
-        return UNIT_BYTES * (int.from_bytes(self.words(SIZE_WORD, 1), "little") + 1)
+        return UNIT_BYTES * (int.from_bytes(self.part(SIZE_WORD, 1), "little") + 1)
 
     @property
     def trusted(self) -> bool:
@@ -121,13 +121,13 @@ class Image:
         """
         word = HEADER_BYTES // 2
         while True:
-            head = self.words(word, 2)
+            head = self.part(word, 2)
             if head[:2] == _END.to_bytes(2, "little"):
                 return
             if len(head) < 4:
                 raise ValueError("no end mark")
             kind, count = struct.unpack("<HH", head)
-            data = self.words(word + 2, count)
+            data = self.part(word + 2, count)
             if len(data) < 2 * count:
                 raise ValueError("beyond the end")
             yield Category(kind, word, data)
@@ -163,7 +163,7 @@ def differences(first: Image, second: Image) -> tuple[Difference, ...]:
     found = [
         Difference(name, word, before.hex(), after.hex())
         for name, word, count in FIELDS
-        if (before := first.words(word, count)) != (after := second.words(word, count))
+        if (before := first.part(word, count)) != (after := second.part(word, count))
     ]
     return tuple(found) + _of_categories(first, second)
 

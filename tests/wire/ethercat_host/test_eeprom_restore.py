@@ -152,7 +152,7 @@ def test_the_file_of_another_drive_is_refused(chip: Chip) -> None:
         (lambda data: data[:-2], "no contents of an EEPROM"),
         (lambda data: data + b"\xff" * 128, "states 2048 bytes and has 2176"),
         (lambda data: b"\x01" + data[1:], "checksum in word 7"),
-        (lambda data: data[:16] + bytes(8) + data[24:], "no vendor and no product"),
+        (lambda data: data[:16] + b"\xff" * 8 + data[24:], "no vendor and no product"),
         (lambda data: data[:0x80] + b"\x0a\x00\xff\x7f" + data[0x84:], "do not end"),
     ],
 )

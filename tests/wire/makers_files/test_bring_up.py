@@ -5,10 +5,12 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
+from dataclasses import replace
 
 import pytest
 
 from drivers.cia402 import State
+from drivers.ethercat.exchange.mapping import plan_station
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Address, CyclicSignal, ScopeBlock
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
@@ -98,3 +100,22 @@ async def test_from_the_file_to_process_data(namespace: Namespace, name: str) ->
         mode = bytes.fromhex(segment.command("read", slave=0, index=0x6060))
         assert mode == b"\x09", "the output that was written has arrived"
         await cyclic.stop()
+
+
+FIXED = {"fixed_with_padding", "two_each_way", "exclusive_sets", "pdos_of_the_mode"}
+"""Samples with fixed contents, none of which carries torque and velocity offset as well."""
+ALL_OUTPUTS = ((0x6060, "INT8"), (0x6071, "INT16"), (0x607A, "INT32"), (0x60B1, "INT32"),
+               (0x60FF, "INT32"))  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_outputs_that_the_process_data_lack_are_left_out(name: str) -> None:
+    """The page asks for every output that the file says can be mapped; fixed PDOs have fewer."""
+    profile = profile_of(name)
+    wanted = [signal(0x6040, "UINT16")]
+    wanted += [replace(signal(i, kind), optional=True) for i, kind in ALL_OUTPUTS]
+    plan = plan_station(1, INPUTS, wanted, profile)
+    carried = {s.channel for s in plan.mapped}
+    assert carried >= {"6040", "6060", "607A", "6041", "6064"}
+    left = {s.channel for s, _why in plan.left_over}
+    assert left == ({"6071", "60B1"} if name in FIXED else set())
