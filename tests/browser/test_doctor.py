@@ -59,9 +59,14 @@ def refused(station: Station, code: int) -> None:
     assert answer.status_code == 409, answer.text
 
 
-def outputs_size(station: Station) -> Callable[[], None]:
-    refused(station, 0x001D)
-    return lambda: slave(station, "refuse", state="SAFEOP", code=None)
+def refusing(code: int) -> Callable[[Station], Callable[[], None]]:
+    """AL status codes of ETG.1020."""
+
+    def inject(station: Station) -> Callable[[], None]:
+        refused(station, code)
+        return lambda: slave(station, "refuse", state="SAFEOP", code=None)
+
+    return inject
 
 
 def eeprom_damaged(station: Station) -> Callable[[], None]:
@@ -78,19 +83,6 @@ def eeprom_damaged(station: Station) -> Callable[[], None]:
     return undo
 
 
-def station_silent(station: Station) -> Callable[[], None]:
-    slave(station, "power_off")
-    until(
-        lambda: (
-            not station.ok(station.http.get("/ethercat/segment", params={"url": SEGMENT}))[
-                "stations"
-            ][0]["answers"]
-        ),
-        what="the station is lost",
-    )
-    return lambda: slave(station, "power_on")
-
-
 def can_drive_fault(station: Station) -> Callable[[], None]:
     drive = next(d for d in station.ok(station.http.get("/drives")) if d["name"] == "Z")["id"]
     station.drives.command(do="inject", axis="Z", what="overload")
@@ -98,17 +90,12 @@ def can_drive_fault(station: Station) -> Callable[[], None]:
     return lambda: station.ok(station.http.post(f"/drives/{drive}/fault-reset", json={}))
 
 
-def can_not_started(_station: Station) -> Callable[[], None]:
-    """As it is: nobody has started the node."""
-    return lambda: None
-
-
 CASES: list[tuple[str, str, Callable[[Station], Callable[[], None]]]] = [
-    (CAN, "can_not_started", can_not_started),
     (CAN, "can_drive_fault", can_drive_fault),
-    (SEGMENT, "outputs_size", outputs_size),
+    (SEGMENT, "outputs_size", refusing(0x001D)),
+    (SEGMENT, "watchdog_refused", refusing(0x001F)),
+    (SEGMENT, "clock_mode_wrong", refusing(0x0030)),
     (SEGMENT, "eeprom_damaged", eeprom_damaged),
-    (SEGMENT, "station_silent", station_silent),
 ]
 
 
