@@ -201,8 +201,10 @@ async def _by_server(
     }  # fmt: skip
     async with remote(at) as asked:
         answer = await asked.raw("POST", "/ethercat/eeprom/plan", content=data, query=query)
-        told = answer.json()
-        shown = _Shown(told["digest"], told["words"], told["keeps_serial"], told["changes"])
+        reported = answer.json()
+        shown = _Shown(
+            reported["digest"], reported["words"], reported["keeps_serial"], reported["changes"]
+        )
         if _confirmed(shown, confirm, yes):
             query |= {"digest": shown.digest, "confirmed": "true"}
             await asked.raw("POST", "/ethercat/eeprom/restore", content=data, query=query)

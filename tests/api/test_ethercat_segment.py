@@ -169,8 +169,8 @@ def test_the_command_line_saves_compares_and_restores(station: Station, tmp_path
     file = tmp_path / "eeprom.bin"
     at = ["--station", "2", "--server", station.url]
     run = CliRunner().invoke
-    told = run(cli.app, ["eeprom", "read", URL, "--out", str(file), *at])
-    assert told.exit_code == 0, told.output
+    reported = run(cli.app, ["eeprom", "read", URL, "--out", str(file), *at])
+    assert reported.exit_code == 0, reported.output
     assert run(cli.app, ["eeprom", "compare", URL, str(file), *at]).exit_code == 0
     station.drives.segments[URL].command("eeprom", slave=1, word=0x51, data="1234")
     differs = run(cli.app, ["eeprom", "compare", URL, str(file), "--json", *at])
@@ -226,10 +226,10 @@ def test_firmware_that_fails_says_how_far_it_came_and_what_to_do(station: Statio
     until(lambda: station.ok(station.http.get(f"/jobs/{job['id']}"))["state"] != "running", 60)
     ended = station.ok(station.http.get(f"/jobs/{job['id']}"))
     assert ended["state"] == "failed", ended
-    told = ended["problem"]["detail"]
-    assert "flash memory error" in told
-    assert "after 1500 of 4000 bytes" in told
-    assert "it may be without firmware" in told
+    reported = ended["problem"]["detail"]
+    assert "flash memory error" in reported
+    assert "after 1500 of 4000 bytes" in reported
+    assert "it may be without firmware" in reported
     segment.command("firmware", slave=0)
     job = station.ok(load(station, "a", bytes(4000), confirmed=True))
     until(lambda: station.ok(station.http.get(f"/jobs/{job['id']}"))["state"] == "done", 60)
@@ -237,9 +237,9 @@ def test_firmware_that_fails_says_how_far_it_came_and_what_to_do(station: Statio
 
 def test_permissions_of_an_interface_that_is_not_there(station: Station) -> None:
     query = {"url": "ethercat://nosuch0"}
-    told = station.ok(station.http.get("/ethercat/permissions", params=query))
-    assert told["ready"] is False
-    assert told["text"] == "there is no network interface 'nosuch0' on this computer"
+    reported = station.ok(station.http.get("/ethercat/permissions", params=query))
+    assert reported["ready"] is False
+    assert reported["text"] == "there is no network interface 'nosuch0' on this computer"
     wrong = station.http.get("/ethercat/permissions", params={"url": "canopen://x"})
     assert wrong.status_code == 422
     unknown = station.http.get("/ethercat/segment", params={"url": "ethercat://other"})

@@ -49,11 +49,11 @@ class LssAccess:
         """
         self._require_calm()
 
-        def told(share: float) -> None:
+        def reported(share: float) -> None:
             progress(share, text("canopen.lss-scanning"))
 
         if await self._in_worker(self._master.unconfigured):
-            found = await self._in_worker(lambda: self._master.find(told))
+            found = await self._in_worker(lambda: self._master.find(reported))
             if found is not None:
                 return LssNode(found, None)
         only = await self._in_worker(self._master.only_node)

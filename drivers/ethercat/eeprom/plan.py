@@ -56,7 +56,7 @@ def plan_restore(
     """From a saved file. ``drive`` is what the drive's firmware says of itself (1018h).
 
     The serial number of the drive stays where it has one that can be believed: two drives with
-    one serial number could not be told apart.
+    one serial number could not be distinguished.
 
     Raises:
         OutOfRange: the file is no sound contents of an EEPROM, or of another size.

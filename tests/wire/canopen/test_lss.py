@@ -100,7 +100,7 @@ async def test_the_only_node_is_found_with_its_number(bench: Bench, link: Canope
     assert (found.identity, found.node) == (truth(bench.node), 5)
 
 
-async def test_several_nodes_with_numbers_are_not_told_apart_by_a_guess(
+async def test_several_nodes_with_numbers_are_not_distinguished_by_a_guess(
     bench: Bench, link: CanopenLink
 ) -> None:
     bench.wire.do(lambda: bench.wire.nodes.__setitem__(0, made(7, 43)))
