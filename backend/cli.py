@@ -27,6 +27,14 @@ COMMANDS = {
         "doctor:doctor",
         "Why a drive does not reach Operational. Nothing moves.",
     ),
+    "eeprom": (
+        "eeprom:app",
+        "The EEPROM of an EtherCAT drive: save, compare, restore, alias, identity.",
+    ),
+    "lss": (
+        "lss:app",
+        "Node number and bit rate of a CANopen node that has none (CiA 305).",
+    ),
     "params": ("params:app", "Read and write parameters on a bus, or by a running server."),
     "jog": (
         "live:jog",

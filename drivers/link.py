@@ -216,11 +216,15 @@ class ScopeBlock:
 
 @dataclass(frozen=True, slots=True)
 class CyclicSignal:
-    """One process-data signal of one station, named ``channel`` in the blocks."""
+    """One process-data signal of one station, named ``channel`` in the blocks.
+
+    An ``optional`` output is left out where the drive's process data have no place for it.
+    """
 
     station: int
     address: Address
     channel: str
+    optional: bool = False
 
 
 @dataclass(frozen=True, slots=True)

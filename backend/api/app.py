@@ -44,6 +44,7 @@ from backend.api.sets import routes as routes_sets
 from backend.api.spoken import Spoken
 from backend.api.station import description as routes_description
 from backend.api.station import doctor as routes_doctor
+from backend.api.station import eeprom as routes_eeprom
 from backend.api.station import ethercat as routes_ethercat
 from backend.api.station import flight as routes_flight
 from backend.api.station import preflight as routes_preflight
@@ -82,6 +83,7 @@ _PARTS = (
     routes_bench,
     routes_drive,
     routes_pending,
+    routes_eeprom,
     routes_ethercat,
     routes_doctor,
     routes_flight,

@@ -82,7 +82,7 @@ class CyclicSession:
                 self.cyclic.take_speeds(port.station, by_speed)
             roles = _SPEED_ROLES if by_speed else OUTPUT_ROLES
             inputs += _signals(drive, port, INPUT_ROLES, ("tx", "rxtx"))
-            outputs += _signals(drive, port, roles, ("rx", "rxtx"))
+            outputs += _signals(drive, port, roles, ("rx", "rxtx"), needed=roles[:1])
         outputs = _fitting_outputs(self.drives, outputs)
         mapped = await self.cyclic.configure(inputs, outputs, cycle_s)
         try:
@@ -201,14 +201,24 @@ def channel(drive: Drive, key: str) -> str:
 
 
 def _signals(
-    drive: Drive, port: Port, roles: Sequence[str], directions: Sequence[str]
+    drive: Drive,
+    port: Port,
+    roles: Sequence[str],
+    directions: Sequence[str],
+    needed: Collection[str] = (),
 ) -> list[CyclicSignal]:
+    """Signals of these roles; fixed process data may lack what is not needed."""
     found = []
     for role in roles:
         parameter = drive.profile.by_role.get(role)
         if parameter is not None and parameter.pdo in directions:
             found.append(
-                CyclicSignal(port.station, address_of(parameter), channel(drive, parameter.key))
+                CyclicSignal(
+                    port.station,
+                    address_of(parameter),
+                    channel(drive, parameter.key),
+                    optional=role not in needed,
+                )
             )
     return found
 

@@ -22,6 +22,10 @@ from drivers.canopen.channel import SdoChannel
 from drivers.canopen.cyclic import CanopenCyclic
 from drivers.canopen.doctor import Examiner
 from drivers.canopen.frames import HEARTBEAT, SDO_ANSWER, SDO_REQUEST, Frame
+from drivers.canopen.lss.access import LssAccess
+from drivers.canopen.lss.codes import ANSWER as LSS_ANSWER
+from drivers.canopen.lss.codes import REQUEST as LSS_REQUEST
+from drivers.canopen.lss.master import LssMaster
 from drivers.canopen.nodes import NodeWatch
 from drivers.canopen.port import CanPort
 from drivers.canopen.scanning import identify, probe
@@ -91,6 +95,10 @@ class CanopenLink:
             self._port, self._settings, self._sdo_read, self._sdo_write, self._in_worker, clock
         )
         self._profiles: dict[int, Profile] = {}
+        self._lss = LssMaster(lambda data: self._port.send(Frame(LSS_REQUEST, data)))
+        self.lss = LssAccess(
+            self._lss, self._in_worker, self._answers, lambda: self._cyclic.running
+        )
         self._examiner = Examiner(
             self._port, self._watch, self._watch_lock, self._channels, self._cyclic
         )
@@ -179,6 +187,10 @@ class CanopenLink:
         ]
         progress(1.0, text("canopen.nodes-found", found_count=len(found)))
         return sorted(found, key=lambda f: f.station)
+
+    async def _answers(self, node: int) -> bool:
+        """Whether a node answers for this number."""
+        return bool(await self._in_worker(partial(probe, [self._channel(node)])))
 
     async def _identify(self, node: int, answers: list[bytes]) -> Found:
         found = await self._run(
@@ -341,6 +353,9 @@ class CanopenLink:
 
     def _frame(self, frame: Frame, now_s: float) -> None:
         if self._cyclic.take(frame):
+            return
+        if frame.cob_id == LSS_ANSWER and not frame.remote:
+            self._lss.deliver(frame.data)
             return
         function, node = frame.cob_id & 0x780, frame.cob_id & 0x7F
         if function == SDO_ANSWER and node:

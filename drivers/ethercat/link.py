@@ -20,6 +20,7 @@ from drivers.doctor.examined import Examination
 from drivers.errors import DriveError, NotAllowed
 from drivers.ethercat.bus import BUS
 from drivers.ethercat.doctor import evidence_of
+from drivers.ethercat.eeprom.access import EepromAccess
 from drivers.ethercat.exchange.segmentcyclic import EthercatCyclic
 from drivers.ethercat.process import firmware
 from drivers.ethercat.process.hostprocess import HostProcess
@@ -77,6 +78,7 @@ class EthercatLink:
             self._host, self._profiles, self._exchange_changed, self.recorder.note
         )
         self.cyclic: Cyclic | None = self.process_data
+        self.eeprom = EepromAccess(self._call, self.read)
 
     # Link ----------------------------------------------------------------------------------
 

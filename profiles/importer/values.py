@@ -252,5 +252,6 @@ def unit_of_code(text: str) -> str:
 
 def tidy(text: str, longest: int = 200) -> str:
     """One line without control characters, at most ``longest`` characters."""
-    cleaned = "".join(c if c.isprintable() else " " for c in text)
+    plain = text.isprintable()
+    cleaned = text if plain else "".join(c if c.isprintable() else " " for c in text)
     return " ".join(cleaned.split())[:longest]

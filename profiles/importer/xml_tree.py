@@ -16,9 +16,12 @@ def strip_namespaces(root: Element) -> None:
 
 
 def child(element: Element | None, tag: str) -> Element | None:
-    """The first child with this tag, whatever the case of its letters."""
+    """The first child with this tag; where there is none, with its letters in another case."""
     if element is None:
         return None
+    found = element.find(tag)
+    if found is not None:
+        return found
     wanted = tag.lower()
     for each in element:
         if isinstance(each.tag, str) and each.tag.lower() == wanted:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
+from backend import cli
 from drivers.virtual.wires.netns import unavailable
 from tests.support import firmware_drive
 from tests.support.station import Station, until
@@ -114,6 +117,72 @@ def test_alias_wants_to_be_confirmed_and_is_read_back_after_power_on(station: St
     station.drives.segments[URL].command("power_cycle", slave=1, off_s=0.1)
     # SOEM refuses the slave with its new alias, so the segment is searched again by itself.
     until(lambda: [s["alias"] for s in view(station)["stations"]] == [0, 1234], 60, "new alias")
+
+
+def eeprom(station: Station, way: str, data: bytes = b"", **query: Any) -> Any:
+    return station.http.post(
+        f"/ethercat/eeprom/{way}", params={"url": URL, "station": 2, **query}, content=data
+    )
+
+
+def test_an_eeprom_is_saved_compared_and_restored_after_two_confirmations(
+    station: Station,
+) -> None:
+    segment = station.drives.segments[URL]
+    answer = station.http.get("/ethercat/eeprom", params={"url": URL, "station": 2})
+    saved = answer.raise_for_status().content
+    assert saved.hex() == segment.command("eeprom", slave=1)["data"]
+    assert answer.headers["content-disposition"].endswith('.bin"')
+    segment.command("eeprom", slave=1, word=0x50, data="1234")
+    compared = station.ok(eeprom(station, "compare", saved))
+    assert compared["sound"]
+    assert len(compared["differences"]) == 1
+    plan = station.ok(eeprom(station, "plan", saved))
+    assert plan["words"] == 1
+    unconfirmed = eeprom(station, "restore", saved, digest=plan["digest"])
+    assert unconfirmed.status_code == 409
+    other = eeprom(station, "restore", saved, digest="0" * 16, confirmed=True)
+    assert other.status_code == 409
+    assert other.json()["code"] == "ethercat.eeprom-plan-changed"
+    assert segment.command("eeprom", slave=1)["words_written"] == 0
+    done = station.ok(eeprom(station, "restore", saved, digest=plan["digest"], confirmed=True))
+    assert done["words"] == 1
+    assert segment.command("eeprom", slave=1)["data"] == saved.hex()
+    rows = station.ok(station.http.get("/audit"))["events"]
+    (row,) = [each for each in rows if each["target"] == "/ethercat/eeprom/restore"][:1]
+    assert plan["digest"] in row["new"]
+    assert not station.ok(eeprom(station, "plan", saved))["changes"]
+
+
+def test_no_eeprom_is_touched_while_the_exchange_runs(station: Station) -> None:
+    saved = bytes.fromhex(station.drives.segments[URL].command("eeprom", slave=1)["data"])
+    station.ok(station.http.post("/buses/cyclic", json={"url": URL, "cycle_us": 2000}))
+    try:
+        busy = eeprom(station, "restore", saved, digest="0" * 16, confirmed=True)
+        assert busy.status_code == 409
+        assert "stop the cyclic exchange" in busy.json()["remedy"]
+    finally:
+        station.http.delete("/buses/cyclic", params={"url": URL})
+
+
+def test_the_command_line_saves_compares_and_restores(station: Station, tmp_path: Path) -> None:
+    file = tmp_path / "eeprom.bin"
+    at = ["--station", "2", "--server", station.url]
+    run = CliRunner().invoke
+    reported = run(cli.app, ["eeprom", "read", URL, "--out", str(file), *at])
+    assert reported.exit_code == 0, reported.output
+    assert run(cli.app, ["eeprom", "compare", URL, str(file), *at]).exit_code == 0
+    station.drives.segments[URL].command("eeprom", slave=1, word=0x51, data="1234")
+    differs = run(cli.app, ["eeprom", "compare", URL, str(file), "--json", *at])
+    assert differs.exit_code == 1
+    assert len(json.loads(differs.output)) == 1
+    refused = run(cli.app, ["eeprom", "restore", URL, str(file), *at], input="wrong\n")
+    assert refused.exit_code == 1
+    plan = station.ok(eeprom(station, "plan", file.read_bytes()))
+    given = f"{plan['digest']}\ny\n"
+    done = run(cli.app, ["eeprom", "restore", URL, str(file), *at], input=given)
+    assert done.exit_code == 0, done.output
+    assert run(cli.app, ["eeprom", "compare", URL, str(file), *at]).exit_code == 0
 
 
 def load(station: Station, drive: str, data: bytes, **query: bool) -> Any:

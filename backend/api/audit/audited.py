@@ -65,6 +65,7 @@ CHANGES_NOTHING = frozenset(
     for path in (
         "/calculate/braking", f"{_DRIVE}/gear/plan", f"{_DRIVE}/notches/preview",
         f"{_DRIVE}/tune/candidates", f"{_DRIVE}/tune/predict", f"{_DRIVE}/tune/excitation",
+        "/ethercat/eeprom/compare", "/ethercat/eeprom/plan",
         "/measurements/import/preview", f"{_DRIVE}/jobs/read_all", f"{_DRIVE}/fault-history/read",
     )
 )  # fmt: skip

@@ -103,6 +103,11 @@ _API: dict[str, Need] = {
     "GET /ethercat/permissions": _LOOK,
     "POST /ethercat/counters/clear": _STATION_BUS,
     "POST /ethercat/alias": _STATION_BUS,
+    # Reading takes the EEPROM from the drive's processor for a moment.
+    "GET /ethercat/eeprom": _STATION,
+    "POST /ethercat/eeprom/compare": _STATION,
+    "POST /ethercat/eeprom/plan": _STATION,
+    "POST /ethercat/eeprom/restore": _STATION_BUS,
     "GET /jobs": _LOOK,
     "GET /jobs/{job_id}": _LOOK,
     # Ends a motion for everybody, like STOP; the route asks for more where nothing moves.

@@ -62,7 +62,7 @@ async def ethercat_segment(bench: TheBench, url: Annotated[str, Query()]) -> Eth
 
     Answers as well while the segment cannot be asked; ``problem`` then says why.
     """
-    link = _link(bench, url)
+    link = opened_segment(bench, url)
     survey, problem = Survey((), ()), ""
     try:
         survey = await link.survey()
@@ -105,7 +105,7 @@ async def clear_counters(
     bench: TheBench, request: CountersRequest, connection: Connection = None
 ) -> Response:
     """Set the port error counters of one station or of all to zero."""
-    link = _link(bench, request.url)
+    link = opened_segment(bench, request.url)
     for connected in _members(bench, link):
         if request.station in (None, _station_of(connected, link)):
             bench.leases.require(connected.drive.id, connection)
@@ -124,9 +124,9 @@ async def write_alias(
     bench: TheBench, request: AliasRequest, connection: Connection = None
 ) -> Response:
     """Write a station alias; the EEPROM takes its time, so nothing may move on this bus."""
-    link = _link(bench, request.url)
-    _require_calm(bench, link, connection)
-    _require_confirmed(request.confirmed, _ALIAS_WARNING)
+    link = opened_segment(bench, request.url)
+    calm_segment(bench, link, connection)
+    require_confirmed(request.confirmed, _ALIAS_WARNING)
     for connected in _members(bench, link):
         if _station_of(connected, link) == request.station:
             await confirm_identity(connected.drive)
@@ -158,8 +158,8 @@ async def load_firmware(
     The job cannot be cancelled: a download that breaks off may leave the drive without firmware.
     """
     link, station = _firmware_port(connected)
-    _require_calm(bench, link, connection)
-    _require_confirmed(confirmed, _FIRMWARE_WARNING)
+    calm_segment(bench, link, connection)
+    require_confirmed(confirmed, _FIRMWARE_WARNING)
     data = await _body(request, file)
     await _require_loadable(connected, link, station)
 
@@ -239,7 +239,12 @@ async def _body(request: Request, file: str) -> bytes:
     return bytes(data)
 
 
-def _link(bench: Bench, url: str) -> EthercatLink:
+def opened_segment(bench: Bench, url: str) -> EthercatLink:
+    """The segment with this URL.
+
+    Raises:
+        NotFound: no such bus is open.
+    """
     link = segment_of(bench.buses.opened.get(url))
     if link is None:
         raise NotFound("api-station.no-opened-ethercat-bus", value=url)
@@ -254,7 +259,7 @@ def _station_of(connected: ConnectedDrive, link: EthercatLink) -> int | None:
     return next((port.station for port in connected.drive.ports if port.link is link), None)
 
 
-def _require_calm(bench: Bench, link: EthercatLink, connection: str | None) -> None:
+def calm_segment(bench: Bench, link: EthercatLink, connection: str | None) -> None:
     """Control of every drive of the segment, and nothing moves on it.
 
     What follows keeps the wire busy or resets a drive; neither may happen under a neighbour's
@@ -265,7 +270,12 @@ def _require_calm(bench: Bench, link: EthercatLink, connection: str | None) -> N
         bench.motion.require_idle(connected)
 
 
-def _require_confirmed(confirmed: bool, warning: str) -> None:
+def require_confirmed(confirmed: bool, warning: str) -> None:
+    """A person has read the warning.
+
+    Raises:
+        NotAllowed: not yet.
+    """
     if not confirmed:
         raise NotAllowed(warning, remedy="send it again with confirmed=true if all that is so")
 

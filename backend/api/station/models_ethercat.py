@@ -115,3 +115,36 @@ class AliasRequest(Message):
     station: int = Field(ge=1)
     alias: int = Field(ge=0, le=0xFFFF)
     confirmed: bool = False
+
+
+class EepromDifference(Message):
+    """A field of the EEPROM: what it has (``first``) and what the file has, as bytes in hex."""
+
+    field: str = Field(description="a field of the header or a category, as ETG.2010 names it")
+    word: int
+    first: str | None = Field(description="None where the EEPROM has it not")
+    second: str | None = Field(description="None where the file has it not")
+
+
+class EepromComparison(Message):
+    """The EEPROM of a slave beside a file."""
+
+    bytes: int
+    sound: bool
+    problem: str | None = Field(description="what is wrong with the present contents")
+    vendor_id: int
+    product_code: int
+    revision: int
+    serial: int | None
+    alias: int
+    differences: list[EepromDifference]
+
+
+class EepromPlan(Message):
+    """What is, or was, to be written."""
+
+    digest: str = Field(description="confirms this change and no other")
+    words: int = Field(description="how many words are written, without the checksum's own steps")
+    keeps_serial: bool = Field(description="the drive keeps its serial number, not the file's")
+    warning: str
+    changes: list[EepromDifference]

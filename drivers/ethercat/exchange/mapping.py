@@ -133,22 +133,24 @@ def plan_station(
 ) -> StationPlan:
     """Choose the process data of one station.
 
-    Outputs are all needed, and with a target its control word, status word and actual position,
-    so that the loop can stop the axis by itself. Inputs fill the rest in their order.
+    Outputs are all needed but the optional ones, and with a target its control word, status word
+    and actual position, so that the loop can stop the axis by itself. Optional outputs and inputs
+    fill the rest in their order.
 
     Raises:
-        NotAllowed: an output cannot be mapped, or all of them do not fit.
+        NotAllowed: an output that is needed cannot be mapped, or all of them do not fit.
     """
-    needed_out = [signal.address for signal in outputs]
+    needed_out = [signal.address for signal in outputs if not signal.optional]
+    optional = [signal.address for signal in outputs if signal.optional]
     needed_in: list[Address] = []
-    if any(address.index in TARGETS for address in needed_out):
+    if any(address.index in TARGETS for address in (*needed_out, *optional)):
         needed_out.insert(0, CONTROL_WORD)
         needed_in = [STATUS_WORD, POSITION_ACTUAL]
     elif CONTROL_WORD.index in {address.index for address in needed_out}:
         needed_in = [STATUS_WORD]
     wish_in = _unique([*needed_in, *(signal.address for signal in inputs)])
-    wish_out = _unique(needed_out)
-    rx = _direction(station, "rx", wish_out, len(wish_out), profile)
+    wish_out = _unique([*needed_out, *optional])
+    rx = _direction(station, "rx", wish_out, len(_unique(needed_out)), profile)
     tx = _direction(station, "tx", wish_in, len(_unique(needed_in)), profile)
     return _with_signals(station, inputs, outputs, rx, tx)
 
@@ -293,7 +295,11 @@ def _fixed(
     """The fixed PDOs that have all that is needed and most of what is wished."""
     must = {str(address) for address in needed}
     want = {str(address) for address in wish}
-    best = choose_fixed(rules, must, want, lambda sets: _reached(_set_entries(sets, profile)))
+
+    def keys_of(sets: Sequence[PdoSet]) -> set[str]:
+        return _reached(_set_entries(sets, profile))
+
+    best = choose_fixed(rules, must, want, keys_of)
     if best is None:
         own = ", ".join(f"{s.index:04X}h" for s in rules.sets)
         raise NotAllowed(

@@ -17,6 +17,7 @@ from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.exchange.setup import FoundInPart
 from drivers.ethercat.process import firmware
 from drivers.ethercat.process import station as transactions
+from drivers.ethercat.process.eeprom import EepromOperations
 from drivers.ethercat.process.examination import examine
 from drivers.ethercat.process.protocol import Message, error_to_wire
 from drivers.ethercat.process.roster import Roster, Send
@@ -51,6 +52,7 @@ class Operations:
         self._send = send
         self._starved = 0
         self._loading: set[int] = set()
+        self._eeprom = EepromOperations(self.roster, self.lanes, self._progress_of)
         self._handlers: dict[str, Callable[[Message, Done], None]] = {
             "scan": self._scan, "read": self._read, "read_many": self._read_many,
             "write": self._write, "enumerate": self._enumerate, "state": self._state,
@@ -59,6 +61,7 @@ class Operations:
             "configure": self._configure, "start": self._start, "stop": self._stop,
             "play": self._play, "renew": self._renew, "halt": self._halt, "pause": self._pause,
             "drive_to": self._drive_to,
+            "eeprom_read": self._eeprom.read, "eeprom_write": self._eeprom.write,
         }  # fmt: skip
 
     @property
@@ -153,6 +156,9 @@ class Operations:
             "state": state_name(station.al_state), "notes": list(station.notes),
             "parent": parent, "parent_port": port, "dc": station.distributed_clock,
         }  # fmt: skip
+
+    def _progress_of(self, message: Message) -> Callable[[float, Text], None]:
+        return lambda share, step: self._progress(message, share, step)
 
     def _progress(self, message: Message, share: float, step: Text) -> None:
         self._send({"id": message["id"], "progress": share, "text": step.to_wire()})

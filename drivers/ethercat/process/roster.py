@@ -43,6 +43,8 @@ class Roster:
         self.attached = False
         self.is_open = False
         self.new_aliases: set[int] = set()
+        self.held: set[int] = set()
+        """Stations whose EEPROM is being written: a search would read it meanwhile."""
         self._ring = ring
         self._send = send
         self._next_watch = 0.0
@@ -92,7 +94,7 @@ class Roster:
                 self.lanes.submit(station.number, "mailbox", station.box.drain(), _ignore)
 
     def _search_again(self, now: float) -> None:
-        if now < self._next_open or self.exchange.loop is not None or self._powered:
+        if now < self._next_open or self.exchange.loop is not None or self._powered or self.held:
             return
         self._next_open = now + _REOPEN_S
         before = len(self.stations)
@@ -259,10 +261,20 @@ class Roster:
             )
         )
 
+    def require_not_held(self) -> None:
+        """No EEPROM of the segment is being written.
+
+        Raises:
+            Busy: one is.
+        """
+        if self.held:
+            raise Busy("ethercat.eeprom-being-written", station=min(self.held))
+
     def attach(self) -> None:
         """Search the segment and make the stations; blocks for as long as SOEM takes."""
         if self.exchange.loop is not None:
             raise Busy("ethercat.cyclic-exchange-runs-segment")
+        self.require_not_held()
         self._ring.host_lives_until(
             time.monotonic_ns() + int(_FIND_S * 1e9), "searching the segment"
         )

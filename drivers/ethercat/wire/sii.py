@@ -29,7 +29,7 @@ _SOEM_BYTES = 4096
 
 _OWNER, _CONTROL, _DATA = 0x500, 0x502, 0x508
 _READ, _WRITE, _ENABLE_WRITE = 0x0100, 0x0200, 0x0001
-_BUSY, _FAILED = 0x8000, 0x6000
+_BUSY, _FAILED, _WRITE_LOCKED, _EMULATED = 0x8000, 0x6000, 0x4000, 0x0020
 _TAKE, _MASTER, _SLAVE = b"\x02", b"\x00", b"\x01"
 _TIMEOUT_S, _POLL_S = 0.5, 0.0005
 _AGAIN_S = 0.005
@@ -164,18 +164,33 @@ def _give_back() -> Steps[None]:
             return
 
 
+def emulated(clock: Callable[[], float]) -> Steps[bool]:
+    """Whether the drive's processor plays the EEPROM (0502h bit 5); errors as `read`."""
+    return bool((yield from _ready(clock)) & _EMULATED)
+
+
 def _command(command: int, word: int, clock: Callable[[], float]) -> Steps[None]:
+    """A chip that still stores the word before does not answer: bit 13, and it is asked again."""
+    deadline = clock() + _TIMEOUT_S
+    while True:
+        yield from _send(command, word, clock)
+        status = yield from _ready(clock)
+        if not status & _FAILED:
+            return
+        if status & _WRITE_LOCKED or clock() > deadline:
+            raise ProtocolError("ethercat.drive-eeprom-refuses-word", word=word, status=status)
+        yield Pause(_AGAIN_S)
+
+
+def _send(command: int, word: int, clock: Callable[[], float]) -> Steps[None]:
     deadline = clock() + GONE_S
     while True:
         # It may be carried out although its frame did not come back: never into a busy EEPROM.
         yield from _ready(clock)
         if (yield Write(_CONTROL, struct.pack("<HI", command, word))) is not None:
-            break
+            return
         if clock() > deadline:
             raise _gone()
-    status = yield from _ready(clock)
-    if status & _FAILED:
-        raise ProtocolError("ethercat.drive-eeprom-refuses-word", word=word, status=status)
 
 
 def _ready(clock: Callable[[], float]) -> Steps[int]:

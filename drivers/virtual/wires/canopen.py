@@ -13,6 +13,8 @@ from collections.abc import Callable
 
 from drivers.canopen import frames
 from drivers.canopen.frames import Frame
+from drivers.canopen.lss import codes
+from drivers.canopen.lss.codes import LssIdentity
 from drivers.virtual.device import (
     ABORT_LENGTH,
     ABORT_NO_DATA,
@@ -24,6 +26,7 @@ from drivers.virtual.device import (
     SdoAbort,
 )
 from drivers.virtual.wires.canopen_objects import CommunicationObjects, Pdo
+from drivers.virtual.wires.lss import LssSlave
 from drivers.virtual.wires.sdo_server import SdoServer
 
 _STOPPED, _OPERATIONAL, _PREOPERATIONAL = 4, 5, 127
@@ -47,7 +50,10 @@ class CanopenNode:
         offers_block: bool = True,
     ) -> None:
         self.device = device
-        self.node_id = node_id
+        self.lss = LssSlave(_identity(device), node_id)
+        """Node-ID 255 is none: the node takes part in nothing but these services."""
+        self.deaf = False
+        """At another bit rate than the bus."""
         self.state = _PREOPERATIONAL
         self.mute = False
         """Takes everything in and says nothing."""
@@ -61,7 +67,7 @@ class CanopenNode:
         self.refused: dict[int, int] = {}
         """Abort codes with which writes of these objects (index) are refused."""
         self._clock = clock
-        self._objects = CommunicationObjects(device, node_id)
+        self._objects = self._objects_now()
         self._server = SdoServer(
             self._read, self._write, offers_block=offers_block, size=self._size
         )
@@ -77,6 +83,14 @@ class CanopenNode:
         self._pending: dict[int, bytes] = {}
         self._sent: dict[int, tuple[int, bytes]] = {}
         self._was_powered = False
+
+    @property
+    def node_id(self) -> int:
+        """Its number now; 255 where it has none."""
+        return self.lss.active_node
+
+    def _objects_now(self) -> CommunicationObjects:
+        return CommunicationObjects(self.device, min(self.node_id, 127))
 
     def delay_answers(self, seconds: float, count: int = 1) -> None:
         """The next ``count`` SDO answers come that late, in order as from a slow drive."""
@@ -94,7 +108,11 @@ class CanopenNode:
         if not self.device.powered:
             return
         self.device.advance(now)
-        if frame.cob_id == frames.NMT and len(frame.data) == 2:
+        if frame.cob_id == codes.REQUEST and not frame.remote:
+            self._set_layers(frame.data, now)
+        elif self.lss.unconfigured:
+            return
+        elif frame.cob_id == frames.NMT and len(frame.data) == 2:
             if frame.data[1] in (0, self.node_id):
                 self._command(frame.data[0], now)
         elif frame.cob_id == self._objects.sync_cob & 0x7FF and not frame.remote:
@@ -119,10 +137,11 @@ class CanopenNode:
             self._outbox.clear()
             return []
         self.device.advance(now)
-        self._beat(now)
-        self._watch_master(now)
-        self._report_emergencies(now)
-        if self.state == _OPERATIONAL:
+        if not self.lss.unconfigured:
+            self._beat(now)
+            self._watch_master(now)
+            self._report_emergencies(now)
+        if self.state == _OPERATIONAL and not self.lss.unconfigured:
             self._send_events(now)
         ready = [frame for at, frame in self._outbox if at <= now]
         self._outbox = [(at, frame) for at, frame in self._outbox if at > now]
@@ -146,9 +165,26 @@ class CanopenNode:
 
     def _boot(self, now: int) -> None:
         self._was_powered = self.device.powered
+        self.lss.power_on()
         self._reset_communication(now)
 
+    def _set_layers(self, data: bytes, now: int) -> None:
+        """A request of the layer setting services.
+
+        A node without node-ID that was given one starts when it is switched to waiting; another
+        node takes a new one with the next reset of its communication (CiA 305 clause 3.5).
+        """
+        answer = self.lss.take(data)
+        if answer is not None:
+            self._say(codes.ANSWER, answer, now)
+        waiting = data[:2] == bytes([codes.SWITCH_ALL, codes.WAITING])
+        if waiting and self.lss.unconfigured and self.lss.pending_node != codes.NO_NODE_ID:
+            self._reset_communication(now)
+
     def _reset_communication(self, now: int) -> None:
+        if self.lss.active_node != self.lss.pending_node:
+            self.lss.active_node = self.lss.pending_node
+            self._objects = self._objects_now()
         self._objects.reset()
         self._outbox.clear()
         self._answers_due_ns = 0
@@ -160,7 +196,8 @@ class CanopenNode:
         self._own_errors.clear()
         self._server.reset()
         self.state = _PREOPERATIONAL
-        self._say(frames.HEARTBEAT + self.node_id, b"\0", now)
+        if not self.lss.unconfigured:
+            self._say(frames.HEARTBEAT + self.node_id, b"\0", now)
 
     def _command(self, command: int, now: int) -> None:
         if command == frames.NMT_RESET_NODE:
@@ -383,3 +420,16 @@ class CanopenNode:
 
     def _say(self, cob_id: int, data: bytes, at: int) -> None:
         self._outbox.append((at, Frame(cob_id, data)))
+
+
+def _identity(device: Device) -> LssIdentity:
+    """1018h, or what the profile says where the device has no such object."""
+    own = device.profile.identity
+    stated = (own.vendor_id, own.product_code, own.revision, 0)
+    parts = []
+    for subindex, number in enumerate(stated, start=1):
+        try:
+            parts.append(int.from_bytes(device.read(0x1018, subindex), "little"))
+        except SdoAbort:
+            parts.append(number or 0)
+    return LssIdentity(*parts)

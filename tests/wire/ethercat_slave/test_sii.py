@@ -143,12 +143,56 @@ def test_alias_write_takes_effect_at_the_next_power_on(wire: Wire) -> None:
     assert wire.value(0x0502, 2) & (BUSY | NO_WRITE_ENABLE) == 0
     assert read_words(wire, 4)[:2] == b"\x2a\x00"
     assert wire.value(0x0012, 2) == 0
+    # CRC-8 of words 0 to 6 with alias 42 (ETG.2010): without it the controller loads nothing.
+    eeprom = controller.eeprom.image
+    wire.write(0x0508, bytes([crc8(bytes(eeprom[:14])), 0]))
+    wire.write(0x0502, struct.pack("<HI", WRITE, 7))
+    wire.clock.time_ns += 5_000_000
     wire.segment.line.power_off(0, wire.clock.time_ns, 0.1)
     wire.clock.time_ns += 1_000_000_000
     wire.segment.settle()
     wire.clock.time_ns += 1_000_000_000
     wire.number()
     assert wire.value(0x0012, 2) == 42
+
+
+def test_a_wrong_checksum_is_shown_and_nothing_is_loaded(wire: Wire) -> None:
+    controller = wire.slaves[0].controller
+    controller.eeprom.image[8] = 42
+    wire.segment.line.power_off(0, wire.clock.time_ns, 0.1)
+    wire.clock.time_ns += 1_000_000_000
+    wire.segment.settle()
+    wire.clock.time_ns += 1_000_000_000
+    wire.number()
+    assert wire.value(0x0502, 2) & 0x1800 == 0x1800, "checksum wrong, not loaded (0502h)"
+    assert wire.value(0x0012, 2) == 0, "no alias"
+    assert wire.value(0x0140, 1) == 0, "no process data interface"
+    wire.write(0x0120, b"\x02\x00")
+    wire.clock.time_ns += 1_000_000_000
+    assert wire.value(0x0130, 1) == 0x11
+    assert wire.value(0x0134, 2) == 0x0051, "EEPROM error (ETG.1020)"
+
+
+def test_a_chip_that_stores_a_word_does_not_acknowledge(wire: Wire) -> None:
+    eeprom = wire.slaves[0].controller.eeprom
+    eeprom.write_ns, eeprom.store_ns = 100_000, 5_000_000
+    wire.write(0x0508, b"\x2a\x00")
+    wire.write(0x0502, struct.pack("<HI", WRITE, 4))
+    wire.clock.time_ns += 100_000
+    assert wire.value(0x0502, 2) & BUSY == 0
+    wire.write(0x0502, struct.pack("<HI", READ, 8))
+    assert wire.value(0x0502, 2) & 0x2000, "not acknowledged (0502h bit 13)"
+    wire.clock.time_ns += 5_000_000
+    wire.write(0x0502, struct.pack("<HI", READ, 8))
+    assert wire.value(0x0502, 2) & 0x2000 == 0
+
+
+def crc8(words: bytes) -> int:
+    """x^8 + x^2 + x + 1, start value FFh (ETG.2010 table 2)."""
+    rest = 0xFF
+    for bit in (byte >> place & 1 for byte in words for place in range(7, -1, -1)):
+        rest = (rest << 1 & 0xFF) ^ (0x07 if (rest >> 7) ^ bit else 0)
+    return rest
 
 
 def test_writing_needs_write_enable_in_the_same_frame(wire: Wire) -> None:

@@ -146,14 +146,16 @@ SAMPLES: dict[str, bytes] = {
     # Nothing can be written; bytes of padding, single bits, padding that fills them up.
     "fixed_with_padding": esi(
         pdo(0x1600, 0x6040, 0x6060, pad(8), 0x607A, 0x60FF, sm=2, Fixed=1, Mandatory=1)
-        + pdo(0x1A00, 0x6041, 0x6061, pad(3), pad(5), 0x6064, 0x606C, pad(16), sm=3, Fixed=1),
+        + pdo(0x1A00, 0x6041, 0x6061, pad(3), pad(5), 0x6064, 0x606C, pad(16), 0x6077,
+              sm=3, Fixed=1),
         coe='SdoInfo="true" PdoAssign="false" PdoConfig="false"',
     ),
     # Two PDOs per direction as delivered, whose contents are fixed.
     "two_each_way": esi(
         pdo(0x1600, 0x6040, 0x6060, sm=2, Fixed=1) + pdo(0x1610, 0x607A, 0x60FF, sm=2, Fixed=1)
         + pdo(0x1620, 0x6071, Fixed=1)
-        + pdo(0x1A00, 0x6041, 0x6061, sm=3, Fixed=1) + pdo(0x1A10, 0x6064, 0x606C, sm=3, Fixed=1),
+        + pdo(0x1A00, 0x6041, 0x6061, sm=3, Fixed=1) + pdo(0x1A10, 0x6064, 0x606C, 0x6077,
+                                                                  sm=3, Fixed=1),
         coe='PdoAssign="1" PdoConfig="0" CompleteAccess="0"',
     ),
     # A mandatory PDO with the control word, beside which a free one is filled.
@@ -169,7 +171,8 @@ SAMPLES: dict[str, bytes] = {
         + pdo(0x1601, 0x6040, 0x6060, 0x607A, Fixed=1, exclude=(0x1600, 0x1602))
         + pdo(0x1602, 0x6040, 0x6060, 0x607A, 0x60FF, Fixed=1, exclude=(0x1600, 0x1601))
         + pdo(0x1A00, 0x6041, 0x6077, sm=3, Fixed=1, exclude=(0x1A01,))
-        + pdo(0x1A01, 0x6041, 0x6061, 0x6064, 0x606C, 0x603F, Fixed=1, exclude=(0x1A00,)),
+        + pdo(0x1A01, 0x6041, 0x6061, 0x6064, 0x606C, 0x603F, 0x6077, Fixed=1,
+              exclude=(0x1A00,)),
         coe='SdoInfo="1" PdoAssign="1"',
     ),
     # 0330h: the application switches SYNC1's pin as well; SYNC0 a quarter of a millisecond late.
@@ -215,8 +218,8 @@ SAMPLES: dict[str, bytes] = {
         pdo(0x1600, 0x6040, 0x6071, sm=2, Fixed=1)
         + pdo(0x1601, 0x6040, 0x6060, 0x607A, 0x60FF, Fixed=1)
         + pdo(0x1A00, 0x6041, sm=3, Fixed=1)
-        + pdo(0x1A01, 0x6041, 0x6061, 0x6064, 0x606C, Fixed=1),
-        sms=managers(' MinSize="2" MaxSize="11" DefaultSize="4"', ' MaxSize="11" DefaultSize="2"',
+        + pdo(0x1A01, 0x6041, 0x6061, 0x6064, 0x606C, 0x6077, Fixed=1),
+        sms=managers(' MinSize="2" MaxSize="11" DefaultSize="4"', ' MaxSize="13" DefaultSize="2"',
                      places=(0x1800, 0x1C00)),
         coe='SdoInfo="1" PdoAssign="1" PdoConfig="0" CompleteAccess="1"',
         dc="<Dc><OpMode><Name>DC</Name><AssignActivate>#x300</AssignActivate>"

@@ -7,6 +7,7 @@ the file differently, the slave refuses. Refusals have codes of its own, named i
 from __future__ import annotations
 
 import struct
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -42,6 +43,7 @@ RULES = {
 }
 _BASE = {"SINT": "INT8", "USINT": "UINT8", "INT": "INT16", "UINT": "UINT16", "DINT": "INT32",
          "UDINT": "UINT32"}  # fmt: skip
+_MEAN_NS = 20_000_000
 _SLOW = 0.6
 """Of the time that the file allows."""
 
@@ -195,7 +197,21 @@ class FileDevice(ServoDevice):
 
     def __init__(self, file: File) -> None:
         self.file = file
+        self._passed: deque[tuple[int, float]] = deque()
         super().__init__(_profile(file))
+
+    def advance(self, t_ns: int) -> None:
+        """While positions are followed the speed is a mean: SYNC0 may be faster than they come."""
+        super().advance(t_ns)
+        if super()._get(0x6060) != 8:
+            self._passed.clear()
+            return
+        self._passed.append((self.time_ns, self.position))
+        while len(self._passed) > 2 and t_ns - self._passed[0][0] > _MEAN_NS:
+            self._passed.popleft()
+        (first_ns, first), (last_ns, last) = self._passed[0], self._passed[-1]
+        if last_ns > first_ns:
+            self._put(0x606C, (last - first) / (last_ns - first_ns) * 1e9)
 
     def _put(self, index: int, value: float) -> None:
         """Speeds in rpm (60A9h of the files), 10000 increments per revolution (608Fh)."""

@@ -5,24 +5,18 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
+from dataclasses import replace
 
 import pytest
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
-from backend.tools.jog.cyclic import jog_cyclic
-from backend.tools.jog.hold import Hold
-from backend.tools.jog.run import JogSettings
 from drivers.cia402 import State
+from drivers.ethercat.exchange.mapping import plan_station
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Address, CyclicSignal, ScopeBlock
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import Namespace, unavailable
 from profiles.importer import import_file
 from profiles.schema import DataType, Profile
-from tests.virtual.tools.rig import silent
 from tests.wire.makers_files.samples import SAMPLES
 
 _FACTORY = "tests.wire.makers_files.strict_slave:make_device"
@@ -40,8 +34,9 @@ def namespace() -> Iterator[Namespace]:
 
 @asynccontextmanager
 async def brought(
-    namespace: Namespace, name: str
+    namespace: Namespace, name: str, haste: float = 1.0
 ) -> AsyncIterator[tuple[EthercatLink, VirtualSegment]]:
+    """``haste``: how many times as fast as real time a lockstep wire may run."""
     # A slave that takes its time takes real time: that of a lockstep wire stands without frames.
     lockstep = "slow" not in name
     arguments = ["--factory", _FACTORY, "--slave", _SLAVE, "--sdo-ms", "0.3", "--drive", name]
@@ -49,7 +44,7 @@ async def brought(
     segment = VirtualSegment.start("ec0s", arguments, namespace)
     link = EthercatLink(
         "ec0m", url="ethercat://virtual0", launcher=namespace.command([]),
-        lockstep=1.0 if lockstep else 0.0,
+        lockstep=haste if lockstep else 0.0,
     )  # fmt: skip
     await link.open()
     try:
@@ -107,42 +102,20 @@ async def test_from_the_file_to_process_data(namespace: Namespace, name: str) ->
         await cyclic.stop()
 
 
-_JOG = JogSettings(
-    direction=1, speed_rpm=60.0, acceleration_rpm_s=600.0, travel_rev=5.0, torque_percent=100.0
-)
+FIXED = {"fixed_with_padding", "two_each_way", "exclusive_sets", "pdos_of_the_mode"}
+"""Samples with fixed contents, none of which carries torque and velocity offset as well."""
+ALL_OUTPUTS = ((0x6060, "INT8"), (0x6071, "INT16"), (0x607A, "INT32"), (0x60B1, "INT32"),
+               (0x60FF, "INT32"))  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["mandatory_and_free", "shifted_clock"])
-async def test_jog_with_the_file_alone(namespace: Namespace, name: str) -> None:
-    """60 rpm are one revolution, 10000 increments by 608Fh of the file, in a second."""
+@pytest.mark.parametrize("name", SAMPLES)
+def test_outputs_that_the_process_data_lack_are_left_out(name: str) -> None:
+    """The page asks for every output that the file says can be mapped; fixed PDOs have fewer."""
     profile = profile_of(name)
-    async with brought(namespace, name) as (link, segment):
-        link.attach(1, profile)
-        spec = profile.link("ethercat")
-        assert spec is not None
-        axis = Axis(Drive("x", "X", profile, [Port(link, 1, spec)]))
-        session = CyclicSession(link, [axis.drive])
-        await session.start(1e-3)
-        axis.session = session
-        # The page's time, which a busy computer does not interrupt.
-        page_s = [0.0]
-        hold = Hold(clock=lambda: page_s[0])
-
-        async def held() -> None:
-            for _ in range(40):
-                page_s[0] += 0.05
-                hold.renew()
-                await asyncio.sleep(0.05)
-            hold.release("released")
-
-        holding = asyncio.create_task(held())
-        try:
-            result = await jog_cyclic(axis, session, _JOG, hold, silent())
-        finally:
-            holding.cancel()
-            await session.stop()
-        truth = bytes.fromhex(segment.command("read", slave=0, index=0x6064))
-    moved = int.from_bytes(truth, "little", signed=True) - 1000
-    assert result["reason"] == "released", result
-    assert result["moved_rev"] == pytest.approx(moved / 10_000, abs=1e-3)
-    assert moved > 2000
+    wanted = [signal(0x6040, "UINT16")]
+    wanted += [replace(signal(i, kind), optional=True) for i, kind in ALL_OUTPUTS]
+    plan = plan_station(1, INPUTS, wanted, profile)
+    carried = {s.channel for s in plan.mapped}
+    assert carried >= {"6040", "6060", "607A", "6041", "6064"}
+    left = {s.channel for s, _why in plan.left_over}
+    assert left == ({"6071", "60B1"} if name in FIXED else set())

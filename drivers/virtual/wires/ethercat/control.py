@@ -55,6 +55,8 @@ class Control:
             "power_cycle": self._power_cycle,
             "timing": self._timing,
             "eeprom_busy": self._eeprom_busy,
+            "eeprom_cut": self._eeprom_cut,
+            "eeprom": self._eeprom,
             "mute": self._mute,
             "die_in_transfer": self._die_in_transfer,
             "refuse": self._refuse,
@@ -202,6 +204,7 @@ class Control:
         sdo_s: float | None = None,
         eeprom_read_s: float | None = None,
         eeprom_write_s: float | None = None,
+        eeprom_store_s: float | None = None,
         drift_ppm: float | None = None,
     ) -> None:
         for chosen in self._chosen(slave):
@@ -213,6 +216,8 @@ class Control:
                 chosen.controller.eeprom.read_ns = int(eeprom_read_s * _NS)
             if eeprom_write_s is not None:
                 chosen.controller.eeprom.write_ns = int(eeprom_write_s * _NS)
+            if eeprom_store_s is not None:
+                chosen.controller.eeprom.store_ns = int(eeprom_store_s * _NS)
             if drift_ppm is not None:
                 chosen.dc.drift_ppm = drift_ppm
 
@@ -220,6 +225,18 @@ class Control:
         now = self._segment.settle()
         until = now + (_FOREVER_NS if for_s is None else int(for_s * _NS))
         self._slave(slave).controller.eeprom.busy_until_ns = until
+
+    def _eeprom_cut(self, slave: int, after_words: int) -> None:
+        """The supply of the EEPROM fails while a word is stored, until the next power cycle."""
+        self._slave(slave).controller.eeprom.cut_after = after_words
+
+    def _eeprom(self, slave: int, word: int | None = None, data: str = "") -> dict[str, object]:
+        """The contents, past the wire; with ``word`` and ``data`` they are changed first."""
+        eeprom = self._slave(slave).controller.eeprom
+        if word is not None:
+            changed = bytes.fromhex(data)
+            eeprom.image[2 * word : 2 * word + len(changed)] = changed
+        return {"data": eeprom.image.hex(), "words_written": eeprom.words_written}
 
     def _mute(self, slave: int, on: bool = True) -> None:
         self._slave(slave).mailbox.muted = on

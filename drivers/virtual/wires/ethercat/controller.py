@@ -79,13 +79,15 @@ class Controller:
         """Registers as after power-on (defaults of ETG.1000.4 and of common controllers)."""
         memory = self.memory
         memory[:] = bytes(len(memory))
+        self.eeprom.power_on()
         memory[reg.TYPE : reg.TYPE + 10] = struct.pack(
             "<BBHBBBBH", 0x11, 0, 2, _FMMUS, _SYNC_MANAGERS, 8, 0x0F,
             _DC_SUPPORTED if has_dc else 0,
         )  # fmt: skip
-        struct.pack_into("<H", memory, reg.STATION_ALIAS, self.eeprom.alias)
         memory[reg.DL_CONTROL] = 0x01
-        memory[reg.PDI_CONTROL] = 0x08
+        if self.eeprom.loaded:
+            struct.pack_into("<H", memory, reg.STATION_ALIAS, self.eeprom.alias)
+            memory[reg.PDI_CONTROL] = 0x08
         struct.pack_into("<H", memory, reg.WATCHDOG_DIVIDER, 0x09C2)
         struct.pack_into("<H", memory, reg.WATCHDOG_PDI, 1000)
         struct.pack_into("<H", memory, reg.WATCHDOG_PROCESS_DATA, 1000)

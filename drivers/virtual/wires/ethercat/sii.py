@@ -181,23 +181,53 @@ def _clocks(names: _Strings) -> bytes:
 
 
 _BUSY = 0x8000
+_NOT_LOADED, _CHECKSUM_ERROR = 0x1000, 0x0800
 _WRITE_ENABLE_ERROR = 0x4000
 _COMMAND_ERROR = 0x2000
 _COMMAND_MASK = 0x0700
 _READ, _WRITE, _RELOAD = 0x0100, 0x0200, 0x0400
 _EIGHT_BYTES = 0x0040
 _TWO_ADDRESS_BYTES = 0x0080
+_FOREVER_NS = 1 << 62
 
 
 class Eeprom:
-    """The EEPROM behind registers 500h to 50Fh. The content survives power cycles."""
+    """The EEPROM behind registers 500h to 50Fh. The content survives power cycles.
+
+    A word is sent to the chip while the interface is busy (``write_ns``); then the chip stores it
+    for ``store_ns``, in which it does not acknowledge another command (bit 13).
+    """
 
     def __init__(self, image: bytes) -> None:
         self.image = bytearray(image)
         self.read_ns = 0
         self.write_ns = 0
+        self.store_ns = 0
         self.busy_until_ns = 0
-        self._status = _EIGHT_BYTES | _TWO_ADDRESS_BYTES
+        self.cut_after: int | None = None
+        """So many words are still written; then the supply of the chip fails inside a word."""
+        self.words_written = 0
+        self._storing_until_ns = 0
+        self._power_on()
+
+    @property
+    def loaded(self) -> bool:
+        """Whether the controller took the configuration at power-on: the checksum was right."""
+        return not self._load_status
+
+    def power_on(self) -> None:
+        """The controller loads the configuration; a chip without supply is there again."""
+        self.busy_until_ns = self._storing_until_ns = 0
+        self.cut_after = None
+        self._power_on()
+
+    def _power_on(self) -> None:
+        right = self.image[14] == checksum(bytes(self.image[:14]))
+        self._load_status = 0 if right else _CHECKSUM_ERROR | _NOT_LOADED
+        self._set()
+
+    def _set(self, bits: int = 0) -> None:
+        self._status = _EIGHT_BYTES | _TWO_ADDRESS_BYTES | self._load_status | bits
 
     @property
     def alias(self) -> int:
@@ -213,7 +243,10 @@ class Eeprom:
         if now_ns < self.busy_until_ns:
             return None  # the controller ignores commands while it is busy
         code = control & _COMMAND_MASK
-        self._status = _EIGHT_BYTES | _TWO_ADDRESS_BYTES | code
+        self._set(code)
+        if code and now_ns < self._storing_until_ns:
+            self._status |= _COMMAND_ERROR
+            return None
         if code == _READ:
             self.busy_until_ns = now_ns + self.read_ns
             start = address * 2
@@ -222,8 +255,7 @@ class Eeprom:
             if not control & 1:
                 self._status |= _WRITE_ENABLE_ERROR
             elif address * 2 + 2 <= len(self.image):
-                self.busy_until_ns = now_ns + self.write_ns
-                self.image[address * 2 : address * 2 + 2] = data[:2]
+                self._store(address * 2, data[:2], now_ns)
             else:
                 self._status |= _COMMAND_ERROR
         elif code == _RELOAD:
@@ -233,3 +265,16 @@ class Eeprom:
         else:
             self._status &= ~_COMMAND_MASK
         return None
+
+    def _store(self, at: int, word: bytes, now_ns: int) -> None:
+        if self.cut_after == 0:
+            # Half of the word is stored, and the interface waits for a chip that is dead.
+            self.image[at : at + 1] = word[:1]
+            self.busy_until_ns = _FOREVER_NS
+            return
+        if self.cut_after is not None:
+            self.cut_after -= 1
+        self.busy_until_ns = now_ns + self.write_ns
+        self._storing_until_ns = self.busy_until_ns + self.store_ns
+        self.image[at : at + 2] = word
+        self.words_written += 1

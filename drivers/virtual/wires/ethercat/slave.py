@@ -215,6 +215,8 @@ class Slave:
 
     def check(self, target: AlState) -> int:
         """Forbid states for which the master's configuration is wrong."""
+        if not self.controller.eeprom.loaded and target != AlState.INIT:
+            return AlCode.EEPROM_ERROR
         if target == AlState.BOOT:
             if self.files is None:
                 return AlCode.BOOT_UNSUPPORTED

@@ -59,6 +59,38 @@ export const segment = {
     'Written to the drive’s EEPROM, valid after its supply was switched off and on. Machines whose controller addresses drives by alias must be reported. Nothing may move on this bus meanwhile.',
     '写入驱动器 EEPROM，断电重启后生效。若控制器按别名寻址，需同步修改。写入期间此总线上不得有运动。',
   ],
+  'segment.eeprom': ['EEPROM', 'EEPROM'],
+  'segment.eepromWhat': [
+    'What the controller of this drive knows of it. Save it before anything is changed: the file restores a drive whose EEPROM was damaged or overwritten.',
+    '驱动器的控制器所保存的信息。更改之前请先保存：EEPROM 损坏或被覆盖时可用该文件恢复。',
+  ],
+  'segment.eepromSave': ['Save to a file', '保存到文件'],
+  'segment.eepromChoose': ['Compare with a saved file', '与已保存的文件比较'],
+  'segment.eepromIdentity': ['Compare identity with the firmware', '与固件比较标识'],
+  'segment.eepromUnknown': [
+    'The file is of this very drive, although the drive cannot say what it is',
+    '文件确属该驱动器，尽管驱动器无法说明自己的标识',
+  ],
+  'segment.eepromSame': ['The EEPROM is like this already', 'EEPROM 已与此相同'],
+  'segment.eepromChanges': ['What would change', '将更改的内容'],
+  'segment.eepromField': ['Field', '字段'],
+  'segment.eepromNow': ['Now', '现在'],
+  'segment.eepromThen': ['Then', '之后'],
+  'segment.eepromSerial': ['The drive keeps its own serial number.', '驱动器保留自己的序列号。'],
+  'segment.eepromWarning': [
+    '{words} words are written. With wrong contents the drive does not start. Nothing may move on this bus meanwhile.',
+    '将写入 {words} 个字。内容错误时驱动器将无法启动。期间该总线上不得有任何运动。',
+  ],
+  'segment.eepromSaved': ['The present contents are saved to a file', '当前内容已保存到文件'],
+  'segment.eepromSure': [
+    'I checked the change, and nothing is switched off until it is done',
+    '我已核对更改，完成之前不会断电',
+  ],
+  'segment.eepromWrite': ['Write the EEPROM', '写入 EEPROM'],
+  'segment.eepromWritten': [
+    'Written and read back. It counts after the drive was switched off and on.',
+    '已写入并读回。驱动器断电重启后生效。',
+  ],
   'segment.aliasSure': ['I want to change the EEPROM', '我确认修改 EEPROM'],
   'segment.aliasWritten': [
     'Written. Switch the drive off and on, then scan.',

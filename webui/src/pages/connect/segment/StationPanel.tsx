@@ -7,6 +7,7 @@ import { setJob } from '../../../live/store'
 import { JobNote } from '../../../widgets/JobNote'
 import { ProblemNote } from '../../../widgets/ProblemNote'
 import { useAction } from '../../../widgets/useAction'
+import { Eeprom } from './Eeprom'
 
 /** One slave: identity, state, clock, ports, alias, firmware. */
 export function StationPanel({ url, station }: { url: string; station: SegmentStation }) {
@@ -79,6 +80,7 @@ export function StationPanel({ url, station }: { url: string; station: SegmentSt
         </p>
       ))}
       <Alias key={station.station} url={url} station={station} />
+      <Eeprom key={`eeprom ${station.station}`} url={url} station={station} />
       {station.foe && station.drive !== null && <Firmware drive={station.drive} />}
     </div>
   )

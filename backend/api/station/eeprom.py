@@ -1,0 +1,206 @@
+"""Routes for the EEPROM of an EtherCAT slave: save, compare, plan a change, carry it out.
+
+A change takes two confirmations: the digest of the plan that was shown, and ``confirmed``.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Request, Response
+
+from backend.api.context import Connection, TheBench
+from backend.api.station.ethercat import calm_segment, opened_segment, require_confirmed
+from backend.api.station.models_ethercat import EepromComparison, EepromDifference, EepromPlan
+from backend.audit.asked import note_before
+from backend.drive.identity import confirm_identity
+from backend.station.bench import Bench
+from drivers.errors import OutOfRange
+from drivers.ethercat.eeprom.expected import against_profile
+from drivers.ethercat.eeprom.image import MOST_BYTES, Difference, Image, differences
+from drivers.ethercat.eeprom.plan import Plan
+from drivers.ethercat.link import EthercatLink
+from drivers.texts.message import Text, language
+from profiles.loader import load_profile
+
+router = APIRouter()
+
+_WARNING = (
+    "The EEPROM says to the controller what the drive is and where its memory lies: with wrong"
+    " contents the drive does not start. Save the present contents first, and do not switch"
+    " anything off until the change is done. It counts after the drive was switched off and on"
+)
+_BODY = {
+    "requestBody": {
+        "required": False,
+        "content": {"application/octet-stream": {"schema": {"type": "string"}}},
+    }
+}
+What = Annotated[
+    Literal["restore", "identity"],
+    Query(description="restore: the file in the body; identity: as the firmware says (1018h)"),
+]
+Url = Annotated[str, Query()]
+StationNumber = Annotated[int, Query(ge=1)]
+Size = Annotated[
+    int | None,
+    Query(ge=128, le=MOST_BYTES, multiple_of=128, description="of a damaged EEPROM, in bytes"),
+]
+UnknownAccepted = Annotated[
+    bool, Query(description="the file is of this drive although the drive cannot say what it is")
+]
+
+
+@router.get("/ethercat/eeprom", response_class=Response)
+async def read_eeprom(
+    bench: TheBench, url: Url, station: StationNumber, size: Size = None
+) -> Response:
+    """The contents of the EEPROM as a file. Not while the cyclic exchange runs."""
+    link = opened_segment(bench, url)
+    image = await link.eeprom.read(station, _unheard, size)
+    vendor, product, _revision = image.identity
+    name = f"eeprom-{vendor:08x}-{product:08x}-{image.serial or 0}.bin"
+    return Response(
+        image.data,
+        media_type="application/octet-stream",
+        headers={"content-disposition": f'attachment; filename="{name}"'},
+    )
+
+
+@router.post("/ethercat/eeprom/compare", openapi_extra=_BODY)
+async def compare_eeprom(
+    bench: TheBench,
+    request: Request,
+    url: Url,
+    station: StationNumber,
+    profile: Annotated[
+        str | None, Query(description="with a maker's file that was imported, in place of a body")
+    ] = None,
+) -> EepromComparison:
+    """The EEPROM against a saved file, or against what the maker's file says. Writes nothing."""
+    link = opened_segment(bench, url)
+    if profile is not None:
+        image = await link.eeprom.read(station, _unheard)
+        found = against_profile(image, load_profile(profile))
+        return _comparison(image, found)
+    saved = Image(await _body(request))
+    problem = saved.problem()
+    if problem is not None:
+        raise OutOfRange("ethercat.eeprom-file-unsound", cause=problem)
+    image = await link.eeprom.read(station, _unheard, len(saved.data))
+    return _comparison(image, differences(image, saved))
+
+
+@router.post("/ethercat/eeprom/plan", openapi_extra=_BODY)
+async def plan_eeprom(
+    bench: TheBench,
+    request: Request,
+    url: Url,
+    station: StationNumber,
+    what: What = "restore",
+    unknown_accepted: UnknownAccepted = False,
+) -> EepromPlan:
+    """What a change would write, with the digest that confirms it. Writes nothing."""
+    link = opened_segment(bench, url)
+    data = b"" if what == "identity" else await _body(request)
+    plan = await _planned(link, station, what, data, unknown_accepted=unknown_accepted)
+    return _plan(plan)
+
+
+@router.post("/ethercat/eeprom/restore", openapi_extra=_BODY)
+async def restore_eeprom(
+    bench: TheBench,
+    request: Request,
+    url: Url,
+    station: StationNumber,
+    digest: Annotated[str, Query(max_length=64, description="of the plan that was looked at")],
+    what: What = "restore",
+    unknown_accepted: UnknownAccepted = False,
+    confirmed: Annotated[bool, Query()] = False,
+    connection: Connection = None,
+) -> EepromPlan:
+    """Write what was planned, read everything back, and say what was written.
+
+    Refused while somebody moves an axis of the segment or has control of one. Who asked may leave
+    meanwhile: it goes on to its end.
+    """
+    link = opened_segment(bench, url)
+    calm_segment(bench, link, connection)
+    require_confirmed(confirmed, _WARNING)
+    data = b"" if what == "identity" else await _body(request)
+    if what == "restore":
+        await _require_known(bench, link, station, unknown_accepted=unknown_accepted)
+    plan = await _planned(link, station, what, data, unknown_accepted=unknown_accepted)
+    note_before(changes=", ".join(each.field for each in plan.changes))
+    calm_segment(bench, link, connection)
+    await asyncio.shield(link.eeprom.carry_out(station, plan, digest, _unheard))
+    bench.journal.add(
+        f"{url}: EEPROM of station {station} written ({plan.words} words);"
+        " valid after a power cycle",
+        level="warning",
+    )
+    return _plan(plan)
+
+
+async def _require_known(
+    bench: Bench, link: EthercatLink, station: int, *, unknown_accepted: bool
+) -> None:
+    """A connected drive that answers is the one that was connected."""
+    if unknown_accepted:
+        return
+    for connected in bench.connected_drives.values():
+        if any(port.link is link and port.station == station for port in connected.drive.ports):
+            await confirm_identity(connected.drive)
+
+
+async def _planned(
+    link: EthercatLink, station: int, what: str, data: bytes, *, unknown_accepted: bool
+) -> Plan:
+    if what == "identity":
+        return await link.eeprom.plan_identity(station, _unheard)
+    return await link.eeprom.plan_restore(
+        station, data, _unheard, unknown_accepted=unknown_accepted
+    )
+
+
+async def _body(request: Request) -> bytes:
+    data = bytearray()
+    async for chunk in request.stream():
+        data += chunk
+        if len(data) > MOST_BYTES:
+            raise OutOfRange("ethercat.eeprom-no-image", bytes=len(data))
+    return bytes(data)
+
+
+def _comparison(image: Image, found: tuple[Difference, ...]) -> EepromComparison:
+    problem = image.problem()
+    return EepromComparison(
+        bytes=len(image.data),
+        sound=problem is None,
+        problem=None if problem is None else problem.words(language()),
+        vendor_id=image.identity.vendor_id,
+        product_code=image.identity.product_code,
+        revision=image.identity.revision,
+        serial=image.serial,
+        alias=image.alias,
+        differences=[_difference(each) for each in found],
+    )
+
+
+def _plan(plan: Plan) -> EepromPlan:
+    return EepromPlan(
+        digest=plan.digest,
+        words=plan.words,
+        keeps_serial=plan.keeps_serial,
+        warning=_WARNING,
+        changes=[_difference(each) for each in plan.changes],
+    )
+
+
+def _difference(each: Difference) -> EepromDifference:
+    return EepromDifference(field=each.field, word=each.word, first=each.first, second=each.second)
+
+
+def _unheard(_share: float, _step: Text) -> None:
+    """Nobody waits for the steps of a request."""

@@ -1,0 +1,1 @@
+"""The EEPROM of a slave as a whole: read, check, compare, plan a change, write and read back."""
