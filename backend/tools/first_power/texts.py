@@ -21,8 +21,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "lead": (
         "A checklist for a motor that no loop has been closed over yet. Small pulses of torque "
-        "turn the shaft some degrees forwards and back; no loop is closed, and a stop takes the power "
-        "off.",
+        "turn the shaft some degrees forwards and back; no loop is closed, and a stop takes the "
+        "power off.",
         "用于尚未闭环运行过的电机的检查表。小转矩脉冲使轴正反各转动几度；不闭合任何控制环，"
         "停止时直接断电。",
     ),
@@ -172,8 +172,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "phases.phases_reversed": (
         "Phases: the feedback counts forwards and the torque acts backwards: a loop would run "
-        "away. The phases are shifted by one place, or the commutation angle is wrong by more than 90°. "
-        "Correct the wiring U V W, or find the angle by the drive's own procedure.",
+        "away. The phases are shifted by one place, or the commutation angle is wrong by more than "
+        "90°. Correct the wiring U V W, or find the angle by the drive's own procedure.",
         "相序：反馈计数正确而转矩反向，闭环会飞车。相序错位一位，或换相角误差超过 90°。"
         "请修正 U V W 接线，或用驱动器自身程序确定换相角。",
     ),

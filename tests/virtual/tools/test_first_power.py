@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import pytest
 
@@ -21,6 +22,7 @@ from drivers.cia402 import State
 from drivers.errors import NotAllowed
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.settings import GainSet, LoopSettings
 from drivers.virtual.mechanics import MechanicsSpec, PhaseSpec
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import At, mechanics, settings_of, silent
@@ -44,7 +46,7 @@ def motor(
 
 async def first_power(
     bench: DirectBench, asked: FirstPowerSettings = ASKED, progress: At | None = None,
-    kept: dict[str, object] | None = None,
+    kept: dict[str, Any] | None = None,
 ) -> FirstPowerResult:  # fmt: skip
     """As a job or the command line does it; what is read from files is the same."""
 
@@ -80,7 +82,9 @@ async def on(
         mode = bench.axis.drive.require("mode")
         before = await settings_of(bench.axis.drive, mode)
         bench.link.highest.update(speed=0.0, torque=0.0)
-        found = await first_power(bench, asked)
+        kept: dict[str, Any] = {}
+        found = await first_power(bench, asked, kept=kept)
+        assert TOOL.reevaluate(kept["arrays"], kept["meta"]) == found
         assert await settings_of(bench.axis.drive, mode) == before
         assert await bench.axis.state() is not State.OPERATION_ENABLED
         assert not bench.axis.drive.pending_restores.entries
@@ -102,16 +106,13 @@ async def test_a_motor_that_is_connected_right(drive: str) -> None:
     assert found.covers_pole_pairs == 3
 
 
-@pytest.mark.parametrize("drive", FAMILIES)
-async def test_shifted_phases_turn_the_shaft_against_the_torque(drive: str) -> None:
-    found, _ = await on(drive, motor(PhaseSpec(order="shifted")))
+async def test_shifted_phases_turn_the_shaft_against_the_torque() -> None:
+    found, _ = await on("mms7", motor(PhaseSpec(order="shifted")))
     assert finding(found, "phases") == ("failed", "reversed")
     assert found.verdict == "failed"
 
 
-@pytest.mark.parametrize(
-    ("drive", "at_rev"), [(d, 0.0) for d in FAMILIES] + [("r6l", a / 40) for a in (1, 2, 3, 4)]
-)
+@pytest.mark.parametrize(("drive", "at_rev"), [("mms7", 0.0), ("ep3e", 0.05), ("r6l", 0.025)])
 async def test_exchanged_phases_lock_the_shaft(drive: str, at_rev: float) -> None:
     found, _ = await on(drive, motor(PhaseSpec(order="exchanged")), at_rev=at_rev)
     assert finding(found, "phases") == ("failed", "locks")
@@ -189,15 +190,6 @@ async def test_nothing_moves_without_a_statement_of_what_hangs() -> None:
         assert shaft_rev(bench) == 0.0
 
 
-async def test_a_second_evaluation_of_the_kept_data_is_the_same() -> None:
-    kept: dict[str, object] = {}
-    async with direct(motor(PhaseSpec(order="shifted")), drive="r6l") as bench:
-        found = await first_power(bench, kept=kept)
-    assert kept["name"] == "first-power"
-    again = TOOL.reevaluate(kept["arrays"], kept["meta"])  # type: ignore[arg-type]
-    assert again.model_dump(mode="json") == found.model_dump(mode="json")
-
-
 async def test_a_stop_meanwhile_takes_the_power_off_and_closes_no_loop() -> None:
     async with direct(motor(PhaseSpec(order="shifted")), drive="mms7") as bench:
         task: asyncio.Task[FirstPowerResult]
@@ -236,8 +228,6 @@ async def test_a_stop_meanwhile_takes_the_power_off_and_closes_no_loop() -> None
 def test_a_closed_loop_runs_away_over_a_wrong_motor(spec: MechanicsSpec, runs_away: bool) -> None:
     """The plant alone: a speed loop at 50 rpm, with no protection."""
     axis = VirtualAxis(spec)
-    from drivers.virtual.firmware.settings import GainSet, LoopSettings
-
     gains = GainSet(20.0, 0.02, 1.0)
     axis.apply_loops(LoopSettings(first=gains, second=gains, homing=None))
     axis.set_limits(RATED_NM, RATED_NM, math.inf)
