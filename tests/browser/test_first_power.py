@@ -16,7 +16,7 @@ from tests.browser.conftest import LAPTOP, _open
 from tests.browser.driving import open_axis
 from tests.support.station import Station
 
-pytestmark = pytest.mark.timeout(400)
+pytestmark = pytest.mark.timeout(160)
 
 BENCH = (
     tuning.BENCH.replace("mms7", "r6l")

@@ -56,9 +56,9 @@ from drivers.halt import HaltCause
 from drivers.texts.message import text
 
 #: Seconds of a pulse, and of no torque before and after it.
-_PULSE_S, _LEAD_S, _AFTER_S, _RAMP_S = 0.03, 0.02, 0.1, 0.004
+_PULSE_S, _LEAD_S, _AFTER_S, _RAMP_S = 0.03, 0.01, 0.06, 0.004
 #: Each pulse that moves less is followed by one that is stronger by this.
-_STRONGER, _FIRST_PERCENT = 1.2, 1.0
+_STRONGER, _FIRST_PERCENT = 1.35, 1.5
 _SMALL_REV, _LARGE_REV, _WEAKER = 0.003, 0.01, 1.5
 #: A pulse that has moved the shaft so far is over: what is left is what it coasts.
 _CUT_REV = 0.012

@@ -116,9 +116,7 @@ export function TunePage({ drive }: { drive: string }) {
               onChange={refresh}
             />
           </div>
-          {possible && (
-            <FirstPowerPanel drive={drive} obstacle={obstacle} cycleMs={cycleMs} />
-          )}
+          {possible && <FirstPowerPanel drive={drive} obstacle={obstacle} cycleMs={cycleMs} />}
           {possible && designable && (
             <AutotunePanel
               drive={drive}
