@@ -39,7 +39,7 @@ _WAYS: tuple[Literal[1, -1], ...] = (1, -1)
 
 @dataclass(frozen=True)
 class Seen:
-    """What was read and seen by hand; None where it was not looked at or is not told.
+    """What was read and seen by hand; None where it was not looked at or is not reported.
 
     ``turned_rev`` by the drive's counts. ``switches``: negative and positive, each whether it was
     seen on and off. ``obstacle``: why nothing was energised.
@@ -186,7 +186,7 @@ def _check(name: str, finding: str, value: float | None = None) -> Check:
 
 _OPEN = frozenset(
     {
-        "not_done", "not_told", "not_turned", "not_seen", "no_input", "no_torque_mode", "short",
+        "not_done", "not_reported", "not_turned", "not_seen", "no_input", "no_torque_mode", "short",
         "not_excluded", "counts_first", "supply_first", "resolution_first", "only_positive",
         "only_negative", "no_motion",
     }
@@ -202,7 +202,7 @@ def _supply(seen: Seen) -> Check:
     if seen.faults:
         return _check("supply", "fault", float(seen.faults))
     if seen.supply_v is None:
-        return _check("supply", "not_told")
+        return _check("supply", "not_reported")
     return _check("supply", "ok" if supply_sound(seen) else "low", seen.supply_v)
 
 

@@ -7,7 +7,7 @@ import type {
   JobInfo,
 } from './schema'
 
-/** What a tool concluded: told apart by its field `tool`. */
+/** What a tool concluded: distinguished by its field `tool`. */
 type ToolOutcome = BrakeResult | FirstPowerResult | FrictionResult | HealthResult | InertiaAnswer
 
 const outcome = (result: unknown): ToolOutcome | null =>
