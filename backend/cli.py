@@ -77,6 +77,11 @@ COMMANDS = {
         "tools:friction",
         "Map friction over speed and torque over position, both directions. The axis moves.",
     ),
+    "first-power": (
+        "tools:first_power",
+        "Before the first closed loop: supply, counts, direction, switches, brake and phase order. "
+        "The axis is energised with at most 10 % of torque and moves by 0.1 rev.",
+    ),
     "health": (
         "health:app",
         "The condition of an axis: measure, sign a baseline, repeat, compare, trend. "

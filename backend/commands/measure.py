@@ -126,9 +126,13 @@ def sweep(
 @asynccontextmanager
 async def exchanging(
     url: str | None, station: int, profile: str | None, cycle_ms: float, envelope: Envelope,
-    consent: bool,
+    consent: bool, *, closes_loops: bool = True,
 ) -> AsyncIterator[tuple[Axis, CyclicSession]]:  # fmt: skip
-    """The drive with its bus exchanging process data, all of it ended afterwards."""
+    """The drive with its bus exchanging process data, all of it ended afterwards.
+
+    ``closes_loops`` as in `Tool`.
+    """
+    from backend.axis.cyclic_mode import keeping_mode
     from backend.commands.scales import take_taught
     from backend.tools.sweep import profile_speed
 
@@ -144,7 +148,11 @@ async def exchanging(
         axis.session = session
         try:
             with axis.granted("measurement from the command line", envelope):
-                async with profile_speed.prepared(axis, session, envelope, consent):
+                async with (
+                    profile_speed.prepared(axis, session, envelope, consent)
+                    if closes_loops
+                    else keeping_mode(axis, session)
+                ):
                     yield axis, session
         finally:
             axis.session = None

@@ -38,7 +38,7 @@ def command_of(tool: AnyTool) -> Callable[..., None]:
         async def here() -> dict[str, object]:
             async with measure.exchanging(
                 where.url, where.station, where.profile, settings.cycle_ms, settings.envelope,
-                settings.consent,
+                settings.consent, closes_loops=tool.closes_loops,
             ) as (axis, session):  # fmt: skip
                 found = await tool.run(Run(axis, session, progress()), settings)
             return dict(found.model_dump(mode="json"))
@@ -135,3 +135,4 @@ def _settings(tool: AnyTool, given: dict[str, Any]) -> Any:
 inertia = command_of(BY_KIND["inertia"])
 friction = command_of(BY_KIND["friction"])
 brake_test = command_of(BY_KIND["brake-test"])
+first_power = command_of(BY_KIND["first-power"])

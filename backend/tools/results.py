@@ -10,10 +10,12 @@ from typing import Annotated, TypeAlias
 from pydantic import Field
 
 from backend.tools.brake.result import BrakeResult
+from backend.tools.first_power.result import FirstPowerResult
 from backend.tools.friction.result import FrictionResult
 from backend.tools.health.result import HealthResult
 from backend.tools.inertia.result import InertiaAnswer
 
 ToolOutcome: TypeAlias = Annotated[
-    FrictionResult | InertiaAnswer | BrakeResult | HealthResult, Field(discriminator="tool")
+    FrictionResult | InertiaAnswer | BrakeResult | HealthResult | FirstPowerResult,
+    Field(discriminator="tool"),
 ]

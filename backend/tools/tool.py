@@ -180,6 +180,8 @@ class Tool(Generic[S, R]):
     "title", "help" and "field.<name>" of every setting of its own. ``reevaluate`` makes the
     result again from arrays and meta data as ``run`` kept them and raises ValueError where they
     are not of this tool. ``right`` is what a person needs to start it; ``motion``: it moves.
+    ``closes_loops`` False: it runs before anybody knows whether a loop may be closed, so that no
+    speed is tried and no ramp is prepared before it.
     """
 
     kind: str
@@ -191,6 +193,7 @@ class Tool(Generic[S, R]):
     texts: Texts
     right: Right = Right.MEASURE
     motion: bool = True
+    closes_loops: bool = True
 
     def text(
         self, name: str, language: Literal["en", "zh"] = "en",

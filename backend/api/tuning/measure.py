@@ -27,6 +27,7 @@ from backend.api.tuning.models import (
     ToolInfo,
 )
 from backend.axis.cyclic import CyclicSession
+from backend.axis.cyclic_mode import keeping_mode
 from backend.axis.restoring import shielded
 from backend.library.measurements import MeasurementStore
 from backend.report.changes import Change
@@ -61,8 +62,13 @@ async def _start(
     kind: str,
     title: str,
     tool: Measure,
+    *,
+    closes_loops: bool = True,
 ) -> JobInfo:
-    """Start a measurement as a job; raw data are stored before they are evaluated."""
+    """Start a measurement as a job; raw data are stored before they are evaluated.
+
+    ``closes_loops`` as in `Tool`.
+    """
     bench.motion.require_idle(connected)
     exchange = await exchange_for(bench, connected, request.cycle_ms / 1e3)
     session = exchange.session
@@ -75,9 +81,13 @@ async def _start(
 
     async def work(progress: Progress) -> JobResult:
         exchange.taken = True
-        limits = request.envelope
+        limits, axis = request.envelope, connected.axis
         try:
-            async with profile_speed.prepared(connected.axis, session, limits, request.consent):
+            async with (
+                profile_speed.prepared(axis, session, limits, request.consent)
+                if closes_loops
+                else keeping_mode(axis, session)
+            ):
                 result = await tool(session, progress, keep)
             await asyncio.to_thread(_conclude, bench.measurements, files, result)
             if isinstance(request, HealthSettings):
@@ -87,7 +97,8 @@ async def _start(
         return result | {"measurements": files}
 
     try:
-        profile_speed.require_consent(session, connected.drive, request.consent)
+        if closes_loops:
+            profile_speed.require_consent(session, connected.drive, request.consent)
         job = bench.jobs.start(
             kind,
             text("work.of-drive", title=text(title), drive=connected.drive.name),
@@ -230,7 +241,10 @@ def _add(tool: AnyTool) -> None:
             found = await tool.run(Run(connected.axis, session, progress, keep), request)
             return dict(found.model_dump(mode="json"))
 
-        return await _start(bench, connected, request, tool.kind, tool.text("title"), measure)
+        return await _start(
+            bench, connected, request, tool.kind, tool.text("title"), measure,
+            closes_loops=tool.closes_loops,
+        )  # fmt: skip
 
     # The body is the tool's own settings, which the interface's description shows.
     start.__annotations__["request"] = tool.settings

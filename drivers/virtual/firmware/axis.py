@@ -283,7 +283,8 @@ class VirtualAxis:
         x, s = self._x, self.s
         x[:] = 0.0
         x[0] = angle_rad
-        s[k.S_THETA] = s[k.S_THETA_FILTERED] = s[k.S_P_DEMAND] = angle_rad
+        seen = angle_rad * self.p[k.P_ENCODER_SENSE]
+        s[k.S_THETA] = s[k.S_THETA_FILTERED] = s[k.S_P_DEMAND] = seen
         s[k.S_OMEGA_LOW] = s[k.S_OMEGA_OBSERVED] = s[k.S_OMEGA] = 0.0
         s[k.S_INDEX_COUNT] = math.floor(angle_rad / self.p[k.P_INDEX_RAD])
 

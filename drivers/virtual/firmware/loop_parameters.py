@@ -37,6 +37,15 @@ def write_physics(p: Parameters, spec: MechanicsSpec, motor: MotorData) -> None:
     """Encoder, friction, travel, switches, motor and supply of this axis."""
     p[k.P_COUNTS_PER_RAD] = spec.encoder.counts_per_rev / TURN
     p[k.P_NOISE] = spec.encoder.noise_counts
+    encoder, phases = spec.encoder, spec.phases
+    sense = -encoder.counted_share if encoder.inverted else encoder.counted_share
+    p[k.P_ENCODER_SENSE] = sense
+    p[k.P_COMMUTATION_SENSE] = 1.0 if phases.commutation == "hall" else sense
+    p[k.P_PHASES_WRONG] = phases.wrong or p[k.P_COMMUTATION_SENSE] != 1.0
+    p[k.P_FIELD_SENSE] = -1.0 if phases.order == "exchanged" else 1.0
+    shifted = TURN / 3 if phases.order == "shifted" else 0.0
+    p[k.P_FIELD_ANGLE] = shifted + math.radians(phases.angle_deg)
+    p[k.P_POLE_PAIRS] = phases.pole_pairs
     p[k.P_COULOMB] = spec.friction.coulomb_nm
     p[k.P_STICTION] = max(spec.friction.static_nm - spec.friction.coulomb_nm, 0.0)
     p[k.P_STRIBECK] = spec.friction.stribeck_rad_s

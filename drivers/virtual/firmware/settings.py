@@ -194,7 +194,7 @@ class MotorData:
             inductance_h=resistance / (2 * math.pi * 200),
             rated_speed_rad_s=speed,
             rated_torque_nm=spec.motor.rated_torque_nm,
-            pole_pairs=4,
+            pole_pairs=spec.phases.pole_pairs,
             rotor_inertia_kgm2=spec.motor.inertia_kgm2,
             supply_v=spec.supply.voltage_v,
         )

@@ -102,10 +102,38 @@ class RippleSpec(_Finite):
 
 
 class EncoderSpec(_Finite):
-    """Motor encoder; noise is the standard deviation of white Gaussian noise in counts."""
+    """Motor encoder; noise is the standard deviation of white Gaussian noise in counts.
+
+    As it is connected wrongly: ``inverted`` counts backwards, and ``counted_share`` of the
+    ``counts_per_rev`` arrives per revolution of the shaft. A motor that commutates by it then has a
+    field that runs away from its rotor.
+    """
 
     counts_per_rev: int = Field(default=2**23, ge=16)
     noise_counts: float = Field(default=0.0, ge=0)
+    inverted: bool = False
+    counted_share: float = Field(default=1.0, gt=0, le=8)
+
+
+class PhaseSpec(_Finite):
+    """How the motor's phases are connected, and by what the drive commutates.
+
+    "exchanged": two phases; the field turns against the rotor, and the torque of a constant
+    current is -cos(2pθ - ``angle_deg``) of what it should be. "shifted": all three by one place,
+    120° electrical; the torque is -0.5 of it. ``angle_deg`` is an error of the commutation
+    angle, electrical. With "hall" the rotor's angle comes from a sensor of its own, not from the
+    encoder.
+    """
+
+    order: Literal["right", "exchanged", "shifted"] = "right"
+    angle_deg: float = 0.0
+    pole_pairs: int = Field(default=4, ge=1, le=64)
+    commutation: Literal["encoder", "hall"] = "encoder"
+
+    @property
+    def wrong(self) -> bool:
+        """Whether the torque is not that of the current."""
+        return self.order != "right" or self.angle_deg != 0.0
 
 
 class TravelSpec(_Part):
@@ -187,6 +215,7 @@ class MechanicsSpec(_Part):
     place: PlaceSpec = PlaceSpec()
     ripple: RippleSpec = RippleSpec()
     encoder: EncoderSpec = EncoderSpec()
+    phases: PhaseSpec = PhaseSpec()
     travel: TravelSpec = TravelSpec()
     switches: SwitchSpec = SwitchSpec()
     supply: SupplySpec = SupplySpec()

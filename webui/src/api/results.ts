@@ -1,7 +1,14 @@
-import type { BrakeResult, FrictionResult, HealthResult, InertiaAnswer, JobInfo } from './schema'
+import type {
+  BrakeResult,
+  FirstPowerResult,
+  FrictionResult,
+  HealthResult,
+  InertiaAnswer,
+  JobInfo,
+} from './schema'
 
 /** What a tool concluded: distinguished by its field `tool`. */
-type ToolOutcome = BrakeResult | FrictionResult | HealthResult | InertiaAnswer
+type ToolOutcome = BrakeResult | FirstPowerResult | FrictionResult | HealthResult | InertiaAnswer
 
 const outcome = (result: unknown): ToolOutcome | null =>
   typeof result === 'object' && result !== null && 'tool' in result ? (result as ToolOutcome) : null
@@ -21,4 +28,10 @@ export function asFriction(result: unknown): FrictionResult | null {
 export function asBrakeTest(result: unknown): BrakeResult | null {
   const found = outcome(result)
   return found?.tool === 'brake-test' ? found : null
+}
+
+/** The checklist of a first power, or null where it is something else. */
+export function asFirstPower(result: unknown): FirstPowerResult | null {
+  const found = outcome(result)
+  return found?.tool === 'first-power' ? found : null
 }

@@ -924,6 +924,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/jobs/first-power": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start First-Power
+         * @description Before the first closed loop: supply, resolution, counts by a hand turn, direction, limit switches, brake and phase order, with at most 10 % of torque and 0.1 rev.
+         */
+        post: operations["start_first-power"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/jobs/friction": {
         parameters: {
             query?: never;
@@ -4172,6 +4192,26 @@ export interface components {
             lines: components["schemas"]["ChatLine"][];
         };
         /**
+         * Check
+         * @description One line of the checklist. ``finding`` is a text of the tool under the check's name.
+         */
+        Check: {
+            /** Finding */
+            finding: string;
+            /**
+             * Name
+             * @enum {string}
+             */
+            name: "supply" | "resolution" | "counts" | "direction" | "switches" | "brake" | "phases";
+            /**
+             * Status
+             * @enum {string}
+             */
+            status: "passed" | "failed" | "open";
+            /** Value */
+            value?: number | null;
+        };
+        /**
          * Code
          * @description What hinders.
          * @enum {string}
@@ -4841,6 +4881,150 @@ export interface components {
             unit: "" | "rpm" | "rev" | "s" | "%";
             /** Value */
             value?: number | null;
+        };
+        /**
+         * FirstPowerResult
+         * @description ``measured_at`` is ISO 8601, UTC. ``covers_pole_pairs``: fewer could hide two exchanged
+         *     phases within this travel. ``guide`` is the drive's own procedure for the commutation angle.
+         */
+        FirstPowerResult: {
+            /** Checks */
+            checks: components["schemas"]["Check"][];
+            /** Covers Pole Pairs */
+            covers_pole_pairs?: number | null;
+            /** Guide */
+            guide?: ("pole_identification" | "identification") | null;
+            /** Measured At */
+            measured_at: string;
+            /**
+             * Measurements
+             * @description names of the stored raw data
+             * @default []
+             */
+            measurements: string[];
+            /**
+             * Pulses
+             * @default []
+             */
+            pulses: components["schemas"]["Pulse"][];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            tool: "first-power";
+            /**
+             * Torque Percent
+             * @description highest torque that was sent
+             * @default 0
+             */
+            torque_percent: number;
+            /**
+             * Travel Rev
+             * @description farthest from the start
+             * @default 0
+             */
+            travel_rev: number;
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            verdict: "passed" | "failed" | "incomplete";
+        };
+        /**
+         * FirstPowerSettings
+         * @description Limits of the motion, and which parts of the checklist are made.
+         *
+         *     Nothing is energised without one of the two statements about what hangs at the axis.
+         */
+        FirstPowerSettings: {
+            /**
+             * Consent
+             * @description the user agreed that nothing in the drive ends a speed when this computer falls silent; needed where the drive has no watchdog (DS_C)
+             * @default false
+             */
+            consent: boolean;
+            /**
+             * Cycle Ms
+             * @description cycle of the exchange that is started where none runs, and ended afterwards
+             * @default 1
+             */
+            cycle_ms: number;
+            /**
+             * Hand Revolutions
+             * @description whole revolutions that you turn it by, to a mark
+             * @default 1
+             */
+            hand_revolutions: number;
+            /**
+             * Hand Switches
+             * @description you operate both limit switches by hand meanwhile
+             * @default false
+             */
+            hand_switches: boolean;
+            /**
+             * Hand Time S
+             * @description time for what is done by hand, in s
+             * @default 60
+             */
+            hand_time_s: number;
+            /**
+             * Hand Turn
+             * @description you turn the shaft by hand, forwards as the machine counts, when asked
+             * @default false
+             */
+            hand_turn: boolean;
+            /**
+             * Load Supported
+             * @description you state that the hanging load is supported, cannot fall and cannot be lifted off its support, and that nobody is below it
+             * @default false
+             */
+            load_supported: boolean;
+            /**
+             * Nothing Hangs
+             * @description you state that no load pulls at the axis
+             * @default false
+             */
+            nothing_hangs: boolean;
+            /**
+             * Pole Pairs
+             * @description pole pairs of the motor, where known
+             */
+            pole_pairs?: number | null;
+            /**
+             * Powered
+             * @description the motor is energised, with small pulses of torque
+             * @default true
+             */
+            powered: boolean;
+            /**
+             * Rated Torque Nm
+             * @description overrides what the drive says
+             */
+            rated_torque_nm?: number | null;
+            /**
+             * Speed Limit
+             * @description highest speed, in rpm
+             * @default 200
+             */
+            speed_limit: number;
+            /**
+             * Time Limit S
+             * @description longest time of a motion, in s
+             * @default 60
+             */
+            time_limit_s: number;
+            /**
+             * Torque Limit
+             * @description highest torque, in % of rated
+             * @default 10
+             */
+            torque_limit: number;
+            /**
+             * Travel Limit
+             * @description longest way from the start, in revolutions
+             * @default 0.1
+             */
+            travel_limit: number;
         };
         /**
          * Fix
@@ -6521,7 +6705,7 @@ export interface components {
              * Result
              * @description of a tool: its result, which its field tool names
              */
-            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"]) | {
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"]) | {
                 [key: string]: unknown;
             } | null;
             /**
@@ -8293,6 +8477,23 @@ export interface components {
             texts: {
                 [key: string]: string;
             };
+        };
+        /**
+         * Pulse
+         * @description One pulse of torque and where the shaft stood before and after it, from the start.
+         */
+        Pulse: {
+            /**
+             * Direction
+             * @enum {integer}
+             */
+            direction: 1 | -1;
+            /** From Rev */
+            from_rev: number;
+            /** To Rev */
+            to_rev: number;
+            /** Torque Percent */
+            torque_percent: number;
         };
         /**
          * Purpose
@@ -10455,6 +10656,7 @@ export type ChangeRecording = components['schemas']['ChangeRecording'];
 export type Chat = components['schemas']['Chat'];
 export type ChatLine = components['schemas']['ChatLine'];
 export type ChatLog = components['schemas']['ChatLog'];
+export type Check = components['schemas']['Check'];
 export type Code = components['schemas']['Code'];
 export type ConnectRequest = components['schemas']['ConnectRequest'];
 export type CountersRequest = components['schemas']['CountersRequest'];
@@ -10483,6 +10685,8 @@ export type ExcitationInfo = components['schemas']['ExcitationInfo'];
 export type FaultHistory = components['schemas']['FaultHistory'];
 export type FaultHistoryInfo = components['schemas']['FaultHistoryInfo'];
 export type Finding = components['schemas']['Finding'];
+export type FirstPowerResult = components['schemas']['FirstPowerResult'];
+export type FirstPowerSettings = components['schemas']['FirstPowerSettings'];
 export type Fix = components['schemas']['Fix'];
 export type FixRequest = components['schemas']['FixRequest'];
 export type Forcing = components['schemas']['Forcing'];
@@ -10622,6 +10826,7 @@ export type ProcedureRequest = components['schemas']['ProcedureRequest'];
 export type ProfileInfo = components['schemas']['ProfileInfo'];
 export type ProfileMatch = components['schemas']['ProfileMatch'];
 export type ProfileTexts = components['schemas']['ProfileTexts'];
+export type Pulse = components['schemas']['Pulse'];
 export type Purpose = components['schemas']['Purpose'];
 export type Quality = components['schemas']['Quality'];
 export type Quantity = components['schemas']['Quantity'];
@@ -18343,6 +18548,149 @@ export interface operations {
         requestBody: {
             content: {
                 "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "start_first-power": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["FirstPowerSettings"];
             };
         };
         responses: {

@@ -82,7 +82,11 @@ P_NOTCHES = 139
     P_RIPPLE_COGGING, P_RIPPLE_COGGING_SECOND, P_RIPPLE_COGGING_PER_REV, P_RIPPLE_PHASE,
 ) = range(P_NOTCHES + 41, P_NOTCHES + 49)  # fmt: skip
 P_BRAKE_STIFFNESS, P_BRAKE_DAMPING = range(P_NOTCHES + 49, P_NOTCHES + 51)
-P_SIZE = P_NOTCHES + 51
+(
+    P_PHASES_WRONG, P_FIELD_SENSE, P_FIELD_ANGLE, P_POLE_PAIRS, P_COMMUTATION_SENSE,
+    P_ENCODER_SENSE,
+) = range(P_NOTCHES + 51, P_NOTCHES + 57)  # fmt: skip
+P_SIZE = P_NOTCHES + 57
 
 # --- state ----------------------------------------------------------------------------------
 (

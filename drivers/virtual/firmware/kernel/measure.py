@@ -43,7 +43,8 @@ def _normal(s, random):  # type: ignore[no-untyped-def]
 @njit(nogil=True)
 def measure(p, s, x, random):  # type: ignore[no-untyped-def]
     """Encoder, feedback filters and switches."""
-    counts = (x[0] + interpolation_error(p, x[0])) * p[k.P_COUNTS_PER_RAD]
+    shaft = (x[0] + interpolation_error(p, x[0])) * p[k.P_ENCODER_SENSE]
+    counts = shaft * p[k.P_COUNTS_PER_RAD]
     if p[k.P_NOISE] > 0.0:
         counts += p[k.P_NOISE] * _normal(s, random)
     theta = math.floor(counts) / p[k.P_COUNTS_PER_RAD]

@@ -68,6 +68,18 @@ def _ripple(p, angle):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True)
+def _torque_share(p, angle):  # type: ignore[no-untyped-def]
+    """Torque of a wrongly phased motor over what its current would make of it.
+
+    The field stands at ±(p·θc + 90°) + an angle (minus: two phases exchanged), θc being what the
+    drive commutates by; the torque is the sine of the electrical angle from rotor to field.
+    """
+    pairs = p[k.P_POLE_PAIRS]
+    commutates = pairs * p[k.P_COMMUTATION_SENSE] * angle + 0.5 * math.pi
+    return math.sin(p[k.P_FIELD_SENSE] * commutates + p[k.P_FIELD_ANGLE] - pairs * angle)
+
+
+@njit(nogil=True)
 def _grip(p, s, angle, speed):  # type: ignore[no-untyped-def]
     """Torque of a closed brake whose hub twists, and which slips at its holding torque."""
     most, stiffness = p[k.P_BRAKE_TORQUE], p[k.P_BRAKE_STIFFNESS]
@@ -90,6 +102,8 @@ def step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-
     am, bm = a[contact], b[contact]
     pull = _pull(p, x, size)
     ripple = _ripple(p, x[0])
+    if p[k.P_PHASES_WRONG] > 0.0:
+        ripple += (1.0 - _torque_share(p, x[0])) * x[2]
     gripped = int(p[k.P_LOOP]) == k.LOOP_OFF or p[k.P_BRAKE_CLOSED] > 0.0
     elastic = p[k.P_BRAKE_STIFFNESS] > 0.0 and p[k.P_BRAKE_TORQUE] > 0.0
     if gripped and elastic:

@@ -15,6 +15,7 @@ import { useToolJob } from '../response/useToolJob'
 import { AutotunePanel } from './AutotunePanel'
 import { CandidatesPanel } from './CandidatesPanel'
 import { BrakePanel } from './BrakePanel'
+import { FirstPowerPanel } from './FirstPowerPanel'
 import { FrictionPanel } from './FrictionPanel'
 import { GainsPanel } from './GainsPanel'
 import { HealthPanel } from './HealthPanel'
@@ -45,9 +46,11 @@ export function TunePage({ drive }: { drive: string }) {
   const stepJob = useToolJob(drive, 'step').job
   const frictionJob = useToolJob(drive, 'friction').job
   const brakeJob = useToolJob(drive, 'brake-test').job
+  const firstJob = useToolJob(drive, 'first-power').job
   useJobEnd(inertiaJob?.id ?? null, () => void measured.refresh())
   useJobEnd(frictionJob?.id ?? null, () => void measured.refresh())
   useJobEnd(brakeJob?.id ?? null, () => void measured.refresh())
+  useJobEnd(firstJob?.id ?? null, () => void measured.refresh())
   useJobEnd(stepJob?.id ?? null, () => void measured.refresh())
   useJobEnd(tuneJob?.id ?? null, () => {
     void measured.refresh()
@@ -113,6 +116,7 @@ export function TunePage({ drive }: { drive: string }) {
               onChange={refresh}
             />
           </div>
+          {possible && <FirstPowerPanel drive={drive} obstacle={obstacle} cycleMs={cycleMs} />}
           {possible && designable && (
             <AutotunePanel
               drive={drive}

@@ -1,0 +1,1 @@
+"""First power: what must be known before a loop is closed over a motor for the first time."""

@@ -1,0 +1,251 @@
+"""The first power on motors that are connected wrongly, as physics has it.
+
+With the field at s·(p·θc + 90°) + φ the torque is sin(field - pθ) of what the current makes: -0.5
+for phases shifted by 120°, -cos(2pθ - φ) for two exchanged ones, and -cos 0 for an error of 180°.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+from backend.axis.cyclic_mode import keeping_mode
+from backend.tools.first_power.result import FirstPowerResult
+from backend.tools.first_power.run import TOOL
+from backend.tools.first_power.settings import FirstPowerSettings
+from backend.tools.tool import Run
+from drivers.cia402 import State
+from drivers.errors import NotAllowed
+from drivers.virtual.firmware.axis import VirtualAxis
+from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.settings import GainSet, LoopSettings
+from drivers.virtual.mechanics import MechanicsSpec, PhaseSpec
+from tests.virtual.tools.direct import DirectBench, direct
+from tests.virtual.tools.rig import At, mechanics, settings_of, silent
+
+RATED_NM = 1.27
+ASKED = FirstPowerSettings(rated_torque_nm=RATED_NM, nothing_hangs=True)
+RIGHT = PhaseSpec()
+#: Four pole pairs: exchanged phases have one sign over 1/16 rev.
+FAMILIES = ("mms7", "r6l", "ep3e", "m6l")
+
+
+def motor(
+    phases: PhaseSpec = RIGHT, *, inverted: bool = False, counted: float = 1.0,
+    brake: bool = False, gravity: float = 0.0,
+) -> MechanicsSpec:  # fmt: skip
+    spec = mechanics((1e-4, 60.0, 0.006), gravity=gravity)
+    encoder = spec.encoder.model_copy(update={"inverted": inverted, "counted_share": counted})
+    turned = spec.motor.model_copy(update={"brake": brake, "brake_supplied": not brake})
+    return spec.model_copy(update={"phases": phases, "encoder": encoder, "motor": turned})
+
+
+async def first_power(
+    bench: DirectBench, asked: FirstPowerSettings = ASKED, progress: At | None = None,
+    kept: dict[str, Any] | None = None,
+) -> FirstPowerResult:  # fmt: skip
+    """As a job or the command line does it; what is read from files is the same."""
+
+    def keep(name: str, arrays: Mapping[str, object], meta: dict[str, object]) -> None:
+        if kept is not None:
+            kept.update(name=name, arrays=arrays, meta=meta)
+
+    steps = silent() if progress is None else progress.progress
+    async with keeping_mode(bench.axis, bench.session):
+        found = await TOOL.run(Run(bench.axis, bench.session, steps, keep), asked)
+    return FirstPowerResult.model_validate(found.model_dump(mode="json"))
+
+
+def shaft(bench: DirectBench) -> VirtualAxis:
+    return bench.link.device.core.axis
+
+
+def shaft_rev(bench: DirectBench) -> float:
+    """The true angle of the shaft, whatever its encoder counts."""
+    return float(shaft(bench)._x[0]) / (2 * math.pi)
+
+
+def finding(result: FirstPowerResult, name: str) -> tuple[str, str]:
+    return next((each.status, each.finding) for each in result.checks if each.name == name)
+
+
+async def on(
+    drive: str, spec: MechanicsSpec, asked: FirstPowerSettings = ASKED, at_rev: float = 0.0
+) -> tuple[FirstPowerResult, DirectBench]:
+    """Made from this place of the rotor; settings are as before, the axis has no power."""
+    async with direct(spec, drive=drive) as bench:
+        shaft(bench).place(2 * math.pi * at_rev)
+        mode = bench.axis.drive.require("mode")
+        before = await settings_of(bench.axis.drive, mode)
+        bench.link.highest.update(speed=0.0, torque=0.0)
+        kept: dict[str, Any] = {}
+        found = await first_power(bench, asked, kept=kept)
+        assert TOOL.reevaluate(kept["arrays"], kept["meta"]) == found
+        assert await settings_of(bench.axis.drive, mode) == before
+        assert await bench.axis.state() is not State.OPERATION_ENABLED
+        assert not bench.axis.drive.pending_restores.entries
+        # 6077h is in per mille of rated torque.
+        assert bench.link.highest["torque"] <= 100
+        assert found.travel_rev <= 0.1
+        assert abs(shaft_rev(bench) - at_rev) <= 0.1
+        return found, bench
+
+
+@pytest.mark.parametrize("drive", FAMILIES)
+async def test_a_motor_that_is_connected_right(drive: str) -> None:
+    found, _ = await on(drive, motor())
+    assert finding(found, "phases") == ("passed", "right")
+    assert finding(found, "brake") == ("passed", "ok")
+    assert finding(found, "supply") == ("passed", "ok")
+    assert finding(found, "counts") == ("open", "not_done")
+    assert found.verdict == "incomplete"
+    assert found.covers_pole_pairs == 3
+
+
+async def test_shifted_phases_turn_the_shaft_against_the_torque() -> None:
+    found, _ = await on("mms7", motor(PhaseSpec(order="shifted")))
+    assert finding(found, "phases") == ("failed", "reversed")
+    assert found.verdict == "failed"
+
+
+@pytest.mark.parametrize(("drive", "at_rev"), [("mms7", 0.0), ("ep3e", 0.05), ("r6l", 0.025)])
+async def test_exchanged_phases_lock_the_shaft(drive: str, at_rev: float) -> None:
+    found, _ = await on(drive, motor(PhaseSpec(order="exchanged")), at_rev=at_rev)
+    assert finding(found, "phases") == ("failed", "locks")
+
+
+async def test_where_exchanged_phases_make_no_torque_the_next_step_is_named() -> None:
+    # cos(2pθ) is zero at θ = 1/(8p).
+    found, _ = await on("r6l", motor(PhaseSpec(order="exchanged")), at_rev=1.0 / 32)
+    assert finding(found, "phases") in (("open", "no_motion"), ("failed", "locks"))
+    assert found.verdict != "passed"
+
+
+async def test_an_inverted_encoder_that_commutates_locks_too() -> None:
+    found, _ = await on("m6l", motor(inverted=True))
+    assert finding(found, "phases") == ("failed", "locks")
+
+
+async def test_a_wrong_angle_beyond_a_quarter_turn_reverses_the_torque() -> None:
+    found, _ = await on("ep3e", motor(PhaseSpec(angle_deg=180.0)))
+    assert finding(found, "phases") == ("failed", "reversed")
+
+
+async def by_hand(
+    spec: MechanicsSpec, turned_rev: float, asked: FirstPowerSettings, drive: str = "r6l"
+) -> tuple[FirstPowerResult, DirectBench]:
+    """A person turns the shaft when asked to."""
+    async with direct(spec, drive=drive) as bench:
+        turn = At("by hand", lambda: shaft(bench).place(2 * math.pi * turned_rev), 0.06)
+        found = await first_power(bench, asked, turn)
+        assert turn.done
+        return found, bench
+
+
+HAND = ASKED.model_copy(update={"hand_turn": True, "hand_time_s": 10.0})
+
+
+async def test_a_hand_turn_tells_an_inverted_encoder_from_shifted_phases() -> None:
+    hall = PhaseSpec(commutation="hall")
+    found, _ = await by_hand(motor(hall, inverted=True), 1.0, HAND)
+    assert finding(found, "counts") == ("passed", "ok")
+    assert finding(found, "direction") == ("failed", "backwards")
+    assert finding(found, "phases") == ("failed", "feedback_inverted")
+    found, _ = await by_hand(motor(PhaseSpec(order="shifted")), 1.01, HAND)
+    assert finding(found, "direction") == ("passed", "ok")
+    assert finding(found, "phases") == ("failed", "phases_reversed")
+
+
+async def test_an_axis_that_only_counts_the_other_way_has_right_phases() -> None:
+    # Phases exchanged and encoder inverted: both signs together are right again.
+    found, _ = await by_hand(motor(PhaseSpec(order="exchanged"), inverted=True), 1.0, HAND)
+    assert finding(found, "phases") == ("passed", "right")
+    assert finding(found, "direction") == ("failed", "backwards")
+
+
+@pytest.mark.parametrize("share", [0.25, 4.0])
+async def test_wrong_counts_are_found_before_anything_is_energised(share: float) -> None:
+    found, bench = await by_hand(motor(counted=share), 1.0, HAND)
+    assert finding(found, "counts") == ("failed", "wrong")
+    assert finding(found, "phases") == ("open", "counts_first")
+    assert found.pulses == ()
+    assert shaft_rev(bench) == 1.0
+
+
+async def test_a_closed_brake_moves_nothing() -> None:
+    found, _ = await on("r6l", motor(brake=True))
+    assert finding(found, "brake") == ("open", "not_seen")
+    assert finding(found, "phases") == ("open", "no_motion")
+
+
+async def test_nothing_moves_without_a_statement_of_what_hangs() -> None:
+    async with direct(motor(), drive="r6l") as bench:
+        with pytest.raises(NotAllowed) as refused:
+            await first_power(bench, ASKED.model_copy(update={"nothing_hangs": False}))
+        assert refused.value.code == "first-power.say-what-hangs"
+        assert shaft_rev(bench) == 0.0
+
+
+async def test_a_stop_meanwhile_takes_the_power_off_and_closes_no_loop() -> None:
+    async with direct(motor(PhaseSpec(order="shifted")), drive="mms7") as bench:
+        task: asyncio.Task[FirstPowerResult]
+        modes = set[float]()
+
+        def stop() -> None:
+            shaft_axis = shaft(bench)
+            begin = shaft_axis._begin
+
+            def seen(generator: int, loop: int) -> None:
+                modes.add(loop)
+                begin(generator, loop)
+
+            shaft_axis._begin = seen  # type: ignore[method-assign]
+            task.cancel()
+
+        at = At("pulses", stop, 0.55)
+        task = asyncio.create_task(first_power(bench, progress=at))
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        assert at.done
+        assert modes <= {k.LOOP_OFF, k.LOOP_TORQUE}
+        assert await bench.axis.state() is not State.OPERATION_ENABLED
+        assert not bench.axis.drive.pending_restores.entries
+        assert abs(shaft_rev(bench)) <= 0.1
+
+
+@pytest.mark.parametrize(
+    ("spec", "runs_away"),
+    [
+        (motor(), False),
+        (motor(PhaseSpec(order="shifted")), True),
+        (motor(PhaseSpec(commutation="hall"), inverted=True), True),
+    ],
+)
+def test_a_closed_loop_runs_away_over_a_wrong_motor(spec: MechanicsSpec, runs_away: bool) -> None:
+    """The plant alone: a speed loop at 50 rpm, with no protection."""
+    axis = VirtualAxis(spec)
+    gains = GainSet(20.0, 0.02, 1.0)
+    axis.apply_loops(LoopSettings(first=gains, second=gains, homing=None))
+    axis.set_limits(RATED_NM, RATED_NM, math.inf)
+    axis.run_velocity(5.0, 1e3, 1e3)
+    for _ in range(40):
+        axis.run(100)
+    fast = abs(float(axis._x[1]))
+    assert (fast > 50.0) is runs_away
+    if not runs_away:
+        assert fast == pytest.approx(5.0, rel=0.05)
+
+
+def test_exchanged_phases_hold_the_rotor_at_a_multiple_of_half_an_electrical_turn() -> None:
+    """A constant torque command of -T·cos(2pθ): it comes to rest where the cosine is zero."""
+    spec = motor(PhaseSpec(order="exchanged"))
+    axis = VirtualAxis(spec)
+    axis.run_torque(0.5 * RATED_NM, math.inf)
+    for _ in range(400):
+        axis.run(100)
+    electrical = 2 * 4 * float(axis._x[0])
+    assert abs(math.cos(electrical)) < 0.06
