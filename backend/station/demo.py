@@ -12,13 +12,16 @@ from pathlib import Path
 from types import TracebackType
 
 from drivers.computer.processes import SESSIONS
-from drivers.errors import LinkLost
+from drivers.errors import LinkLost, NotAllowed
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Link
 from drivers.urls import link_for
 from drivers.virtual.bench import STANDARD_BENCH, BenchSpec, load_bench
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import Namespace, NamespaceUnavailable
+
+#: A fault that needs no motion and that a reset clears.
+TRAINING_FAULT = "under_voltage"
 
 
 class DemoBench:
@@ -140,6 +143,24 @@ class DemoBench:
         if not answer.get("ok"):
             raise ValueError(str(answer.get("error", "the process ended")))
         return answer.get("result")
+
+    def cause_fault(self, url: str, station: int) -> None:
+        """Report an under-voltage in the virtual drive at a station, for training.
+
+        Raises:
+            NotAllowed: no drive of the bench is there. ValueError: the drive refuses.
+            LinkLost: the virtual drives have ended.
+        """
+        segment = self.segments.get(url)
+        for place, (axis, at) in enumerate(self.spec.on(url)):
+            if at != station:
+                continue
+            if segment is not None:
+                segment.command("inject", slave=place, what=TRAINING_FAULT)
+            else:
+                self.command(do="inject", axis=axis.name, what=TRAINING_FAULT)
+            return
+        raise NotAllowed("station.no-virtual-drive", url=url, station=station)
 
     def stop(self) -> None:
         """End the virtual drives. Calling again does nothing."""

@@ -26,6 +26,7 @@ import { StopButton } from './StopButton'
 import { currentReport } from './stop'
 import { StopElsewhere } from './StopElsewhere'
 import { SupportBar } from './SupportBar'
+import { Tour } from './tour/Tour'
 import { TurningNote } from './TurningNote'
 import { linkLook, stateLook } from './states'
 import { useCanTune } from './useCanTune'
@@ -114,6 +115,7 @@ export function Frame({ children }: { children: ReactNode }) {
         </Late>
         <div className="room">{children}</div>
       </main>
+      <Tour />
       <PointerLayer />
       <nav className="bottom" aria-label={t('frame.pages')}>
         {(chosen === null ? EMPTY_BENCH : HANDY).map((name) => (
