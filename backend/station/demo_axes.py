@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
@@ -11,7 +12,13 @@ from drivers.errors import DriveError, NotAllowed
 
 if TYPE_CHECKING:
     from backend.station.bench import Bench
+    from drivers.link import Found
     from drivers.virtual.bench import AxisSpec, BenchSpec
+
+#: Searches of a bus until all of its drives have answered.
+_TRIES = 10
+#: Between them: the segment of a busy computer answers late after its start.
+_PAUSE_S = 1.0
 
 
 def mechanics_of(axis: AxisSpec) -> Mechanics | None:
@@ -47,22 +54,45 @@ async def connect_axes(bench: Bench, spec: BenchSpec) -> list[str]:
     if bench.connected_drives:
         return []
     made: list[str] = []
+    found: dict[tuple[str, int], Found] = {}
+    for url in spec.urls():
+        stations = [at for axis, at in spec.on(url) if axis.connected and axis.on == url]
+        if stations and url in bench.buses.wires:
+            found |= {(url, each.station): each for each in await _search(bench, url, stations)}
     for axis in spec.axis:
         if not axis.connected or axis.on not in bench.buses.wires:
             continue
         try:
-            mechanics = mechanics_of(axis)
-            seen = await bench.buses.scan(axis.on, [axis.station], lambda _fraction, _step: None)
-            found = next((each for each in seen if each.station == axis.station), None)
-            connected = await bench.connect(
-                axis.on, axis.station, axis.drive, axis.name, found=found
-            )
+            made.append(await _connect(bench, axis, found.get((axis.on, axis.station))))
         except DriveError as error:
-            bench.journal.add(f"{axis.name}: not connected: {error}", level="warning")
-            continue
-        drive = connected.drive.id
-        if mechanics is not None:
-            record = bench.axis_records.get(drive)
-            bench.axis_records.put(drive, record.model_copy(update={"mechanics": mechanics}))
-        made.append(drive)
+            bench.journal.add(f"{axis.name}: not connected: {error}", level="error")
     return made
+
+
+async def _search(bench: Bench, url: str, stations: list[int]) -> list[Found]:
+    """What answers; a busy computer may miss a drive, so it is asked again, but not often."""
+    seen: list[Found] = []
+    for attempt in range(_TRIES):
+        if attempt:
+            await asyncio.sleep(_PAUSE_S)
+        try:
+            seen = await bench.buses.scan(url, stations, lambda _fraction, _step: None)
+        except DriveError as error:
+            bench.journal.add(f"{url}: {error}", level="warning")
+        if {each.station for each in seen} >= set(stations):
+            break
+    return seen
+
+
+async def _connect(bench: Bench, axis: AxisSpec, found: Found | None) -> str:
+    mechanics = mechanics_of(axis)
+    if found is None:
+        raise NotAllowed(
+            "command.nothing-answers-station-check-power", station=axis.station, url=axis.on
+        )
+    connected = await bench.connect(axis.on, axis.station, axis.drive, axis.name, found=found)
+    drive = connected.drive.id
+    if mechanics is not None:
+        record = bench.axis_records.get(drive)
+        bench.axis_records.put(drive, record.model_copy(update={"mechanics": mechanics}))
+    return drive
