@@ -278,7 +278,12 @@ function StateBadge() {
         ? known(t, 'state', state.state)
         : t('state.noAnswer')
   return (
-    <span className={`badge ${look.tone}`} role="status" aria-label={t('frame.state')}>
+    <span
+      className={`badge ${look.tone}`}
+      role="status"
+      aria-label={t('frame.state')}
+      title={state?.fresh ? state.state : undefined}
+    >
       <Icon name={look.icon} size={16} />
       <span>{words}</span>
     </span>
