@@ -15,8 +15,7 @@ from backend.commands.serve import serve as run_server
 from backend.commands.session import until_interrupted
 from backend.commands.state import state_folder
 from backend.station.bench import Bench
-from backend.station.demo import DemoBench
-from backend.station.demo_axes import connect_axes
+from backend.station.demo import DemoBench, connect_axes
 
 Host = Annotated[
     str,
