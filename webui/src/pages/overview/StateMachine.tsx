@@ -1,3 +1,4 @@
+import { Fragment } from 'react'
 import { known, useLanguage, useT } from '../../i18n'
 import { ArrowTip, DrawnButton } from '../../widgets/drawn'
 
@@ -68,35 +69,48 @@ export function StateMachine({
             <text x={box.x} y={box.y + (allowed || now ? -2 : 5) - (both ? 8 : 0)}>
               {name}
             </text>
+          </>
+        )
+        // Outside of the button, whose name is the state alone.
+        const hints = (
+          <g className={allowed ? 'allowed' : undefined} aria-hidden="true" pointerEvents="none">
             {both && (
-              <text x={box.x} y={box.y + (allowed || now ? 5 : 14)} className="hint">
+              <text
+                x={box.x}
+                y={box.y + (allowed || now ? 5 : 14)}
+                className="hint"
+                aria-hidden="true"
+              >
                 ({box.state})
               </text>
             )}
             {(allowed || now) && (
-              <text x={box.x} y={box.y + (both ? 21 : 14)} className="hint">
+              <text x={box.x} y={box.y + (both ? 21 : 14)} className="hint" aria-hidden="true">
                 {t(now ? 'overview.here' : 'overview.goThere')}
               </text>
             )}
-          </>
+          </g>
         )
         if (!allowed) {
           return (
             <g key={box.state} className={look}>
               {drawing}
+              {hints}
             </g>
           )
         }
         return (
-          <DrawnButton
-            key={box.state}
-            className={look}
-            label={t('overview.goTo', { state: name })}
-            busy={busy}
-            onPress={() => onGoal(box.state)}
-          >
-            {drawing}
-          </DrawnButton>
+          <Fragment key={box.state}>
+            <DrawnButton
+              className={look}
+              label={t('overview.goTo', { state: name })}
+              busy={busy}
+              onPress={() => onGoal(box.state)}
+            >
+              {drawing}
+            </DrawnButton>
+            {hints}
+          </Fragment>
         )
       })}
     </svg>
