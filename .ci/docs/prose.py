@@ -17,9 +17,9 @@ LONGEST = 30
 #: Pages that are looked up and not read: their sentences may be longer.
 REFERENCE = (
     "adr/", "architecture.md", "audit.md", "backup.md", "buses/", "drives/", "friction.md",
-    "import.md", "library.md", "not-operational.md", "parameter-sets.md", "recording.md",
+    "import.md", "library.md", "parameter-sets.md", "recording.md",
     "reference/", "scope.md", "security.md", "station.md", "tuning-accuracy.md",
-    "tuning.md", "virtual-drives.md", "pages.md", "safety.md", "handover.md", "install.md",
+    "tuning.md", "virtual-drives.md", "pages.md", "safety.md", "handover.md",
     "remote-support.md", "command-line.md",
 )  # fmt: skip
 

@@ -7,6 +7,7 @@ import contextlib
 import socket
 import ssl
 import webbrowser
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -61,8 +62,12 @@ class Serving:
         return self.host in LOOPBACK or self.host == "::1"
 
 
-async def serve(bench: Bench, serving: Serving) -> None:
+async def serve(
+    bench: Bench, serving: Serving, ready: Callable[[], Awaitable[object]] | None = None
+) -> None:
     """Serve until interrupted. Port 0 takes a free one; the address is printed.
+
+    ``ready`` is awaited once the server answers, before the address is printed.
 
     Raises:
         Busy: another server uses the state folder.
@@ -71,12 +76,14 @@ async def serve(bench: Bench, serving: Serving) -> None:
     """
     bench.records.claim()
     try:
-        await _serve_claimed(bench, serving)
+        await _serve_claimed(bench, serving, ready)
     finally:
         bench.records.release()
 
 
-async def _serve_claimed(bench: Bench, serving: Serving) -> None:
+async def _serve_claimed(
+    bench: Bench, serving: Serving, ready: Callable[[], Awaitable[object]] | None
+) -> None:
     needed = await accounts_needed(bench.state_folder, serving)
     people = People(bench.state_folder, accounts_needed=needed)
     certificate = _certificate(bench.state_folder, serving)
@@ -89,6 +96,8 @@ async def _serve_claimed(bench: Bench, serving: Serving) -> None:
     while not server.started and not running.done():
         await asyncio.sleep(0.02)
     if server.started:
+        if ready is not None:
+            await ready()
         shown = _address(serving, certificate, listening.getsockname()[1])
         _tell(shown, people, certificate)
         _tell_problems(bench)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +15,7 @@ from backend.commands.serve import serve as run_server
 from backend.commands.session import until_interrupted
 from backend.commands.state import state_folder
 from backend.station.bench import Bench
-from backend.station.demo import DemoBench
+from backend.station.demo import DemoBench, connect_axes
 
 Host = Annotated[
     str,
@@ -100,6 +101,9 @@ def demo(
                 server_bench = Bench(
                     state, drives.wires, database=database, blobs=blobs, names=drives.names
                 )
-                await run_server(server_bench, serving)
+                server_bench.buses.cause_fault = drives.cause_fault
+                await run_server(
+                    server_bench, serving, partial(connect_axes, server_bench, drives.spec)
+                )
 
     until_interrupted(work)

@@ -27,6 +27,8 @@ class Buses:
 
     def __init__(self, bench: Bench, wires: Mapping[str, Callable[[], Link]]) -> None:
         self.wires = dict(wires)
+        #: Causes a fault in a virtual drive, by bus URL and station; None without a demo bench.
+        self.cause_fault: Callable[[str, int], None] | None = None
         self.opened: dict[str, Link] = {}
         self._bench = bench
         self._opening = asyncio.Lock()

@@ -9,6 +9,8 @@
     station = 1
     also_on = "modbus://virtual0"      # a second port of the same drive, where it has one
     also_station = 1
+    connected = true                   # the demo connects it at its start
+    moves = {kind = "screw", lead_mm = 10}    # what the page shows it to move
     [axis.mechanics.motor]
     …
 """
@@ -45,6 +47,9 @@ class AxisSpec(BaseModel):
     also_on: str | None = None
     also_station: int | None = None
     serial: int | None = Field(default=None, ge=1, le=0xFFFFFFFF)
+    connected: bool = False
+    #: What the shaft drives, as `backend.scales.gear_calculator.Mechanics` is written.
+    moves: dict[str, str | int | float] = Field(default_factory=dict)
     mechanics: MechanicsSpec = Field(default_factory=standard_mechanics)
 
     @property

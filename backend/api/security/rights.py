@@ -125,6 +125,8 @@ _API: dict[str, Need] = {
     "GET /drives/{drive_id}/state": _LOOK,
     "GET /drives/{drive_id}/faults": _LOOK,
     "POST /drives/{drive_id}/fault-reset": _MOTION,
+    # Of the demo only; the route refuses it elsewhere.
+    "POST /drives/{drive_id}/training-fault": _MOTION,
     "POST /drives/{drive_id}/transition": _MOTION,
     "GET /drives/{drive_id}/parameters": _LOOK,
     "PUT /drives/{drive_id}/parameters": _PARAMETERS,

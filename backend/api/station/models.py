@@ -17,6 +17,7 @@ class Health(Message):
     version: str
     time: datetime
     demo: bool
+    tour: bool = Field(description="the demo's virtual drives take training faults")
 
 
 class SerialPort(Message):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
@@ -34,6 +35,7 @@ from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.station.second_port import require_same_drive
 from backend.work.jobs import Job, JobResult, Progress
+from drivers.errors import NotAllowed
 from drivers.link import Found
 from drivers.texts.message import text
 from profiles import load_all
@@ -46,7 +48,12 @@ router = APIRouter()
 async def health(bench: TheBench) -> Health:
     """Whether the server is alive."""
     now = convert.moment(backend.now())
-    return Health(version=backend.__version__, time=now, demo=bool(bench.buses.wires))
+    return Health(
+        version=backend.__version__,
+        time=now,
+        demo=bool(bench.buses.wires),
+        tour=bench.buses.cause_fault is not None,
+    )
 
 
 @router.get("/interfaces")
@@ -206,6 +213,20 @@ async def remove_drive(bench: TheBench, connected: Controlled) -> Response:
     """Take a drive off the bench."""
     await bench.remove(connected.drive.id)
     bench.audit.add(Fact("station", "taken off the bench", connected.drive.name))
+    return Response(status_code=204)
+
+
+@router.post("/drives/{drive_id}/training-fault", status_code=204)
+async def training_fault(bench: TheBench, connected: Controlled) -> Response:
+    """Cause an under-voltage fault in a virtual drive of the demo; refused for real drives."""
+    port = connected.drive.ports[0]
+    url = bench.buses.url_of(port)
+    cause = bench.buses.cause_fault
+    if cause is None or url not in bench.buses.wires:
+        raise NotAllowed("api-station.training-fault-needs-demo", drive=connected.drive.name)
+    await asyncio.to_thread(cause, url, port.station)
+    bench.journal.add(text("station.training-fault"), level="warning", drive=connected.drive.id)
+    await connected.monitor.refresh()
     return Response(status_code=204)
 
 

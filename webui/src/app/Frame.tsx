@@ -26,6 +26,7 @@ import { StopButton } from './StopButton'
 import { currentReport } from './stop'
 import { StopElsewhere } from './StopElsewhere'
 import { SupportBar } from './SupportBar'
+import { Tour } from './tour/Tour'
 import { TurningNote } from './TurningNote'
 import { linkLook, stateLook } from './states'
 import { useCanTune } from './useCanTune'
@@ -114,6 +115,7 @@ export function Frame({ children }: { children: ReactNode }) {
         </Late>
         <div className="room">{children}</div>
       </main>
+      <Tour />
       <PointerLayer />
       <nav className="bottom" aria-label={t('frame.pages')}>
         {(chosen === null ? EMPTY_BENCH : HANDY).map((name) => (
@@ -276,7 +278,12 @@ function StateBadge() {
         ? known(t, 'state', state.state)
         : t('state.noAnswer')
   return (
-    <span className={`badge ${look.tone}`} role="status" aria-label={t('frame.state')}>
+    <span
+      className={`badge ${look.tone}`}
+      role="status"
+      aria-label={t('frame.state')}
+      title={state?.fresh ? state.state : undefined}
+    >
       <Icon name={look.icon} size={16} />
       <span>{words}</span>
     </span>

@@ -1,12 +1,15 @@
 import { ActionIcon, Menu, useMantineColorScheme } from '@mantine/core'
 import { useT } from '../i18n'
 import { Icon } from '../widgets/Icon'
+import { useLink } from '../live/store'
 import { leave, useSession } from './session'
+import { setPlace, useHasTour } from './tour/tour'
 
 /** Appearance, the time zone of what is shown, and who is logged in. */
 export function Preferences() {
   const t = useT()
   const session = useSession()
+  const tour = useHasTour(useLink().open)
   const zone = Intl.DateTimeFormat().resolvedOptions().timeZone
   const { colorScheme, setColorScheme } = useMantineColorScheme()
   return (
@@ -28,6 +31,7 @@ export function Preferences() {
           </Menu.Item>
         ))}
         <Menu.Label>{t('frame.times', { zone })}</Menu.Label>
+        {tour && <Menu.Item onClick={() => setPlace('offer')}>{t('tour.menu')}</Menu.Item>}
         {session?.login_required && session.person !== null && (
           <>
             <Menu.Label>{t('door.in', { name: session.person ?? '' })}</Menu.Label>

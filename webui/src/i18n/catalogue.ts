@@ -17,6 +17,7 @@ import { scales } from './texts/scales'
 import { scene } from './texts/scene'
 import { scope } from './texts/scope'
 import { segment } from './texts/segment'
+import { tour } from './texts/tour'
 import { tuning } from './texts/tuning'
 import { unwatched } from './texts/unwatched'
 
@@ -37,6 +38,7 @@ export const catalogue = {
   ...library,
   ...notListed,
   ...scales,
+  ...tour,
   ...scene,
   ...scope,
   ...segment,

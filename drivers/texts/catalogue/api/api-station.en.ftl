@@ -43,3 +43,5 @@ api-station_scan = Scan { $url }
 api-station_station-not-answer = station { $value } of { $url } does not answer
     .remedy = check its supply and cable, then scan the segment again
 api-station_wait-for-end = wait for the end
+api-station_training-fault-needs-demo = { $drive }: training faults are for virtual drives
+    .remedy = start `servodeck demo` and choose one of its axes

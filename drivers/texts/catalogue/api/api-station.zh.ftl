@@ -43,3 +43,5 @@ api-station_scan = 扫描 { $url }
 api-station_station-not-answer = { $url } 的站 { $value } 无应答
     .remedy = 请检查其供电和电缆，然后重新扫描网段
 api-station_wait-for-end = 请等待结束
+api-station_training-fault-needs-demo = { $drive }：培训用故障仅用于虚拟驱动器
+    .remedy = 请启动 `servodeck demo` 并选择其中的轴

@@ -1,8 +1,9 @@
 import { useFaultAtOpening } from '../../app/AxisNotes'
+import { useHasTour } from '../../app/tour/tour'
 import { api, ask } from '../../api/client'
 import type { AxisState, TransitionRequest } from '../../api/schema'
 import { known, useT } from '../../i18n'
-import { setState, useAxisState, useDrive } from '../../live/store'
+import { setState, useAxisState, useDrive, useLink } from '../../live/store'
 import { FaultList } from '../../widgets/FaultList'
 import { FaultResetButton, FaultResetProblem, useFaultReset } from '../../widgets/FaultReset'
 import { quantity } from '../../widgets/format'
@@ -23,6 +24,8 @@ export function OverviewPage({ drive }: { drive: string }) {
   const state = useAxisState(drive)
   const summary = useDrive(drive)
   const change = useAction()
+  // The demo shows its load without scrolling.
+  const demo = useHasTour(useLink().open)
   const reported = useFaultAtOpening(state)
   const reset = useFaultReset(drive)
   const goTo = (goal: string) =>
@@ -63,6 +66,7 @@ export function OverviewPage({ drive }: { drive: string }) {
           </div>
         </div>
         <div className="stack">
+          {demo && <SceneHere drive={drive} />}
           <Panel title={t('overview.machine')}>
             <StateMachine
               state={state?.fresh ? state.state : null}
@@ -74,9 +78,11 @@ export function OverviewPage({ drive }: { drive: string }) {
             <Blocked state={state} />
             <ProblemNote problem={change.problem} onClose={change.clear} />
           </Panel>
-          <div className="later">
-            <SceneHere drive={drive} />
-          </div>
+          {!demo && (
+            <div className="later">
+              <SceneHere drive={drive} />
+            </div>
+          )}
         </div>
       </div>
     </div>

@@ -1,7 +1,9 @@
 import { Button } from '@mantine/core'
 import { useState } from 'react'
 import { href } from '../../app/router'
+import { useHasTour } from '../../app/tour/tour'
 import { useT } from '../../i18n'
+import { useLink } from '../../live/store'
 import { Panel } from '../../widgets/Panel'
 import '../scene/scene.css'
 import { SceneFrame } from '../scene/SceneFrame'
@@ -14,10 +16,14 @@ const SHOWN = 'servodeck.overview.scene'
  */
 export function SceneHere({ drive }: { drive: string }) {
   const t = useT()
-  const [shown, setShown] = useState(() => localStorage.getItem(SHOWN) === '1')
+  const demo = useHasTour(useLink().open)
+  const [chosen, setChosen] = useState(() => localStorage.getItem(SHOWN))
+  // The demo shows its load from the start; the computer that draws it is the one that serves it.
+  const shown = chosen === null ? demo : chosen === '1'
   const toggle = () => {
-    localStorage.setItem(SHOWN, shown ? '0' : '1')
-    setShown(!shown)
+    const next = shown ? '0' : '1'
+    localStorage.setItem(SHOWN, next)
+    setChosen(next)
   }
   return (
     <Panel

@@ -1,4 +1,5 @@
-import { known, useT } from '../../i18n'
+import { Fragment } from 'react'
+import { known, useLanguage, useT } from '../../i18n'
 import { ArrowTip, DrawnButton } from '../../widgets/drawn'
 
 /** Boxes of the picture: centre, in the units of the drawing. After CiA 402-2 figure 6. */
@@ -40,6 +41,8 @@ export function StateMachine({
   onGoal: (goal: string) => void
 }) {
   const t = useT()
+  // The manuals print the states in English: a translation stands with the original.
+  const both = useLanguage() !== 'en'
   return (
     <svg className="state-machine" viewBox="0 -3 436 323" aria-label={t('overview.machine')}>
       <title>{t('overview.machine')}</title>
@@ -63,33 +66,51 @@ export function StateMachine({
               height={HEIGHT}
               rx={4}
             />
-            <text x={box.x} y={box.y + (allowed || now ? -2 : 5)}>
+            <text x={box.x} y={box.y + (allowed || now ? -2 : 5) - (both ? 8 : 0)}>
               {name}
             </text>
+          </>
+        )
+        // Outside of the button, whose name is the state alone.
+        const hints = (
+          <g className={allowed ? 'allowed' : undefined} aria-hidden="true" pointerEvents="none">
+            {both && (
+              <text
+                x={box.x}
+                y={box.y + (allowed || now ? 5 : 14)}
+                className="hint"
+                aria-hidden="true"
+              >
+                ({box.state})
+              </text>
+            )}
             {(allowed || now) && (
-              <text x={box.x} y={box.y + 14} className="hint">
+              <text x={box.x} y={box.y + (both ? 21 : 14)} className="hint" aria-hidden="true">
                 {t(now ? 'overview.here' : 'overview.goThere')}
               </text>
             )}
-          </>
+          </g>
         )
         if (!allowed) {
           return (
             <g key={box.state} className={look}>
               {drawing}
+              {hints}
             </g>
           )
         }
         return (
-          <DrawnButton
-            key={box.state}
-            className={look}
-            label={t('overview.goTo', { state: name })}
-            busy={busy}
-            onPress={() => onGoal(box.state)}
-          >
-            {drawing}
-          </DrawnButton>
+          <Fragment key={box.state}>
+            <DrawnButton
+              className={look}
+              label={t('overview.goTo', { state: name })}
+              busy={busy}
+              onPress={() => onGoal(box.state)}
+            >
+              {drawing}
+            </DrawnButton>
+            {hints}
+          </Fragment>
         )
       })}
     </svg>

@@ -4,7 +4,7 @@ import { useT } from '../../i18n'
 import { dateTime } from '../../widgets/format'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
-import { changedSince, forget, useChanges } from './undo'
+import { changedSince, forget, noteUndone, useChanges } from './undo'
 
 /** The newest change to an axis, with the way back. */
 export function UndoNote({ drive, onUndone }: { drive: string; onUndone: () => void }) {
@@ -23,6 +23,7 @@ export function UndoNote({ drive, onUndone }: { drive: string; onUndone: () => v
         }),
       )
       forget(drive)
+      noteUndone()
       onUndone()
     })
   return (

@@ -1,5 +1,6 @@
 import { useSyncExternalStore } from 'react'
 import type { Problem } from '../../api/schema'
+import { publish } from '../../live/store'
 
 /** What a write answers: raw values that take it back, and those that it left. */
 export interface Written {
@@ -57,6 +58,17 @@ export const changedSince = (problem: Problem | null, before: Record<string, num
   problem.parameter != null &&
   problem.parameter in before &&
   problem.limit != null
+
+let undone = 0
+
+/** How many changes this page has undone. */
+export const undoneCount = (): number => undone
+
+/** Keep that a change was undone. */
+export function noteUndone(): void {
+  undone += 1
+  publish('undone')
+}
 
 /** Take the newest change off the list, once it has been undone. */
 export const forget = (drive: string) => store(drive, read(drive).slice(0, -1))

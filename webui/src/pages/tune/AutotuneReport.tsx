@@ -4,7 +4,7 @@ import { api, ask } from '../../api/client'
 import { known, useSay, useT } from '../../i18n'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
-import { changedSince } from '../response/undo'
+import { changedSince, noteUndone } from '../response/undo'
 import { hertz, measuredCurve, wrapWhole } from '../response/bode'
 import { BodePlot } from '../response/BodePlot'
 import { Legend } from '../response/Legend'
@@ -51,6 +51,7 @@ export function AutotuneReport({
         }),
       )
       undone.add(job)
+      noteUndone()
       setPressed(true)
       onChanged()
     })
