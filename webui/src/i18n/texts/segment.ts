@@ -59,7 +59,7 @@ export const segment = {
     'Written to the drive’s EEPROM, valid after its supply was switched off and on. Machines whose controller addresses drives by alias must be reported. Nothing may move on this bus meanwhile.',
     '写入驱动器 EEPROM，断电重启后生效。若控制器按别名寻址，需同步修改。写入期间此总线上不得有运动。',
   ],
-  'segment.eeprom': ['EEPROM', 'EEPROM'],
+  'segment.eeprom': ['EEPROM', 'EEPROM 存储器'],
   'segment.eepromWhat': [
     'What the controller of this drive knows of it. Save it before anything is changed: the file restores a drive whose EEPROM was damaged or overwritten.',
     '驱动器的控制器所保存的信息。更改之前请先保存：EEPROM 损坏或被覆盖时可用该文件恢复。',
