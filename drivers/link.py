@@ -238,9 +238,10 @@ class Envelope:
     following_error_max: float | None = None
     feedback: FeedbackScale | None = None
     """How 606Ch and 6064h hang together: they are compared then, the speed limit watches both."""
-    brake_closed: bool = False
-    """The axis is held by its closed brake: beyond a limit a torque only becomes zero, and the
-    power goes a moment later. A quick stop would push against the brake."""
+    torque_off_only: bool = False
+    """Beyond a limit a torque only becomes zero, and the power goes a moment later. For an axis
+    that its closed brake holds, as a quick stop would push against the brake, and for pulses of a
+    motor whose phases are not known yet, as a quick stop would close a loop."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ def motion_of(trajectory: Trajectory, cycle_s: float) -> Motion:
             envelope.torque_max,
             envelope.following_error_max,
             envelope.feedback,
-            envelope.brake_closed,
+            envelope.torque_off_only,
         ),
         renew_cycles=max(1, math.ceil(trajectory.renew_s / cycle_s)),
         longest_step=longest_step(trajectory),

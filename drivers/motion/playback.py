@@ -190,7 +190,7 @@ class AxisLoop:
             self._set(TORQUE, 0)
             self.phase, self._brake_left = Phase.IDLE, 0
             self._brake_target = TORQUE
-            if motion.limits.brake_closed and why.cause in ENVELOPE_CAUSES:
+            if motion.limits.torque_off_only and why.cause in ENVELOPE_CAUSES:
                 self._let_go_at = self._cycles + max(1, round(LET_GO_S / self._cycle_s))
                 return
             self.goal = State.QUICK_STOP_ACTIVE

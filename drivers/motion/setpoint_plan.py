@@ -39,7 +39,7 @@ class Limits:
     torque_max: float | None = None
     following_error_max: float | None = None
     feedback: FeedbackScale | None = None
-    brake_closed: bool = False
+    torque_off_only: bool = False
     """A torque beyond a limit becomes zero without a quick stop."""
 
     def require_watched(self, inputs: Container[int], where: str) -> None:

@@ -114,16 +114,16 @@ def test_restoring_what_can_move_an_axis_takes_the_right_to_move(server: Guarded
         server.call(lambda key=key: drive.pending_restores.settle([key]))
 
 
-def test_nobody_can_say_that_a_brake_is_closed(server: GuardedServer) -> None:
-    """`Envelope.brake_closed` replaces a quick stop by torque zero: only the brake test may, which
-    has seen before that the brake holds."""
-    assert "brake_closed" not in json.dumps(server.interface)
+def test_no_request_replaces_a_quick_stop_by_torque_zero(server: GuardedServer) -> None:
+    """`Envelope.torque_off_only` is set by the brake test, which has seen before that the brake
+    holds, and by the first power, whose pulses end after degrees and may close no loop."""
+    assert "torque_off_only" not in json.dumps(server.interface)
     named = set()
     root = Path(__file__).parents[2]
     for file in (root / "backend").rglob("*.py"):
         tree = ast.parse(file.read_text())
-        if any((isinstance(node, ast.keyword) and node.arg == "brake_closed")
-               or (isinstance(node, ast.Attribute) and node.attr == "brake_closed")
+        if any((isinstance(node, ast.keyword) and node.arg == "torque_off_only")
+               or (isinstance(node, ast.Attribute) and node.attr == "torque_off_only")
                for node in ast.walk(tree)):  # fmt: skip
             named.add(file.relative_to(root).as_posix())
-    assert named == {"backend/tools/brake/run.py"}
+    assert named == {"backend/tools/brake/run.py", "backend/tools/first_power/run.py"}

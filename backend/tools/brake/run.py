@@ -221,7 +221,7 @@ async def _trial(
         for part, closed in ((slice(0, begins), False), (slice(begins, None), True)):
             low = 0.05 + 0.45 * number + (0.2 if closed else 0.0)
             done = share(run.progress, low, low + 0.22, step)
-            bounds = replace(limits, brake_closed=closed)
+            bounds = replace(limits, torque_off_only=closed)
             catch, halted = await _played(run, facts, raw[part], bounds, done)
             parts.append(_placed(catch, raw[part], phases[part], units, facts, direction, halted))
             if halted:

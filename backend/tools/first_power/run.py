@@ -227,7 +227,7 @@ async def _energised(run: Run, settings: FirstPowerSettings, pulses: list[Pulse]
     facts = await read_facts(axis, settings.rated_torque_nm)
     async with _without_loops(axis, settings):
         start = await axis.position_raw()
-        limits = replace(await bus_limits(axis, settings.envelope, start), brake_closed=True)
+        limits = replace(await bus_limits(axis, settings.envelope, start), torque_off_only=True)
         test = _Test(run, settings, units, start, limits, facts.rated_torque_nm, pulses)
         for direction in _WAYS:
             await test.direction(direction)

@@ -261,7 +261,7 @@ def test_torque_ends_with_a_quick_stop_because_no_torque_does_not_stop_an_axis()
 def test_against_a_closed_brake_a_torque_beyond_a_limit_only_becomes_zero() -> None:
     """A quick stop would push on; the power goes when no torque is left."""
     bench = Bench().enabled(mode=10)
-    limits = Limits(position_max=600, brake_closed=True)
+    limits = Limits(position_max=600, torque_off_only=True)
     bench.play([100] * 1000, target=0x6071, limits=limits)
     bench.step(5)
     assert bench.axis.outputs[3] == 100
@@ -281,7 +281,7 @@ def test_against_a_closed_brake_a_torque_beyond_a_limit_only_becomes_zero() -> N
 
 def test_against_a_closed_brake_every_other_end_is_a_quick_stop() -> None:
     bench = Bench().enabled(mode=10)
-    bench.play([100] * 1000, target=0x6071, limits=Limits(position_max=600, brake_closed=True))
+    bench.play([100] * 1000, target=0x6071, limits=Limits(position_max=600, torque_off_only=True))
     bench.step(5)
     bench.axis.stop(RELEASED)
     bench.step()
