@@ -33,7 +33,7 @@ COMMANDS = {
     ),
     "lss": (
         "lss:app",
-        "Node number and bit rate of a CANopen node that has none (CiA 305).",
+        "Node number and bit rate of a CANopen node that has none, or by its identity (CiA 305).",
     ),
     "params": ("params:app", "Read and write parameters on a bus, or by a running server."),
     "jog": (
@@ -80,7 +80,7 @@ COMMANDS = {
     "first-power": (
         "tools:first_power",
         "Before the first closed loop: supply, counts, direction, switches, brake and phase order. "
-        "The axis is energised with at most 10 % of torque and moves by 0.1 rev.",
+        "The axis is energised: at most 10 % of torque and 0.1 rev.",
     ),
     "health": (
         "health:app",

@@ -23,7 +23,8 @@ from profiles.importer.files import is_xml
 from profiles.schema import Profile
 
 app = typer.Typer(
-    no_args_is_help=True, help="The EEPROM of an EtherCAT drive: save, compare, restore, alias."
+    no_args_is_help=True,
+    help="The EEPROM of an EtherCAT drive: save, compare, restore, alias, identity.",
 )
 
 Size = Annotated[int | None, typer.Option(help="bytes, where a damaged EEPROM does not say")]

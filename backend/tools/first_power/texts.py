@@ -14,10 +14,9 @@ from backend.tools.tool import Chart, Line, Note, Row, Section
 TEXTS: dict[str, tuple[str, str]] = {
     "title": ("First power", "首次通电"),
     "help": (
-        "Before the first closed loop: supply, resolution, counts by a hand turn, direction, limit "
-        "switches, brake and phase order, with at most 10 % of torque and 0.1 rev.",
-        "首次闭环之前：电源、分辨率、手动转动计数、方向、限位开关、抱闸和相序，转矩不超过 10 %，"
-        "行程不超过 0.1 圈。",
+        "Before the first closed loop: supply, counts, direction, switches, brake and phase order. "
+        "The axis is energised: at most 10 % of torque and 0.1 rev.",
+        "首次闭环之前：电源、计数、方向、开关、抱闸和相序。轴将通电：转矩不超过 10 %，行程不超过 0.1 圈。",
     ),
     "lead": (
         "A checklist for a motor that no loop has been closed over yet. Small pulses of torque "

@@ -935,7 +935,7 @@ export interface paths {
         put?: never;
         /**
          * Start First-Power
-         * @description Before the first closed loop: supply, resolution, counts by a hand turn, direction, limit switches, brake and phase order, with at most 10 % of torque and 0.1 rev.
+         * @description Before the first closed loop: supply, counts, direction, switches, brake and phase order. The axis is energised: at most 10 % of torque and 0.1 rev.
          */
         post: operations["start_first-power"];
         delete?: never;
