@@ -16,7 +16,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     "help": (
         "Before the first closed loop: supply, counts, direction, switches, brake and phase order. "
         "The axis is energised: at most 10 % of torque and 0.1 rev.",
-        "首次闭环之前：电源、计数、方向、开关、抱闸和相序。轴将通电：转矩不超过 10 %，行程不超过 0.1 圈。",
+        "首次闭环之前：电源、计数、方向、开关、抱闸和相序。"
+        "轴将通电：转矩不超过 10 %，行程不超过 0.1 圈。",
     ),
     "lead": (
         "A checklist for a motor that no loop has been closed over yet. Small pulses of torque "
