@@ -296,4 +296,4 @@ def test_only_stop_brakes_without_a_grant() -> None:
                 # Also a mention that is no call: a bound method can be handed on.
                 if isinstance(node, ast.Attribute) and node.attr == "stop_by":
                     found.add(path.relative_to(house).parent.as_posix())
-    assert found == {"backend/stopping"}
+    assert found == {"backend/stopping", "backend/axis/stop"}
