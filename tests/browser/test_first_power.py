@@ -62,9 +62,10 @@ def test_exchanged_phases_are_found_and_named(page: Page, station: Station) -> N
     start = page.get_by_role("button", name="Go through the checklist")
     # Nothing starts before somebody has stated what hangs at the axis.
     expect(start).to_be_disabled()
-    page.get_by_label("No load pulls at this axis", exact=True).check()
+    nothing_hangs = page.get_by_label("No load pulls at this axis", exact=True)
+    nothing_hangs.check()
     expect(start).to_be_enabled()
-    tuning.run_job(page, station, axis, "Go through the checklist")
+    tuning.run_job(page, station, axis, "Go through the checklist", nothing_hangs.check)
     checks = page.get_by_role("list", name="Check").get_by_role("listitem")
     expect(checks).to_have_count(7)
     expect(
@@ -72,7 +73,7 @@ def test_exchanged_phases_are_found_and_named(page: Page, station: Station) -> N
     ).to_be_visible()
     expect(page.get_by_text("Do not close a loop over this motor yet")).to_be_visible()
     # The statement was for this run only.
-    expect(page.get_by_label("No load pulls at this axis", exact=True)).not_to_be_checked()
+    expect(nothing_hangs).not_to_be_checked()
     jobs = tuning.answered(station, "/jobs")
     found = next(job["result"] for job in jobs if job["kind"] == "first-power")
     assert found["travel_rev"] <= 0.1

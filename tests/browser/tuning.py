@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -89,10 +89,17 @@ BUSY = ("in time", "no longer answers", "does not answer", "came back", "EtherCA
 _TRIES = 3
 
 
-def run_job(page: Page, station: Station, axis: str, button: str) -> None:
-    """Press a button that starts a job on the axis, and wait for the job's good end."""
+def run_job(
+    page: Page, station: Station, axis: str, button: str, state: Callable[[], None] | None = None
+) -> None:
+    """Press a button that starts a job on the axis, and wait for the job's good end.
+
+    ``state`` makes the statements that each run asks for anew.
+    """
     reported = ""
     for _ in range(_TRIES):
+        if state is not None:
+            state()
         page.get_by_role("button", name=button, exact=True).click()
         progress = page.locator(".job")
         expect(progress.first).to_be_visible(timeout=60_000)
