@@ -11,7 +11,7 @@ from profiles.language.overlay import load_overlay, parse_overlay
 from profiles.language.texts import Kind, check_overlay, translations, untranslated
 from profiles.loader import ProfileError
 
-FAMILIES = ("mms7", "ds_c", "ep3e", "m6l", "r6l", "generic402")
+FAMILIES = ("mms7", "ds_c", "ep3e", "m6l", "r6l")
 COMPLETE: tuple[Kind, ...] = ("safety", "faults", "procedures")
 #: Wrong terms of the term base, with the right one.
 FORBIDDEN = {
@@ -83,4 +83,4 @@ def test_text_given_in_two_files_is_refused() -> None:
 
 
 def test_family_without_an_overlay_has_no_translations() -> None:
-    assert translations(load_profile("generic402"), load_overlay("another-drive", "zh")) == {}
+    assert translations(load_profile("generic402"), load_overlay("generic402", "zh")) == {}
