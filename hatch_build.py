@@ -40,12 +40,12 @@ def system_node() -> Path | None:
     if node is None or shutil.which("npm") is None:
         return None
     try:
-        told = subprocess.run(
+        reported = subprocess.run(
             [node, "--version"], capture_output=True, text=True, check=True, timeout=30
         )
     except (OSError, subprocess.SubprocessError):
         return None
-    return Path(node) if node_is_suitable(told.stdout.strip()) else None
+    return Path(node) if node_is_suitable(reported.stdout.strip()) else None
 
 
 class PageBuildHook(BuildHookInterface[Any]):

@@ -4,7 +4,7 @@
 
 Every seed is one axis (no to three resonances, close together or hardly damped, inertia ratio up
 to 80, friction, gravity, encoders from 2500 lines up) behind one bus (hold and delay of up to 2.5
-cycles, current loop and speed filter told or not). The excitation and the evaluation are the
+cycles, current loop and speed filter showed or not). The excitation and the evaluation are the
 product's. Printed is what misses the table of tuning.md, section 2, with its figures.
 """
 

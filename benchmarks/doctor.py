@@ -155,11 +155,11 @@ async def table(namespace: Namespace, cases: tuple[Case, ...] = CASES) -> list[t
     found: list[tuple[Case, str]] = []
     for case in cases:
         try:
-            told = await first_cause(namespace, case)
+            reported = await first_cause(namespace, case)
         except DriveError as error:
-            told = f"({error.kind})"
-        found.append((case, told))
-        _show(case, told)
+            reported = f"({error.kind})"
+        found.append((case, reported))
+        _show(case, reported)
     return found
 
 
@@ -176,9 +176,9 @@ async def table_of_can(cases: tuple[CanCase, ...] = CAN_CASES) -> list[tuple[Can
     return found
 
 
-def _show(case: Case | CanCase, told: str) -> None:
-    mark = "right" if told == case.cause else "WRONG"
-    print(f"{mark:6} {case.how:5} {case.name:40} {case.cause:24} {told}", flush=True)
+def _show(case: Case | CanCase, reported: str) -> None:
+    mark = "right" if reported == case.cause else "WRONG"
+    print(f"{mark:6} {case.how:5} {case.name:40} {case.cause:24} {reported}", flush=True)
 
 
 def main() -> int:
@@ -209,8 +209,8 @@ def _canopen(options: argparse.Namespace) -> int:
 
 
 def _verdict(bus: str, found: Sequence[tuple[Case | CanCase, str]]) -> int:
-    right = sum(told == case.cause for case, told in found)
-    real = [(case, told) for case, told in found if case.how == "real"]
+    right = sum(reported == case.cause for case, reported in found)
+    real = [(case, reported) for case, reported in found if case.how == "real"]
     print(f"{bus}: {right} of {len(found)} first diagnoses are right "
           f"({sum(t == c.cause for c, t in real)} of {len(real)} real ones)")  # fmt: skip
     return 0 if right >= _NEEDED * len(found) else 1

@@ -82,12 +82,16 @@ async def ours(
                 *(link.read_many(station, addresses) for station in range(1, drives + 1))
             )
             times.append(time.perf_counter() - began)
-            told = [a for answer in answers for a in answer]
-            failed = [a for a in told if isinstance(a, DriveError) and not isinstance(a, NotInUse)]
+            reported = [a for answer in answers for a in answer]
+            failed = [
+                a for a in reported if isinstance(a, DriveError) and not isinstance(a, NotInUse)
+            ]
             assert not failed, failed[0]
     finally:
         await link.close()
-    used = [a for a, told in zip(addresses, answers[0], strict=True) if isinstance(told, bytes)]
+    used = [
+        a for a, reported in zip(addresses, answers[0], strict=True) if isinstance(reported, bytes)
+    ]
     return times, used
 
 

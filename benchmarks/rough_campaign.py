@@ -290,9 +290,9 @@ def table(tallies: dict[str, Tally]) -> str:
             whole.held[name] += rows
         lines.append(_row(kind, tally))
     lines.append(_row("all", whole))
-    told = [f"FALSE {each}" for each in whole.false]
-    told += [f"REJECTED THOUGH SOUND {each}" for each in whole.rejected]
-    return "\n".join([*lines, *told])
+    reported = [f"FALSE {each}" for each in whole.false]
+    reported += [f"REJECTED THOUGH SOUND {each}" for each in whole.rejected]
+    return "\n".join([*lines, *reported])
 
 
 def _row(kind: str, tally: Tally) -> str:

@@ -63,8 +63,8 @@ NICE = -10
 CLIENT_PRIORITY = 1
 #: From the bus to what a page says of it, at most.
 SHOWN_S = 1.0
-#: A page that slept is told of what it missed, less what waited for it in queues and sockets.
-TOLD_PART = 0.8
+#: A page that slept is informed of what it missed, less what waited for it in queues and sockets.
+REPORTED_PART = 0.8
 
 
 def bench_text() -> str:
@@ -101,10 +101,10 @@ def station_process(folder: Path) -> Iterator[tuple[httpx.Client, int, str]]:
     assert child.stdin is not None
     assert child.stdout is not None
     try:
-        told = json.loads(child.stdout.readline())
-        url = f"http://127.0.0.1:{told['port']}"
+        reported = json.loads(child.stdout.readline())
+        url = f"http://127.0.0.1:{reported['port']}"
         with httpx.Client(base_url=f"{url}/api/v1", timeout=60) as http:
-            yield http, int(told["pid"]), url
+            yield http, int(reported["pid"]), url
     finally:
         child.stdin.close()
         child.wait(30)
@@ -232,12 +232,12 @@ def open_scope(page: Page, url: str, drives: list[str]) -> None:
 class Chromium:
     """A browser that runs by itself; it is only looked into while its `attached` is entered.
 
-    Whatever stays attached is told of every frame of its sockets, gigabytes in half an hour.
+    Whatever stays attached is informed of every frame of its sockets, gigabytes in half an hour.
     """
 
     def __init__(self, folder: Path) -> None:
         program = shutil.which("chromium") or "/usr/bin/chromium"
-        self._told = folder / "DevToolsActivePort"
+        self._reported = folder / "DevToolsActivePort"
         folder.mkdir()
         ordinary = []
         if os.geteuid() == 0:  # root's Chromium gives its threads nice -8, next to the server's
@@ -255,7 +255,7 @@ class Chromium:
     def attached(self) -> Iterator[Browser]:
         """The browser, for as long as this is entered."""
         deadline = time.monotonic() + 30
-        while not self._told.exists() or not (lines := self._told.read_text().splitlines()):
+        while not self._reported.exists() or not (lines := self._reported.read_text().splitlines()):
             if time.monotonic() > deadline:
                 raise TimeoutError("Chromium did not start within 30 s")
             time.sleep(0.05)
@@ -314,10 +314,10 @@ class View:
 
     def _read(self, page: Page) -> tuple[int, int, int]:
         before = int(cycle_figures(self._http)["cyclic_overruns"])
-        time.sleep(2 * SHOWN_S)  # the page shows what the bus told
-        told = lost(page)
+        time.sleep(2 * SHOWN_S)  # the page shows what the bus reported
+        reported = lost(page)
         time.sleep(SHOWN_S)
-        return before, told, int(cycle_figures(self._http)["cyclic_overruns"])
+        return before, reported, int(cycle_figures(self._http)["cyclic_overruns"])
 
 
 def disk_figures(path: Path) -> tuple[int, int, int]:
@@ -416,8 +416,8 @@ def soak(http: httpx.Client, server: int, url: str, folder: Path, browsers: list
             info["state"] == "complete" and missing == 0),
         Aim(f"the page that was awake lost {max(least, 0)} rows beyond those that the bus left "
             "out, none", least <= 0),
-        Aim(f"the page that slept was told of {views[1]} lost rows of about {missed:.0f}",
-            TOLD_PART * missed <= views[1] <= missed / TOLD_PART),
+        Aim(f"the page that slept was informed of {views[1]} lost rows of about {missed:.0f}",
+            REPORTED_PART * missed <= views[1] <= missed / REPORTED_PART),
         Aim(f"the server's memory grew by {grown:.1f} MiB, at most {FLAT_MIB:.0f}",
             grown <= FLAT_MIB),
         Aim(f"GET /drives p99 {p99:.1f} ms, below 50 ms", bool(p99 < 50)),

@@ -153,7 +153,7 @@ def _modes(found: SweepResult, spec: MechanicsSpec, highest_hz: float) -> str:
     return text + (f" extra {','.join(extra)} Hz" if extra else "")
 
 
-def _told(name: str, part: Errors, limits: tuple[float, float]) -> str:
+def _reported(name: str, part: Errors, limits: tuple[float, float]) -> str:
     db, deg = limits
     if part.lines == 0:
         return f"{name} withheld"
@@ -191,10 +191,10 @@ async def _frequency(rig: Rig, spec: MechanicsSpec) -> str:
         top, limits = 1000.0, (0.3, 3.0)
     else:
         top, limits = (250 * rig.khz, (0.3, 2.0)) if free else (200 * rig.khz, (0.4, 3.0))
-    parts = _told("direct", errors(found.direct, spec, 5, top, truth), limits)
+    parts = _reported("direct", errors(found.direct, spec, 5, top, truth), limits)
     if rig.khz < 4:
         above = errors(found.frf, spec, 250 * rig.khz, 400 * rig.khz, truth)
-        parts += " " + _told("model above", above, (0.6, 4.0))
+        parts += " " + _reported("model above", above, (0.6, 4.0))
     if truth is not None:
         closed = errors(found.direct, spec, 5, top)
         parts += f" (without play {closed.magnitude_db:.2f} dB {closed.phase_deg:.2f}°)"

@@ -93,7 +93,7 @@ _STATES = (
 
 
 def decode_state(status_word: int, *, echoes_control: bool = False) -> State:
-    """State told by a status word.
+    """State shown by a status word.
 
     ``echoes_control``: the family's bits 0–2 repeat the control word and bit 7 is the alarm
     (manual 003:300-305).

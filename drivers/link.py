@@ -18,8 +18,8 @@ import numpy.typing as npt
 from drivers.cia402 import State
 from drivers.dictionary import Described
 from drivers.errors import DriveError, NotAllowed
+from drivers.feedback import FeedbackScale
 from drivers.halt import LoopState
-from drivers.motion.feedback import FeedbackScale
 from drivers.texts.message import Text
 from profiles.schema import DataType, LinkKind, Profile
 
@@ -176,7 +176,7 @@ class Link(Protocol):
         """Counters for one station or the whole bus. Never blocks."""
 
     def listen(self, listener: Callable[[LinkEvent], None]) -> Unsubscribe:
-        """Be told of events, on the event loop's thread."""
+        """Be notified of events, on the event loop's thread."""
 
 
 @runtime_checkable

@@ -19,7 +19,7 @@ from backend.api.audit.audited import AuditedAnswers
 from backend.api.described import DescribedApp
 from backend.api.drive import functions as routes_functions
 from backend.api.drive import motion_class as routes_motion_class
-from backend.api.drive import restore as routes_owed
+from backend.api.drive import restore as routes_pending
 from backend.api.drive import routes as routes_drive
 from backend.api.drive import scales as routes_scales
 from backend.api.drive import terminals as routes_io
@@ -52,10 +52,10 @@ from backend.api.tuning import measure as routes_tune
 from backend.functions.forcing import ForcingSessions
 from backend.people.station import People
 from backend.recording.rerun_assets import ViewerAssets
-from backend.recording.rerun_feed import RerunFeed
-from backend.recording.service import Recordings
 from backend.scene.feed import SceneFeed
 from backend.station.bench import Bench
+from backend.station.recording.rerun_feed import RerunFeed
+from backend.station.recording.service import Recordings
 from drivers.computer import scheduling
 
 PREFIX = "/api/v1"
@@ -81,7 +81,7 @@ _PROBLEMS = (
 _PARTS = (
     routes_bench,
     routes_drive,
-    routes_owed,
+    routes_pending,
     routes_ethercat,
     routes_doctor,
     routes_flight,

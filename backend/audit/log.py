@@ -218,7 +218,7 @@ class AuditLog:
         )  # fmt: skip
         return [body_of(fact, moment=datetime.now(UTC), station=self.station, person=PROGRAM)]
 
-    def _succeeded(self, batch: list[str], lost_told: bool) -> None:
+    def _succeeded(self, batch: list[str], lost_reported: bool) -> None:
         self._unsure.difference_update(batch)
         with self._wake:
             queue = self._queue
@@ -227,7 +227,7 @@ class AuditLog:
             emptied = 0 < queue.spooled <= len(batch)
             queue.kept += max(0, len(batch) - queue.spooled)
             queue.spooled = max(0, queue.spooled - len(batch))
-            if lost_told:
+            if lost_reported:
                 queue.kept += queue.lost
                 queue.lost, queue.lost_since = 0, ""
             self._resolve()

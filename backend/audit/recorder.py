@@ -34,7 +34,7 @@ class _Sent:
 
 @dataclass(slots=True)
 class _Running:
-    """A job that was told to have begun. ``drive`` is the axis that it moves, None for others."""
+    """A job whose begin was recorded. ``drive`` is the axis that it moves, None for others."""
 
     drive: str | None
     sent: dict[str, _Sent] = field(default_factory=dict)
@@ -93,7 +93,7 @@ class AuditRecorder:
     def commanded(self, record: CommandRecord) -> None:
         """A control word or setpoint was sent, or may have been.
 
-        What a motion sends, many a second, is told with its end. Anything else is told at once,
+        What a motion sends, many a second, is recorded with its end. All else is recorded at once,
         and again only when it changes: words that STOP repeats are one event.
         """
         motion = next((j for j in self._running.values() if j.drive == record.drive), None)
@@ -179,7 +179,7 @@ class AuditRecorder:
         )
 
     def stopped(self, drives: Sequence[str]) -> None:
-        """Somebody pressed STOP. Told when it is sent: nothing waits for this."""
+        """Somebody pressed STOP. Reported when it is sent: nothing waits for this."""
         for drive in drives:
             self._audit.add(
                 Fact("stop", "pressed", axis=self._name_of(drive), detail={"drive": drive})

@@ -16,13 +16,13 @@ from backend.axis import restoring
 from backend.axis.cyclic import CyclicSession
 from backend.axis.restoring import CLEANUP_TIMEOUT_S, shielded
 from backend.axis.scaled import ScaledAxis
+from backend.axis.stop.quick_stop import quick_stop_keys, raise_quick_stop
 from backend.drive.drive import Drive
 from backend.drive.optional import existing, torque_limits
 from backend.motion.authority import UNATTENDED_S
 from backend.motion.envelope import Envelope
 from backend.motion.grant import Grant
 from backend.people.identity import acting
-from backend.stopping.quick_stop import quick_stop_keys, raise_quick_stop
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, OutOfRange, ProtocolError
@@ -44,7 +44,7 @@ class Axis(ScaledAxis):
         #: The page by which it was left enabled; None where it was no page.
         self.enabled_by: str | None = None
         self._standing: Grant | None = None
-        #: Told why, when nobody may leave the axis enabled any longer; power is to be taken off.
+        #: Called with the reason when the axis must not stay enabled; power is to be taken off.
         self.unattended: Callable[[Text], None] = lambda _why: None
 
     @property

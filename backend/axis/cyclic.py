@@ -152,8 +152,8 @@ class CyclicSession:
         """Raw values of the last cycle, of those keys that the drive sends with every cycle."""
         if not self.running or not isinstance(self.cyclic, TellsNewest):
             return {}
-        told = {drive.key(role) for role in INPUT_ROLES}
-        names = {channel(drive, key): key for key in keys if key in told}
+        reported = {drive.key(role) for role in INPUT_ROLES}
+        names = {channel(drive, key): key for key in keys if key in reported}
         return {names[name]: raw for name, raw in self.cyclic.newest(list(names), within_s).items()}
 
     def subscribe(

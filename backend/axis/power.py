@@ -12,6 +12,9 @@ from backend.axis import loop
 from backend.axis.causes import hints
 from backend.axis.cyclic import CyclicSession
 from backend.axis.restoring import shielded
+from backend.axis.stop.braking import brake_then_quick_stop, quick_stop_coasts
+from backend.axis.stop.facts import StepCode, StopStep
+from backend.axis.stop.settings import settings_keys
 from backend.drive.drive import Drive
 from backend.drive.faults import read_active_faults
 from backend.drive.ports import address_of
@@ -19,9 +22,6 @@ from backend.motion.authority import Ended
 from backend.motion.envelope import Envelope
 from backend.motion.grant import Grant
 from backend.motion.stopping import stops
-from backend.stopping.braking import brake_then_quick_stop, quick_stop_coasts
-from backend.stopping.facts import StepCode, StopStep
-from backend.stopping.settings import settings_keys
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.codec import encode

@@ -53,7 +53,7 @@ async def restoring(drive: Drive, *keys: str) -> AsyncIterator[dict[str, Raw]]:
 
 
 async def _put_back(drive: Drive, before: dict[str, Raw], earlier: BaseException | None) -> None:
-    """Restore; what failed before is told as well, it may be an inner restore."""
+    """Restore; what failed before is reported as well, it may be an inner restore."""
     name = drive.name
     try:
         await _to_its_end(lambda: _restore(drive, before), CLEANUP_TIMEOUT_S, name)

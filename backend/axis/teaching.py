@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from backend.axis.axis import Axis
-from backend.scales.resolve import read_told
+from backend.scales.resolve import read_reported
 from backend.scales.taught import Taught
 from backend.scales.units_found import nearest_unit
 from drivers.errors import NotAllowed, OutOfRange
@@ -16,7 +16,7 @@ _MOST_REV = 1e6
 async def confirmed(axis: Axis, turned_rev: float) -> Taught:
     """The scales after the last small move, of which a person says how far the shaft turned.
 
-    The speed's unit is the usual one that 606Ch told in meanwhile; where it told nothing, or in a
+    The speed's unit is the usual one that fits 606Ch meanwhile; where 606Ch showed nothing, or in a
     factor that is no usual unit, it stays as it was.
 
     Raises:
@@ -28,7 +28,7 @@ async def confirmed(axis: Axis, turned_rev: float) -> Taught:
         raise NotAllowed("axis.no-small-move-made", drive=drive.name)
     if not _LEAST_REV <= abs(turned_rev) <= _MOST_REV:
         raise OutOfRange(
-            "axis.rev-cannot-told-eye",
+            "axis.rev-cannot-reported-eye",
             drive=drive.name,
             value=turned_rev,
             limit=f"at least {_LEAST_REV:g} rev",
@@ -46,7 +46,7 @@ async def confirmed(axis: Axis, turned_rev: float) -> Taught:
         raw_per_rpm=per_rpm,
         raw_per_rpm_s=before.raw_per_rpm_s if before is not None else None,
         velocity_origin="user" if unit is None else "measured",
-        bound_to=dict((await read_told(drive)).raws),
+        bound_to=dict((await read_reported(drive)).raws),
     )
 
 
@@ -75,5 +75,5 @@ async def stated(
         raw_per_rpm=raw_per_rpm or before.raw_per_rpm,
         raw_per_rpm_s=raw_per_rpm_s or before.raw_per_rpm_s,
         velocity_origin="user" if raw_per_rpm is not None else before.velocity_origin,
-        bound_to=dict((await read_told(axis.drive)).raws),
+        bound_to=dict((await read_reported(axis.drive)).raws),
     )

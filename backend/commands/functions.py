@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from backend.commands import local_functions, remote_functions
 from backend.commands.function_answers import Faults, Gear, Terminal, of_plan
 from backend.commands.options import Json, Place, Profile, Server, Station, Url, place
-from backend.commands.session import run, told
+from backend.commands.session import reporting_errors, run
 from backend.functions.regeneration import BrakingCycle, BrakingLimits, Resistor
 from backend.functions.regeneration import braking as braking_of
 from backend.scales.gear_calculator import Mechanics, plan_gear
@@ -86,7 +86,7 @@ def faults(
     run(work)
 
 
-@told
+@reporting_errors
 def gear_command(
     drive: Annotated[str, typer.Argument(help="drive family, or a bus URL with --station")],
     kind: Annotated[Literal["screw", "belt", "rack", "rotary"], typer.Option()],
@@ -144,7 +144,7 @@ def _show(plan: Gear) -> None:
             print(f"  {key} waits for {why}")
 
 
-@told
+@reporting_errors
 def braking(
     inertia: Annotated[float, typer.Option(help="motor and load, kg·m²")],
     speed: Annotated[float, typer.Option(help="before braking, rpm")],

@@ -16,14 +16,14 @@ from backend.audit.chain import Anchor
 from backend.audit.export_check import check_lines
 from backend.audit.trail import Filter
 from backend.commands.options import Json
-from backend.commands.session import told
+from backend.commands.session import reporting_errors
 from backend.commands.state import chosen_folder, state_folder
+from backend.library.backup.backup import make_backup
+from backend.library.backup.restore import restore as restore_archive
 from backend.library.entries import KINDS, Kind, Query
 from backend.parameters import set_file as parameter_set
 from backend.people.identity import LOCAL, Actor, acting
 from backend.station.records import Records
-from backend.store.backup import make_backup
-from backend.store.restore import restore as restore_archive
 from backend.work.journal import Journal
 from drivers.errors import NotAllowed
 
@@ -73,7 +73,7 @@ def _existing(config: Path | None, database: str | None, blobs: str | None = Non
 # --- backup ------------------------------------------------------------------------------
 
 
-@told
+@reporting_errors
 def backup(
     archive: Annotated[Path, typer.Argument(help="zip file to write")],
     config: Config = None,
@@ -89,7 +89,7 @@ def backup(
     print(f"{archive}: {len(parts)} files, {size} bytes, each with its checksum")
 
 
-@told
+@reporting_errors
 def restore(
     archive: Annotated[Path, typer.Argument(help="zip file of `servodeck backup`")],
     config: Config = None,
@@ -115,7 +115,7 @@ def restore(
 
 
 @audit.command("verify")
-@told
+@reporting_errors
 def verify(
     config: Config = None,
     database: Database = None,
@@ -150,7 +150,7 @@ def _anchor(text: str) -> Anchor | None:
 
 
 @audit.command("export")
-@told
+@reporting_errors
 def export(
     config: Config = None,
     database: Database = None,
@@ -181,7 +181,7 @@ def export(
 
 
 @library.command("list")
-@told
+@reporting_errors
 def list_(
     words: Annotated[list[str] | None, typer.Argument(help="all must occur")] = None,
     config: Config = None,
@@ -223,7 +223,7 @@ def _kinds(name: str) -> tuple[Kind, ...]:
 
 
 @library.command("export")
-@told
+@reporting_errors
 def export_set(
     name: str,
     config: Config = None,
@@ -243,7 +243,7 @@ def export_set(
 
 
 @library.command("import")
-@told
+@reporting_errors
 def import_sets(
     files: list[Path],
     config: Config = None,
@@ -263,7 +263,7 @@ def import_sets(
 
 
 @library.command("purge")
-@told
+@reporting_errors
 def purge(
     config: Config = None,
     database: Database = None,

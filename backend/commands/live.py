@@ -123,7 +123,7 @@ async def _page(server: str) -> AsyncIterator[ClientConnection]:
         raise LinkLost("command.live-connection-failed", server=server, cause=str(error)) from error
 
 
-def _told(message: str) -> Hello | JogEnded | ScopeInfo | None:
+def _reported(message: str) -> Hello | JogEnded | ScopeInfo | None:
     """What a message says, None where it is about something else; a refusal is raised."""
     try:
         news = _News.validate_json(message)
@@ -137,7 +137,7 @@ def _told(message: str) -> Hello | JogEnded | ScopeInfo | None:
 async def _next(page: ClientConnection, kind: type[Hello | JogEnded]) -> Hello | JogEnded:
     """The next message of this kind; a refusal is raised."""
     async for message in page:
-        if not isinstance(message, bytes) and isinstance(news := _told(message), kind):
+        if not isinstance(message, bytes) and isinstance(news := _reported(message), kind):
             return news
     raise LinkLost("command.server-ended-live-connection")
 
@@ -234,7 +234,7 @@ async def _record(
                     for block in decode(message):
                         into.add(block)
                     continue
-                if isinstance(news := _told(message), ScopeInfo):
+                if isinstance(news := _reported(message), ScopeInfo):
                     if news.problem is not None:
                         raise NotAllowed(news.problem.detail, remedy=news.problem.remedy)
                     into.head(news)

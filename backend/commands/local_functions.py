@@ -58,8 +58,8 @@ async def gear(place: Place, mechanics: Mechanics, *, write: bool) -> Gear:
     async with drive_at(place.url, place.station, place.profile) as drive:
         axis = Axis(drive)
         plan = await gears.plan(axis, mechanics)
-        told = of_plan(plan)
+        reported = of_plan(plan)
         if not write:
-            return told
+            return reported
         change = await gears.write_gear(axis, plan.values)
-    return told._replace(before=change.before, waits=change.waits)
+    return reported._replace(before=change.before, waits=change.waits)

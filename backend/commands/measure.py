@@ -120,7 +120,7 @@ def sweep(
             )
 
     where = Where(url, station, profile, server, axis)
-    measure(where, "sweep", here, limits | more, out, _told, as_json=as_json)
+    measure(where, "sweep", here, limits | more, out, _reported, as_json=as_json)
 
 
 @asynccontextmanager
@@ -193,7 +193,7 @@ class Where(NamedTuple):
 
 def measure(
     where: Where, kind: str, here: Callable[[], Awaitable[Answer]], request: Answer,
-    out: Path | None, told: Callable[[Answer], list[str]], *, as_json: bool,
+    out: Path | None, reported: Callable[[Answer], list[str]], *, as_json: bool,
 ) -> None:  # fmt: skip
     """Measure by a server or ``here``, write and show the result.
 
@@ -208,13 +208,13 @@ def measure(
             async with remote(server) as at:
                 drive = await where.drive(at)
                 answer = await at.result(f"/drives/{drive.id}/jobs/{kind}", request)
-        show(answer, out, told, as_json=as_json)
+        show(answer, out, reported, as_json=as_json)
 
     run_in_order(work)
 
 
 def show(
-    answer: Answer, out: Path | None, told: Callable[[Answer], list[str]], *, as_json: bool
+    answer: Answer, out: Path | None, reported: Callable[[Answer], list[str]], *, as_json: bool
 ) -> None:
     """Write a result to ``out``, and print it as JSON or in words."""
     if out is not None:
@@ -222,13 +222,13 @@ def show(
     if as_json:
         print(json.dumps(answer, indent=1))
         return
-    for line in told(answer):
+    for line in reported(answer):
         print(line)
     if out is not None:
         print(f"written: {out}")
 
 
-def _told(answer: Answer) -> list[str]:
+def _reported(answer: Answer) -> list[str]:
     rows, warnings = answer["resonances"], answer["warnings"]
     lines = [
         f"{row['kind']:14} {row['frequency_hz']:8.1f} Hz  damping {row['damping']:.3f}"

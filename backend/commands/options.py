@@ -8,7 +8,7 @@ import typer
 
 from drivers.urls import parse_url
 
-#: Where `servodeck demo` and `servodeck serve` listen unless told otherwise.
+#: Where `servodeck demo` and `servodeck serve` listen unless set otherwise.
 DEFAULT_SERVER = "http://127.0.0.1:8420"
 
 Url = Annotated[str, typer.Argument(metavar="BUS_URL")]

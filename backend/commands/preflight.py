@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from backend.commands.session import told
+from backend.commands.session import reporting_errors
 from backend.commands.state import state_folder
 from backend.preflight import kept
 from backend.preflight.findings import Effect, Fix
@@ -23,7 +23,7 @@ from drivers.errors import OutOfRange
 _BAR = 40
 
 
-@told
+@reporting_errors
 def preflight_command(
     interface: Annotated[
         str, typer.Argument(help="Network interface for EtherCAT, as eth0; frames go out there.")

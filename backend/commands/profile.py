@@ -16,7 +16,7 @@ import typer
 from backend.audit import Fact
 from backend.audit.facts import Value
 from backend.commands.keep import station_records
-from backend.commands.session import opened, show_progress, told
+from backend.commands.session import opened, reporting_errors, show_progress
 from backend.station.description import profile_of_drive
 from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
@@ -41,7 +41,7 @@ app = typer.Typer(help="Drive profiles: show, check, import.")
 
 
 @app.command("show")
-@told
+@reporting_errors
 def show(
     drive: str, as_json: Annotated[bool, typer.Option("--json", help="one stable form")] = False
 ) -> None:
@@ -89,7 +89,7 @@ def _check_name(name: str | None) -> None:
 
 
 @app.command("import")
-@told
+@reporting_errors
 def import_description(
     file: Annotated[Path, typer.Argument(help="ESI (.xml), EDS or DCF file")],
     name: Annotated[str | None, typer.Option(help="name of the new profile")] = None,
@@ -131,7 +131,7 @@ def import_description(
 
 
 @app.command("from-drive")
-@told
+@reporting_errors
 def import_from_drive(
     url: Annotated[str, typer.Argument(metavar="BUS_URL")],
     name: Annotated[str, typer.Option(help="name of the new profile")],
@@ -157,7 +157,7 @@ def import_from_drive(
 
 
 @app.command("classify")
-@told
+@reporting_errors
 def classify_object(
     drive: Annotated[str, typer.Argument(help="an imported profile")],
     key: Annotated[str, typer.Argument(help="key of the object, for example 2005:01")],
@@ -196,13 +196,13 @@ def classify_object(
             str(error), parameter=key, remedy="see docs/drives/not-listed.md"
         ) from error
     records = station_records(config, database)
-    told_as: dict[str, Value] = {
+    reported_as: dict[str, Value] = {
         "reason": now.motion_reason,
         "safe_in_motion": now.safe_in_motion,
     }
     target = f"/profiles/{drive}/parameters/{now.key}/motion"
     records.audit.add(
-        Fact("station", "changed", target=target, old=before, new=now.motion, detail=told_as)
+        Fact("station", "changed", target=target, old=before, new=now.motion, detail=reported_as)
     )
     records.audit.close()
     records.store.close()
@@ -210,7 +210,7 @@ def classify_object(
 
 
 @app.command("export-eds")
-@told
+@reporting_errors
 def export_description(
     drive: str, out: Annotated[Path, typer.Argument(help="the EDS file to write")]
 ) -> None:

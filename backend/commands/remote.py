@@ -85,10 +85,10 @@ class Remote:
             await asyncio.shield(self.raw("DELETE", f"/jobs/{job.id}"))
             raise
         if job.state != "done":
-            told = job.problem
+            reported = job.problem
             raise NotAllowed(
-                told.detail if told else f"{job.title}: the job was {job.state}",
-                remedy=told.remedy if told else None,
+                reported.detail if reported else f"{job.title}: the job was {job.state}",
+                remedy=reported.remedy if reported else None,
             )
         if isinstance(job.result, BaseModel):
             return job.result.model_dump(mode="json")
@@ -163,7 +163,7 @@ def authorisation() -> dict[str, str]:
 
 def _problem(answer: httpx.Response) -> DriveError:
     try:
-        told = Problem.model_validate_json(answer.content)
+        reported = Problem.model_validate_json(answer.content)
     except ValidationError:
         return DriveError("command.server-says", status_code=answer.status_code)
-    return DriveError(told.detail or told.title, remedy=told.remedy)
+    return DriveError(reported.detail or reported.title, remedy=reported.remedy)

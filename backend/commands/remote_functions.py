@@ -13,13 +13,13 @@ from backend.scales.gear_calculator import Mechanics
 async def terminals(place: Place) -> list[Terminal]:
     """All terminals, read now."""
     async with remote_drive(place) as (at, drive):
-        told = await at.ask("GET", f"/drives/{drive.id}/io", IoInfo)
+        reported = await at.ask("GET", f"/drives/{drive.id}/io", IoInfo)
     return [
         Terminal(
             state.name, state.direction, state.on, state.function, state.function_name,
             state.inverted, state.same_function,
         )
-        for state in told.terminals
+        for state in reported.terminals
     ]  # fmt: skip
 
 
@@ -51,11 +51,11 @@ async def gear(place: Place, mechanics: Mechanics, *, write: bool) -> Gear:
     async with remote_drive(place) as (at, drive):
         here = f"/drives/{drive.id}/gear"
         plan = await at.ask("POST", f"{here}/plan", GearPlanInfo, body=body)
-        told = Gear(
+        reported = Gear(
             [(value.key, value.name, value.raw) for value in plan.values],
             plan.travel_per_motor_turn, plan.unit, plan.reached, plan.error_ppm, plan.warnings,
         )  # fmt: skip
         if not write:
-            return told
+            return reported
         done = await at.ask("POST", f"{here}/write", GearWritten, body=body)
-    return told._replace(before=done.before, waits=done.waits)
+    return reported._replace(before=done.before, waits=done.waits)

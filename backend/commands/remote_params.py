@@ -132,10 +132,10 @@ async def _differences(
         "PUT", f"/sets/{quote(file.name)}", StoredSet, content=data, query={"overwrite": "true"}
     )
     query = {"file": kept.file, "version": str(kept.version)}
-    told = await at.ask("GET", f"/drives/{drive.id}/diff", Diff, query=query)
-    for warning in told.warnings:
+    reported = await at.ask("GET", f"/drives/{drive.id}/diff", Diff, query=query)
+    for warning in reported.warnings:
         print(f"note: {warning}", file=sys.stderr)
-    rows = [row for row in told.rows if row.status not in ("same", "not_in_file")]
+    rows = [row for row in reported.rows if row.status not in ("same", "not_in_file")]
     return kept, [
         Compared(
             row.key, row.name or "?", row.unit, row.drive_raw, row.drive_value, row.file_raw,

@@ -124,7 +124,7 @@ def import_(
     with reported():
         answer = evaluate_file(_bytes(file), file.name, settings)
         write_atomically(out, json.dumps(answer, indent=1).encode())
-    for line in _told(answer):
+    for line in _reported(answer):
         print(line)
     print(f"written: {out}")
 
@@ -140,7 +140,7 @@ def _bytes(file: Path) -> bytes:
     return file.read_bytes()
 
 
-def _told(answer: dict[str, object]) -> list[str]:
+def _reported(answer: dict[str, object]) -> list[str]:
     said = answer["imported"]
     assert isinstance(said, dict)
     lines = [_method(answer, said)]

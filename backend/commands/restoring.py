@@ -1,4 +1,4 @@
-"""Values that an earlier process left in a drive, as a command sees them: told, and restored."""
+"""Values that an earlier process left in a drive, as a command reports and restores them."""
 
 from __future__ import annotations
 

@@ -100,7 +100,7 @@ async def _serve_claimed(bench: Bench, serving: Serving) -> None:
 
 async def settle() -> None:
     """What a first request would wait for otherwise, and every later one again and again."""
-    # One that cannot be read is told where it is asked for, and keeps no server from its work.
+    # One that cannot be read is reported where it is asked for, and keeps no server from its work.
     with contextlib.suppress(ProfileError, OSError, UnicodeDecodeError):
         await asyncio.to_thread(load_all)
     scheduling.spare_collector()
@@ -112,7 +112,7 @@ async def accounts_needed(folder: Path, serving: Serving) -> bool:
     Raises:
         NotAllowed: they would not have to where others could reach the server.
         AccountsGone: they have had to, and there are no accounts any more.
-        DatabaseFailed: it cannot be told.
+        DatabaseFailed: it cannot be known.
     """
     reachable = not serving.on_loopback or bool(serving.behind)
     if reachable and serving.accounts is False:

@@ -37,15 +37,15 @@ def reported(code: int = 1) -> Iterator[None]:
     except DriveError as error:
         spoken, advice = language(), error.advice_text
         remedy = None if advice is None else advice.words(spoken)
-        raise _told(error.text.words(spoken), remedy, code) from error
+        raise _reported(error.text.words(spoken), remedy, code) from error
     except ProfileError as error:
-        raise _told(str(error), "see `servodeck profile check`", code) from error
+        raise _reported(str(error), "see `servodeck profile check`", code) from error
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
-        raise _told(f"{place}{error.strerror or error}", None, code) from error
+        raise _reported(f"{place}{error.strerror or error}", None, code) from error
 
 
-def _told(message: str, remedy: str | None, code: int) -> typer.Exit:
+def _reported(message: str, remedy: str | None, code: int) -> typer.Exit:
     print(f"error: {message}", file=sys.stderr)
     if remedy:
         print(f"try:   {remedy}", file=sys.stderr)
@@ -72,7 +72,7 @@ def _run(work: Callable[[], Awaitable[T]], error_code: int = 1) -> T:
 def run_in_order(work: Callable[[], Awaitable[T]]) -> T:
     """Run what moves an axis: Ctrl+C and SIGTERM let it put everything back first; exit code 130.
 
-    What the drive was lent for a measurement is put back while the work is cancelled.
+    What the drive was borrowed for a measurement is put back while the work is cancelled.
     """
     # The event loop makes a cancelling of SIGINT alone, and only where that is not ignored.
     with signals.interruptible():
@@ -91,7 +91,7 @@ def until_interrupted(work: Callable[[], Awaitable[None]]) -> None:
         _run(work)
 
 
-def told(command: Callable[P, T]) -> Callable[P, T]:
+def reporting_errors(command: Callable[P, T]) -> Callable[P, T]:
     """A command whose errors are `reported`."""
 
     @functools.wraps(command)
@@ -131,7 +131,7 @@ async def opened(url: str) -> AsyncIterator[Link]:
 async def drive_at(url: str, station: int, profile: str | None) -> AsyncIterator[Drive]:
     """A drive on a bus. Without ``profile`` it is recognised, or the choices are named.
 
-    What an earlier process left pending in it is told on standard error.
+    What an earlier process left pending in it is reported on standard error.
 
     Raises:
         NotAllowed: nothing answers, or several families would fit.

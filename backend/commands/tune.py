@@ -130,12 +130,12 @@ def autotune(
     async def work() -> None:
         address = where.asked
         answer = await (here() if address is None else there(address))
-        show(answer, out, lambda found: told(found, kept=keep), as_json=as_json)
+        show(answer, out, lambda found: reported(found, kept=keep), as_json=as_json)
 
     run_in_order(work)
 
 
-def told(answer: Answer, *, kept: bool) -> list[str]:
+def reported(answer: Answer, *, kept: bool) -> list[str]:
     """The marked designs, what became of the chosen one, and what it does without."""
     lines = [_HEAD, *(_row(each) for each in _maps(answer["candidates"]) if each["marks"])]
     verified, applied = answer["verified"], answer["applied"]

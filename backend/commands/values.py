@@ -51,7 +51,7 @@ class Described(Protocol):
         """Words of its bits."""
 
 
-class Told(Protocol):
+class Reported(Protocol):
     """What a drive said of it; ``raw`` is None where ``error`` says why."""
 
     @property
@@ -89,7 +89,7 @@ class Compared(NamedTuple):
 
 D = TypeVar("D", bound=Described)
 
-#: The widest word with bits: a negative one is told as it is on the wire.
+#: The widest word with bits: a negative one is reported as it is on the wire.
 _WIDEST = 0xFFFF_FFFF
 
 
@@ -126,38 +126,38 @@ def assignment(find: Callable[[str], D], text: str) -> tuple[D, Raw]:
         return parameter, finite(parameter.key, parameter.name, value)
 
 
-def line(parameter: Described, told: Told) -> str:
+def line(parameter: Described, reported: Reported) -> str:
     """A parameter and its value."""
-    if told.raw is None:
-        return f"{parameter.key}  {parameter.name}: {told.error or 'not read'}"
-    label = _label(parameter, told)
-    shown = _in_unit(told.raw, told.value, parameter.unit)
-    if parameter.bits and isinstance(told.raw, int):
-        shown = f"{told.raw} ({told.raw & _WIDEST:#06x})"
+    if reported.raw is None:
+        return f"{parameter.key}  {parameter.name}: {reported.error or 'not read'}"
+    label = _label(parameter, reported)
+    shown = _in_unit(reported.raw, reported.value, parameter.unit)
+    if parameter.bits and isinstance(reported.raw, int):
+        shown = f"{reported.raw} ({reported.raw & _WIDEST:#06x})"
     return f"{parameter.key}  {parameter.name} = {shown}" + (f" ({label})" if label else "")
 
 
-def show_readings(read: Iterable[tuple[Described, Told]], *, as_json: bool) -> bool:
+def show_readings(read: Iterable[tuple[Described, Reported]], *, as_json: bool) -> bool:
     """Print parameters with their values; whether each has one."""
     rows = list(read)
     if as_json:
-        print(json.dumps([_row(parameter, told) for parameter, told in rows], indent=1))
+        print(json.dumps([_row(parameter, reported) for parameter, reported in rows], indent=1))
     else:
-        for parameter, told in rows:
-            print(line(parameter, told))
-    return all(told.raw is not None for _, told in rows)
+        for parameter, reported in rows:
+            print(line(parameter, reported))
+    return all(reported.raw is not None for _, reported in rows)
 
 
-def _row(parameter: Described, told: Told) -> dict[str, object]:
+def _row(parameter: Described, reported: Reported) -> dict[str, object]:
     return {
-        "key": parameter.key, "name": parameter.name, "value": told.value,
-        "unit": parameter.unit, "raw": told.raw, "label": _label(parameter, told),
-        "error": told.error,
+        "key": parameter.key, "name": parameter.name, "value": reported.value,
+        "unit": parameter.unit, "raw": reported.raw, "label": _label(parameter, reported),
+        "error": reported.error,
     }  # fmt: skip
 
 
-def _label(parameter: Described, told: Told) -> str:
-    return parameter.enum.get(told.raw, "") if isinstance(told.raw, int) else ""
+def _label(parameter: Described, reported: Reported) -> str:
+    return parameter.enum.get(reported.raw, "") if isinstance(reported.raw, int) else ""
 
 
 def _in_unit(raw: Raw | None, value: Raw | None, unit: str) -> str:

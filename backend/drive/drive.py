@@ -147,10 +147,10 @@ class Drive:
         """Modes of operation: the profile's, without those that the drive itself says it lacks."""
         modes = self.profile.supported_modes
         reading = self.readings.get(self.modes_key or "")
-        told = reading.raw if reading is not None else None
-        if not isinstance(told, int):
+        reported = reading.raw if reading is not None else None
+        if not isinstance(reported, int):
             return modes
-        lacks = {mode for mode, bit in cia402.SUPPORTED_MODE_BIT.items() if not told >> bit & 1}
+        lacks = {mode for mode, bit in cia402.SUPPORTED_MODE_BIT.items() if not reported >> bit & 1}
         return tuple(mode for mode in modes if mode not in lacks) or modes
 
     def require(self, role: str) -> str:

@@ -2,7 +2,7 @@
 
 Some drives bear no SDO while they store their parameters: an EP3E that is asked meanwhile stores
 nothing (001:1209-1212). The gate lets what is under way end, then only the procedure through;
-others wait when it is short, and are told how long it takes when it is not. Commands of motion,
+others wait when it is short, and are informed how long it takes when it is not. Commands of motion,
 a STOP above all, do not ask the gate: they end the rest, whatever becomes of the storing.
 """
 

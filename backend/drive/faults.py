@@ -1,4 +1,4 @@
-"""Which faults of the profile are present, told by bits and by the error code."""
+"""Which faults of the profile are present, shown by bits and by the error code."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ async def read_active_faults(drive: Drive) -> list[Fault]:
     """
     readings = await drive.read_many(fault_keys(drive))
     if all(reading.raw is None for reading in readings.values()):
-        # Nothing was told: by a drive that lacks these objects, or by none at all.
+        # Nothing was reported: by a drive that lacks these objects, or by none at all.
         await drive.read(drive.require("status_word"))
     return active_faults(drive, readings)
 

@@ -1,4 +1,4 @@
-"""Who is told what was read from a drive, written to it and commanded; on the event loop."""
+"""Who is informed of what was read from a drive, written to it and commanded; on the event loop."""
 
 from __future__ import annotations
 

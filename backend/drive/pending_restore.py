@@ -16,7 +16,7 @@ class PendingRestore:
     """One parameter that may still hold what was meant for a while; raw values.
 
     ``left`` is what it holds if nobody changed it since: empty where that is not known.
-    ``unapplied``: the value is back, but the drive has not been told to act on it.
+    ``unapplied``: the value is back, but the drive has not been commanded to act on it.
     """
 
     key: str

@@ -111,8 +111,8 @@ def axis_of(drive: Drive, station: str) -> AxisOf:
 
 def settings_sha256(settings: HealthSettings) -> str:
     """Of the settings on which values depend."""
-    told = settings.model_dump(mode="json", exclude=set(_OF_NO_EFFECT))
-    return _digest(told)
+    reported = settings.model_dump(mode="json", exclude=set(_OF_NO_EFFECT))
+    return _digest(reported)
 
 
 class HealthRecords:

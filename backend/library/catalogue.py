@@ -47,7 +47,7 @@ class NotInLibrary(NotAllowed):
 
 
 class Library:
-    """The library of a store. ``record`` is told of every change (see backend.audit)."""
+    """The library of a store. ``record`` is informed of every change (see backend.audit)."""
 
     def __init__(
         self,
@@ -238,8 +238,8 @@ class Library:
         self._tell("taken back", entry)
         return entry
 
-    def told_deleted(self, entry: Entry) -> None:
-        """A file of this station was deleted for good; the audit is told."""
+    def reported_deleted(self, entry: Entry) -> None:
+        """A file of this station was deleted for good; the audit is reported."""
         self._tell("deleted", entry)
 
     def purge(self, before: datetime) -> list[Entry]:

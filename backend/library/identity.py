@@ -9,7 +9,7 @@ from backend.drive.drive import Drive
 from backend.parameters.set_file import ParameterSet
 
 What = Literal["vendor", "product", "serial", "revision", "firmware"]
-#: What makes it another drive: writing needs consent. The others are only told.
+#: What makes it another drive: writing needs consent. The others are only reported.
 _OTHER_DRIVE = frozenset({"vendor", "product", "serial"})
 _WORDS: dict[What, str] = {
     "vendor": "vendor id", "product": "product code", "serial": "serial number",

@@ -142,7 +142,7 @@ def unpack(data: bytes, name: str = "the file") -> Measurement:
     Raises:
         BadMeasurement: not a measurement, damaged, or of a newer version.
     """
-    with _told(name), zipfile.ZipFile(io.BytesIO(data)) as archive:
+    with _reported(name), zipfile.ZipFile(io.BytesIO(data)) as archive:
         if sum(each.file_size for each in archive.infolist()) > _MAX_UNPACKED:
             raise ValueError("it is larger than any measurement")
         arrays: Arrays = {}
@@ -160,7 +160,7 @@ def unpack_head(file: Path) -> Head:
     Raises:
         BadMeasurement: as `unpack`; damage in the signals is not seen.
     """
-    with _told(file.name), zipfile.ZipFile(file) as archive:
+    with _reported(file.name), zipfile.ZipFile(file) as archive:
         if archive.getinfo("meta.npy").file_size > _MAX_HEAD:
             raise ValueError("it is larger than any measurement")
         values = np.load(io.BytesIO(archive.read("meta.npy")), allow_pickle=False)
@@ -176,7 +176,7 @@ def _head(text: npt.NDArray[np.generic], name: str) -> Head:
 
 
 @contextmanager
-def _told(name: str) -> Iterator[None]:
+def _reported(name: str) -> Iterator[None]:
     """Whatever a damaged file makes its readers say becomes one kind of error."""
     try:
         yield

@@ -159,7 +159,7 @@ class MotionAuthority:
         return grant
 
     def end(self, grant: Grant) -> None:
-        """Give a grant back. Nothing is told to the work that had it."""
+        """Give a grant back. Nothing is commanded to the work that had it."""
         record = self._record(grant)
         if record is None:
             return
@@ -173,7 +173,7 @@ class MotionAuthority:
     def revoke(self, drive: str, why: Text) -> None:
         """All grants of this axis end now, whoever holds them: nothing is commanded any more.
 
-        Their holders are not told: whoever calls this brings the axis to rest.
+        Their holders are not reported: whoever calls this brings the axis to rest.
         """
         for record in self._records.get(drive, ()):
             record.why = record.why or why
@@ -182,7 +182,7 @@ class MotionAuthority:
     def end_of(self, session: str, why: Text) -> None:
         """All grants asked for by this session, token or invitation end now, on every axis.
 
-        Their holders are told, as when the time of a grant is over: each brings its axis to rest.
+        Their holders are informed as when the time of a grant is over: each stops its axis.
         """
         if not session:
             return  # the one user of a station without accounts, or the program itself

@@ -11,7 +11,7 @@ from backend.scales.travel_units import TravelUnit
 class Envelope:
     """Limits of one motion, in the axis' units: travel from the start point in rev, rpm, %, s.
 
-    ``travel_unit`` and ``travel_per_rev`` are the unit of who asked, for what is told to them.
+    ``travel_unit`` and ``travel_per_rev`` are the unit of who asked, for what is commanded to them.
     """
 
     travel_rev: float

@@ -144,9 +144,9 @@ def _separator(text: str) -> str:
     """As a spreadsheet's first line says; else of the first line that is no comment: tabulator
     before semicolon before comma.
     """
-    told = _SEPARATOR_LINE.fullmatch(text.partition("\n")[0].strip(" \r"))
-    if told is not None:
-        return told[1]
+    reported = _SEPARATOR_LINE.fullmatch(text.partition("\n")[0].strip(" \r"))
+    if reported is not None:
+        return reported[1]
     first = next(iter(_lines(text)[1]), "")
     return next((mark for mark in ("\t", ";") if mark in first), ",")
 

@@ -1,4 +1,4 @@
-"""Lists of parameters in the formats of other tools, told apart by contents and name."""
+"""Lists of parameters in the formats of other tools, distinguished by contents and name."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ acting: ContextVar[Actor | None] = ContextVar("acting", default=None)
 def by_itself() -> Context:
     """A context of work that outlives the request that began it: nobody is named for what it does.
 
-    Else what a drive does hours later is told of the person who connected it.
+    Else what a drive does hours later is informed of the person who connected it.
     """
     context = copy_context()
     context.run(acting.set, None)

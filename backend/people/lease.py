@@ -43,7 +43,7 @@ NoticeKind = Literal["asked", "refused", "given", "overridden", "returned", "exp
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """Something that the person at ``connection`` must be told of. ``person`` is the other one."""
+    """Notice for the person at ``connection``; ``person`` is the other one."""
 
     connection: str
     drive: str
@@ -63,7 +63,7 @@ class Leases:
         self._asked: dict[str, Asked] = {}
         self._changed = changed
         self._ticks = ticks
-        #: Called with what somebody must be told of.
+        #: Called with what somebody must be notified of.
         self.on_notice: list[Callable[[Notice], None]] = []
 
     def holder(self, drive: str) -> Holder | None:
@@ -194,7 +194,7 @@ class Leases:
         return dropped
 
     def lose(self, connection: str) -> list[str]:
-        """Like `drop`, for a connection that is silent but not closed; it is told."""
+        """Like `drop`, for a connection that is silent but not closed; it is reported."""
         dropped = self.drop(connection)
         for drive in dropped:
             self._tell(connection, drive, "lost", "")

@@ -164,7 +164,7 @@ class People:
         return self.accounts.devices.known(device) is not None
 
     def require_accounts(self) -> None:
-        """Whoever may come from afar must be told apart.
+        """Whoever may come from afar must be distinguished.
 
         Raises:
             NotAllowed: this station has no accounts.

@@ -16,7 +16,7 @@ from drivers.computer.sockets import hold_name, require_linux
 from drivers.errors import Busy, LinkLost
 
 #: How far the measurement is (0…1) and at which period.
-Told = Callable[[float, int], None]
+Reported = Callable[[float, int], None]
 MOST_S = 60.0
 
 
@@ -45,7 +45,7 @@ async def preflight(
     seconds: float = 0.0,
     *,
     computer: Computer | None = None,
-    progress: Told = lambda _fraction, _period_us: None,
+    progress: Reported = lambda _fraction, _period_us: None,
 ) -> Preflight:
     """Look, and measure for ``seconds`` where that is more than 0; frames go to ``interface``.
 

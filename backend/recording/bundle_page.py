@@ -152,7 +152,9 @@ def _polled(evidence: Evidence) -> str:
         number = value.value
         if isinstance(number, (int, float)) and (value.drive, value.key) not in cyclic:
             found.setdefault((value.drive, value.key), []).append((value.time, float(number)))
-    told = '<p>All values that were read one by one are in <a href="history.csv">history.csv</a>'
+    reported = (
+        '<p>All values that were read one by one are in <a href="history.csv">history.csv</a>'
+    )
     if not evidence.history:
         return "<p>Nothing was read in the last seconds.</p>"
     first = min(value.time for value in evidence.history)
@@ -164,7 +166,7 @@ def _polled(evidence: Evidence) -> str:
         name = evidence.names.get(place, " ".join(place))
         drawing = curve(points[:, 0], points[:, 1], evidence.time - first)
         parts.append(f"<h3>{_e(name)}</h3>{drawing}")
-    return f"{''.join(parts)}{told}; those that changed are drawn.</p>"
+    return f"{''.join(parts)}{reported}; those that changed are drawn.</p>"
 
 
 def curve(times: npt.NDArray[np.float64], values: npt.NDArray[np.float64], mark_s: float) -> str:

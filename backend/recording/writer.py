@@ -92,7 +92,7 @@ class RecordingWriter:
     # --- called by the event loop -----------------------------------------------------
 
     def put(self, stream: int, block: ScopeBlock) -> None:
-        """Queue a block. After a failure it does nothing; ``failed`` told it."""
+        """Queue a block. After a failure it does nothing; ``failed`` reported it."""
         self._add((stream, block), block.samples.nbytes + 64)
 
     def event(self, content: Mapping[str, object]) -> None:

@@ -21,7 +21,7 @@ from backend.report.tools import kind_title, tool_blocks
 from backend.report.views import StepView, SweepView
 from backend.tools.tool import ToolResult
 
-#: Told apart in print and by the colour-blind: dark blue, orange.
+#: Reported apart in print and by the colour-blind: dark blue, orange.
 _NOW, _EARLIER, _DEMAND = "#1a5c94", "#c2571a", "#5b6770"
 _LEAST_COHERENCE = 0.5
 _BAND = 1.96

@@ -108,8 +108,8 @@ def _verdict(measured: Measured, words: Words) -> Note:
         peaks = [hertz(r.frequency_hz) for r in view.resonances if r.kind == "resonance"]
         if not view.trusted:
             return Note(f"{kind}: {words('untrusted')}", "warn")
-        told = f"{words('resonances')} {', '.join(peaks)}" if peaks else words("no_resonance")
-        return Note(f"{kind}: {told}", "good")
+        reported = f"{words('resonances')} {', '.join(peaks)}" if peaks else words("no_resonance")
+        return Note(f"{kind}: {reported}", "good")
     return _loop_verdict(view, kind, words)
 
 

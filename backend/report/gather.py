@@ -120,7 +120,7 @@ async def live_facts(
 ) -> Facts:
     """Everything but the measurements; values that were changed are read from the drive now.
 
-    A drive that does not answer is told in the report, and fails nothing.
+    A drive that does not answer is reported in the report, and fails nothing.
     """
     drive = connected.drive
     settings, trouble = await _changes(drive, changes)
@@ -242,8 +242,8 @@ def facts_of_files(heads: Mapping[str, Head], about: About) -> Facts:
         drives = ", ".join(sorted(f"{name} ({serial})" for name, _, serial in identities))
         raise NotAllowed("report.measurements-different-drives", value=drives or "none")
     head = next(iter(heads.values()))
-    told = head.meta.get("identity")
-    numbers = told if isinstance(told, dict) else {}
+    reported = head.meta.get("identity")
+    numbers = reported if isinstance(reported, dict) else {}
 
     def number(name: str) -> int | None:
         value = numbers.get(name)

@@ -23,7 +23,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "buses": ("Bus", "总线"),
     "person": ("Commissioned by", "调试人员"),
     "program": ("Made with", "软件"),
-    "unknown": ("not told", "未提供"),
+    "unknown": ("not reported", "未提供"),
     "notes": ("Notes", "备注"),
     "verdict": ("Verdict", "结论"),
     "sound": ("sound", "良好"),

@@ -96,7 +96,7 @@ def evaluate_signals(signals: Signals, name: str, settings: ImportSettings) -> d
             signals.sample_rate_hz, settings.band_hz,
         )  # fmt: skip
     except NoResponse as error:
-        raise _told(error, name, signals) from error
+        raise _reported(error, name, signals) from error
     return _as_json(found, signals, settings, scale)
 
 
@@ -128,7 +128,7 @@ def _check(settings: ImportSettings, scale: Scale) -> None:
         )
 
 
-def _told(error: NoResponse, name: str, signals: Signals) -> BadRecording:
+def _reported(error: NoResponse, name: str, signals: Signals) -> BadRecording:
     """One message for each reason that the analysis has."""
     facts = error.facts
     if error.code == "few-lines":

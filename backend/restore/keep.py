@@ -20,7 +20,7 @@ def keep_list(
     """Recall what is pending in a drive; write its list whenever something is borrowed or back.
 
     ``in_motion`` says whether the next process has to stop the axis, ``failed`` is called once per
-    failure of the disk: a motion goes on without a list, as people are told then.
+    failure of the disk: a motion goes on without a list, as people are informed then.
     """
     drive.pending_restores.recall(known.pending.values)
     well = True

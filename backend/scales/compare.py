@@ -1,6 +1,6 @@
 """Whether 606Ch and 6064h of a whole recording tell of the same motion.
 
-The loop watches them while the axis moves (`drivers.motion.feedback`) and must decide at once. A
+The loop watches them while the axis moves (`drivers.feedback`) and must decide at once. A
 recording shows more: also at low speeds and to and fro, and before anything is computed from 606Ch.
 """
 
@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from drivers.feedback import FeedbackScale, disagreement
 from drivers.halt import HaltCause, Halted
-from drivers.motion.feedback import FeedbackScale, disagreement
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -41,16 +41,16 @@ def disagreement_of(
         return None
     edges = np.arange(count + 1) * length
     means = 0.5 * (velocity[1:] + velocity[:-1])[: count * length]
-    told = means.reshape(count, length).mean(axis=1)
+    reported = means.reshape(count, length).mean(axis=1)
     seen = _moved(position[edges]) / (length * cycle_s) * scale.velocity_per_inc_s
     if valid is not None:
         lost = np.concatenate([[0], np.cumsum(~valid)])
         whole = lost[edges[1:] + 1] == lost[edges[:-1]]
-        told, seen = told[whole], seen[whole]
-        if told.size < 2:
+        reported, seen = reported[whole], seen[whole]
+        if reported.size < 2:
             return None
     power = float(np.mean(seen**2))
-    rms_told, rms_seen = float(np.sqrt(np.mean(told**2))), float(np.sqrt(power))
+    rms_reported, rms_seen = float(np.sqrt(np.mean(reported**2))), float(np.sqrt(power))
     steps = np.abs(np.diff(velocity))
     finest = float(np.min(steps[steps > 0], initial=np.inf))
     ignored = max(
@@ -58,14 +58,14 @@ def disagreement_of(
         min(finest, _MOST_STEPS * scale.ignored) if np.isfinite(finest) else 0.0,
         _COUNTS / (length * cycle_s) * abs(scale.velocity_per_inc_s),
     )
-    if float(np.sqrt(np.mean((told - seen) ** 2))) <= ignored:
+    if float(np.sqrt(np.mean((reported - seen) ** 2))) <= ignored:
         return None
-    factor = float(np.mean(told * seen)) / power if power else np.inf
+    factor = float(np.mean(reported * seen)) / power if power else np.inf
     if abs(factor - 1.0) <= _RELATIVE:
         return None
     sign = -1.0 if factor < 0 else 1.0
-    kind = disagreement(sign * rms_told, rms_seen)
-    return Halted(HaltCause.CONTRADICTION, "speed", sign * rms_told, rms_seen, kind.value)
+    kind = disagreement(sign * rms_reported, rms_seen)
+    return Halted(HaltCause.CONTRADICTION, "speed", sign * rms_reported, rms_seen, kind.value)
 
 
 def measured_scale(position: FloatArray, velocity: FloatArray, cycle_s: float) -> float | None:
@@ -79,12 +79,12 @@ def measured_scale(position: FloatArray, velocity: FloatArray, cycle_s: float) -
         return None
     edges = np.arange(count + 1) * length
     means = 0.5 * (velocity[1:] + velocity[:-1])[: count * length]
-    told = means.reshape(count, length).mean(axis=1)
+    reported = means.reshape(count, length).mean(axis=1)
     seen = _moved(position[edges]) / (length * cycle_s)
-    power, other = float(np.sum(seen**2)), float(np.sum(told**2))
+    power, other = float(np.sum(seen**2)), float(np.sum(reported**2))
     if not power or not other:
         return None
-    together = float(np.sum(told * seen))
+    together = float(np.sum(reported * seen))
     return together / power if together**2 > _TOGETHER * power * other else None
 
 

@@ -2,7 +2,7 @@
 
 A *user increment* is what one count of the position objects shall mean, 0.001 mm for example.
 The wanted number of user increments per motor revolution follows from the mechanics; the drive's
-gear parameters can hold it exactly or only nearly, and the difference is told.
+gear parameters can hold it exactly or only nearly, and the difference is reported.
 
 Sources: CiA 402-2 clause 7 (608Fh, 6091h, 6092h); 001:1011 to 001:1080 (EP3E, the same objects
 with worked examples); 002:2557 (R6L, 6091h is encoder increments over user increments);

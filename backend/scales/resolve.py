@@ -32,7 +32,7 @@ _SAME = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class Reported:
     """Raw values of the drive by key, of the objects that scales rest on; absent ones are not in.
 
     ``encoder`` is the resolution by the family's own parameter, where it has one.
@@ -62,7 +62,7 @@ def stating_keys(drive: Drive) -> tuple[str, ...]:
     )
 
 
-async def read_told(drive: Drive) -> Told:
+async def read_reported(drive: Drive) -> Reported:
     """What the drive says of its scales, read now.
 
     Raises:
@@ -73,17 +73,17 @@ async def read_told(drive: Drive) -> Told:
         for key, reading in (await existing(drive, stating_keys(drive))).items()
         if isinstance(reading.raw, (int, float))
     }
-    return Told(raws)
+    return Reported(raws)
 
 
-def scales_of(spec: UnitSpec, told: Told, taught: Taught | None) -> Scales:
+def scales_of(spec: UnitSpec, reported: Reported, taught: Taught | None) -> Scales:
     """The scales of a drive with these units in its profile that says this of itself."""
-    said = taught if taught is not None and taught.holds(told.raws) else None
-    position = _position(spec, told, said)
+    said = taught if taught is not None and taught.holds(reported.raws) else None
+    position = _position(spec, reported, said)
     return Scales(
         position,
-        _rate(spec, told, said, position.raw_per_unit, Quantity.VELOCITY),
-        _rate(spec, told, said, position.raw_per_unit, Quantity.ACCELERATION),
+        _rate(spec, reported, said, position.raw_per_unit, Quantity.VELOCITY),
+        _rate(spec, reported, said, position.raw_per_unit, Quantity.ACCELERATION),
     )
 
 
@@ -102,28 +102,28 @@ def origin_of(spec: UnitSpec, quantity: Quantity) -> Origin:
 # Position ---------------------------------------------------------------------------------------
 
 
-def _position(spec: UnitSpec, told: Told, said: Taught | None) -> Scale:
-    code = told.get(SI_POSITION)
+def _position(spec: UnitSpec, reported: Reported, said: Taught | None) -> Scale:
+    code = reported.get(SI_POSITION)
     unit = None if code is None else decode_si_unit(code)
     name = spec.position if unit is None else unit.name
     if said is not None and said.counts_per_rev is not None:
         return Scale(Quantity.POSITION, said.counts_per_rev, name, Origin.USER)
     if code is not None and unit is None and code != 0:
         return _uncertain(Quantity.POSITION, Uncertainty.UNREADABLE, source=f"60A8h = {code:08X}h")
-    ratio = _ratio(spec, told)
-    feed, resolution = _feed(spec, told), _resolution(told)
+    ratio = _ratio(spec, reported)
+    feed, resolution = _feed(spec, reported), _resolution(reported)
     trusted = origin_of(spec, Quantity.POSITION) is not Origin.UNKNOWN
     if not trusted and feed == 1.0 and (resolution or 1.0) > 1.0:
         return _uncertain(Quantity.POSITION, Uncertainty.FEED_OF_ONE, name, "6092h, 608Fh")
     if unit is not None and not unit.counts:
         return _by_unit(unit, name, feed, ratio)
-    gear = _names(told, spec.gear_numerator, spec.gear_denominator)
-    if spec.feed is not None and spec.feed in told.raws:
+    gear = _names(reported, spec.gear_numerator, spec.gear_denominator)
+    if spec.feed is not None and spec.feed in reported.raws:
         if feed is None:
             return _uncertain(Quantity.POSITION, Uncertainty.NO_RESOLUTION, name, _shown(spec.feed))
-        source = _joined(_names(told, spec.feed, spec.feed_revolutions), gear)
+        source = _joined(_names(reported, spec.feed, spec.feed_revolutions), gear)
         return Scale(Quantity.POSITION, feed / ratio, name, Origin.DRIVE, source)
-    counts = told.encoder or resolution
+    counts = reported.encoder or resolution
     if counts:
         source = _joined([_shown(_RESOLUTION)] if resolution else ["encoder"], gear)
         return Scale(Quantity.POSITION, counts / ratio, name, Origin.DRIVE, source)
@@ -146,64 +146,70 @@ def _by_unit(unit: SiUnit, name: str, feed: float | None, ratio: float) -> Scale
     return Scale(Quantity.POSITION, per_turn / ratio, name, Origin.DRIVE, "60A8h")
 
 
-def _ratio(spec: UnitSpec, told: Told) -> float:
+def _ratio(spec: UnitSpec, reported: Reported) -> float:
     """Motor revolutions of one revolution of the shaft behind the gear."""
-    return float(told.get(spec.gear_numerator) or 1) / float(told.get(spec.gear_denominator) or 1)
+    return float(reported.get(spec.gear_numerator) or 1) / float(
+        reported.get(spec.gear_denominator) or 1
+    )
 
 
-def _feed(spec: UnitSpec, told: Told) -> float | None:
+def _feed(spec: UnitSpec, reported: Reported) -> float | None:
     """Position units of one revolution of the shaft, where a feed constant is set."""
-    feed = told.get(spec.feed)
-    return None if feed is None else feed / (told.get(spec.feed_revolutions) or 1)
+    feed = reported.get(spec.feed)
+    return None if feed is None else feed / (reported.get(spec.feed_revolutions) or 1)
 
 
-def _resolution(told: Told) -> float | None:
-    counts = told.get(_RESOLUTION)
-    return None if counts is None else counts / (told.get(_RESOLUTION_REVS) or 1)
+def _resolution(reported: Reported) -> float | None:
+    counts = reported.get(_RESOLUTION)
+    return None if counts is None else counts / (reported.get(_RESOLUTION_REVS) or 1)
 
 
 # Speed and acceleration -------------------------------------------------------------------------
 
 
 def _rate(
-    spec: UnitSpec, told: Told, said: Taught | None, per_rev: float | None, quantity: Quantity
+    spec: UnitSpec,
+    reported: Reported,
+    said: Taught | None,
+    per_rev: float | None,
+    quantity: Quantity,
 ) -> Scale:
     fast = quantity is Quantity.VELOCITY
     key = SI_VELOCITY if fast else SI_ACCELERATION
-    code = told.get(key)
+    code = reported.get(key)
     unit = None if code is None else decode_si_unit(code)
     text = spec.velocity if fast else spec.acceleration
     taught = None if said is None else said.raw_per_rpm if fast else said.raw_per_rpm_s
     if said is not None and taught is not None:
         origin = Origin.MEASURED if fast and said.velocity_origin == "measured" else Origin.USER
         return Scale(quantity, taught, unit.name if unit else "", origin)
-    if (other := _other_factor(told, quantity)) is not None:
+    if (other := _other_factor(reported, quantity)) is not None:
         return _uncertain(quantity, Uncertainty.FACTOR, unit.name if unit else text, other)
     if code is not None:
         source = f"{_shown(key)} = {code:08X}h"
         if unit is None:
             return _uncertain(quantity, Uncertainty.UNREADABLE, source=source)
-        return _by_rate_unit(quantity, unit, per_rev, _ratio(spec, told), source)
+        return _by_rate_unit(quantity, unit, per_rev, _ratio(spec, reported), source)
     origin = origin_of(spec, quantity)
     if origin is Origin.UNKNOWN:
         return _uncertain(quantity, Uncertainty.NOT_STATED)
     return by_text(quantity, text, per_rev, origin, spec)
 
 
-def _other_factor(told: Told, quantity: Quantity) -> str | None:
+def _other_factor(reported: Reported, quantity: Quantity) -> str | None:
     """The object that says that raw values are not simply the stated unit; None without one.
 
     6090h beside another 608Fh, or a factor of 6096h or 6097h that is not 1: whether a drive
     calculates with them, and before or behind its stated unit, is the maker's choice.
     """
     first, second = _FACTORS[quantity]
-    numerator, divisor = told.get(first), told.get(second) or 1
+    numerator, divisor = reported.get(first), reported.get(second) or 1
     if numerator is not None and abs(numerator / divisor - 1.0) > _SAME:
         return _shown(first)
-    speed, counts = told.get(_SPEED_RESOLUTION), _resolution(told)
+    speed, counts = reported.get(_SPEED_RESOLUTION), _resolution(reported)
     if speed is None or counts is None or quantity is not Quantity.VELOCITY:
         return None
-    by_speed = speed / (told.get(_SPEED_RESOLUTION_REVS) or 1)
+    by_speed = speed / (reported.get(_SPEED_RESOLUTION_REVS) or 1)
     if abs(by_speed - counts) <= _SAME * counts:
         return None
     return _joined([_shown(_SPEED_RESOLUTION), _shown(_RESOLUTION)])
@@ -269,8 +275,8 @@ def _uncertain(
     return Scale(quantity, None, name, Origin.UNKNOWN, source, uncertainty)
 
 
-def _names(told: Told, *keys: str | None) -> list[str]:
-    found = [_shown(key) for key in keys if key is not None and key in told.raws]
+def _names(reported: Reported, *keys: str | None) -> list[str]:
+    found = [_shown(key) for key in keys if key is not None and key in reported.raws]
     return list(dict.fromkeys(found))
 
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 from backend.drive.drive import Drive
 from backend.drive.optional import existing
-from backend.scales.resolve import by_text, origin_of, read_told, scales_of
+from backend.scales.resolve import by_text, origin_of, read_reported, scales_of
 from backend.scales.scale import Origin, Quantity, Scale, Scales, ScaleUnknown, Uncertainty
 from backend.scales.taught import Taught
 from drivers.errors import NotAllowed, OutOfRange
-from drivers.motion.feedback import FeedbackScale
+from drivers.feedback import FeedbackScale
 from profiles.schema import Parameter, UnitSpec
 
 #: Raw units per 1 % of rated torque.
@@ -221,10 +221,10 @@ async def read_units(drive: Drive, taught: Taught | None = None) -> AxisUnits:
         NotAllowed: a unit switch of the drive is not where the profile's units hold.
     """
     await _check_unit_switches(drive)
-    told = await read_told(drive)
-    if drive.profile.units.feed not in told.raws:
-        told = replace(told, encoder=await encoder_counts(drive))
-    scales = scales_of(drive.profile.units, told, taught)
+    reported = await read_reported(drive)
+    if drive.profile.units.feed not in reported.raws:
+        reported = replace(reported, encoder=await encoder_counts(drive))
+    scales = scales_of(drive.profile.units, reported, taught)
     return AxisUnits(drive.profile.units, scales.position.raw_per_unit, scales, drive.name)
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from backend.scales.units import AxisUnits
+from drivers.feedback import Disagreement, disagreement
 from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted, quantity_key
-from drivers.motion.feedback import Disagreement, disagreement
 from drivers.texts.message import Text, text
 
 _MEANING = {
@@ -20,9 +20,10 @@ def halt_words(halt: Halted, units: AxisUnits | None) -> Text:
     if units is None or halt.value is None or halt.limit is None:
         return halt.text
     if halt.cause is HaltCause.CONTRADICTION:
-        told, seen = units.velocity(halt.value), units.velocity(halt.limit)
+        reported, seen = units.velocity(halt.value), units.velocity(halt.limit)
         return text(
-            "scales.speed-contradicts-position", speed=_figure(told), from_position=_figure(seen),
+            "scales.speed-contradicts-position",
+            speed=_figure(reported), from_position=_figure(seen),
             unit=units.names["velocity"], meaning=text(_meaning(halt.value, halt.limit)),
         )  # fmt: skip
     if halt.cause not in ENVELOPE_CAUSES:

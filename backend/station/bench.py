@@ -309,7 +309,7 @@ class Bench:
                 listener(job)
             except Exception:
                 # The next one may be who stops it, and the job itself must come to its end.
-                log.exception("a change of the job %s could not be told", job.id)
+                log.exception("a change of the job %s could not be known", job.id)
 
     def _lease_changed(self, drive_id: str) -> None:
         self.recorder.lease_changed(drive_id, self.leases.holder(drive_id))

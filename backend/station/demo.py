@@ -97,7 +97,7 @@ class DemoBench:
     def _start_segment(self, url: str, number: int) -> None:
         """A private network with the segment at one end of its cable.
 
-        Where the system forbids such networks the rest of the bench runs, and the user is told.
+        Where the system forbids such networks the rest of the bench runs, and the user is informed.
         """
         master, slave = f"ec{number}m", f"ec{number}s"
         try:

@@ -148,12 +148,12 @@ async def _stored_eds(link: Link, found: Found) -> bytes:
 
 
 def dictionary_entries(
-    told: Sequence[Described],
+    reported: Sequence[Described],
 ) -> list[DictionaryEntry]:
-    """What the drive told, each entry with the name of its object."""
-    objects = {item.index: item for item in told if isinstance(item, ObjectInfo)}
+    """What the drive reported, each entry with the name of its object."""
+    objects = {item.index: item for item in reported if isinstance(item, ObjectInfo)}
     entries = []
-    for item in told:
+    for item in reported:
         if isinstance(item, ObjectInfo):
             continue
         owner = objects.get(item.index)

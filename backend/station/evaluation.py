@@ -19,7 +19,7 @@ from drivers.texts.message import cause_of
 
 #: Numbers nearer than this share are the same: another computer sums in another order.
 _SAME = 1e-6
-#: Below this nothing is told of a difference; phases and decibels are of the order of one.
+#: Below this nothing is reported about a difference; phases and decibels are of the order of one.
 _NOTHING = 1e-9
 _NAMED_AT_MOST = 5
 
@@ -78,8 +78,8 @@ def recompute(measurement: Measurement) -> dict[str, object]:
 
 
 def _step(measurement: Measurement) -> dict[str, object]:
-    given, told = measurement.meta["settings"], measurement.meta["facts"]
-    if not isinstance(given, dict) or not isinstance(told, dict):
+    given, reported = measurement.meta["settings"], measurement.meta["facts"]
+    if not isinstance(given, dict) or not isinstance(reported, dict):
         raise TypeError("settings or facts")
     settings = step_tool.StepSettings(**{**given, "envelope": Envelope(**given["envelope"])})
     arrays = {name: np.asarray(values) for name, values in measurement.arrays.items()}
@@ -89,7 +89,7 @@ def _step(measurement: Measurement) -> dict[str, object]:
     rate = float(str(measurement.meta["sample_rate_hz"]))
     recording = Recording(rate, **columns, valid=valid)
     return step_tool.as_json(
-        step_tool.evaluate(recording, demand, settings, float(told["rated_torque_nm"]))
+        step_tool.evaluate(recording, demand, settings, float(reported["rated_torque_nm"]))
     )
 
 

@@ -47,7 +47,7 @@ class Exchange:
     async def end(self) -> None:
         """Leave the bus as it was, as soon as no other axis moves through the exchange.
 
-        A drive that does not let itself be set up again is told of.
+        A drive that does not let itself be set up again is informed of.
         """
         if not self.own:
             return

@@ -16,7 +16,7 @@ from backend.drive.faults import active_faults, fault_keys, integer
 from backend.drive.readings import Reading
 from backend.people.identity import by_itself
 from backend.scales.units import AxisUnits
-from backend.stopping.turning import Turning, TurnWatch, told
+from backend.stopping.turning import Turning, TurnWatch, turning_message
 from backend.work.journal import Journal, Level
 from drivers import cia402
 from drivers.cia402 import State
@@ -229,13 +229,13 @@ class Monitor:
     def _tells_other(self, newest: Mapping[str, Reading], telling: Sequence[str]) -> bool:
         """Whether state, warning or error code are not what they were, or are not known."""
         drive = self.axis.drive
-        told, known = (
+        reported, known = (
             [integer(readings.get(key)) for key in telling] for readings in (newest, self._last)
         )
-        word, before = told[0], known[0]
+        word, before = reported[0], known[0]
         if word is None or before is None or drive.decode_state(word) in _FAULTY:
             return True
-        return bool((word ^ before) & ~_MODE_SPECIFIC) or told[1:] != known[1:]
+        return bool((word ^ before) & ~_MODE_SPECIFIC) or reported[1:] != known[1:]
 
     def _state(self) -> State:
         drive = self.axis.drive
@@ -288,7 +288,9 @@ class Monitor:
         if not now.fresh:
             return
         if now.turning is not None and before.turning is None:
-            self._journal.add(told(drive.name, now.turning), level="error", drive=drive.id)
+            self._journal.add(
+                turning_message(drive.name, now.turning), level="error", drive=drive.id
+            )
         old = {fault.code for fault in before.faults}
         for fault in now.faults:
             if fault.code not in old:

@@ -9,9 +9,9 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from backend.axis.stop.facts import AxisStop, Verdict
 from backend.station.connected_drive import ConnectedDrive
-from backend.stopping.facts import AxisStop, Verdict
-from backend.stopping.told import told
+from backend.stopping.stop_message import stop_message
 from backend.stopping.watch import StopWatch
 from drivers.errors import Busy, DriveError, internal_error
 from drivers.texts.message import Text, text
@@ -187,7 +187,7 @@ class Motion:
 
     def _note(self, connected: ConnectedDrive, found: AxisStop) -> None:
         connected.monitor.hurry()
-        line = told(connected.drive.name, found)
+        line = stop_message(connected.drive.name, found)
         if line is not None and not found.superseded:
             self._bench.journal.add(line, level="error", drive=connected.drive.id)
 
@@ -195,7 +195,7 @@ class Motion:
         """What the last STOP of these drives has reached; waits for verdicts that are due.
 
         Drives that were never stopped are left out. One that is taken off the bench meanwhile
-        was not seen to stand, and is told so. May take some seconds.
+        was not seen to stand, and is reported so. May take some seconds.
         """
         watches = {each: self._watches[each] for each in drive_ids if each in self._watches}
         if watches:
@@ -235,7 +235,7 @@ class Motion:
         try:
             await connected.axis.let_go()
         except DriveError as error:
-            # Told to stop as soon as it answers, here or after it was put back on the bench.
+            # Commanded to stop as soon as it answers, here or after it was put back on the bench.
             connected.axis.stop_pending = True
             line = text(
                 "station.may-still-be-enabled", drive=connected.drive.name, cause=error.text

@@ -53,7 +53,7 @@ async def require_same_drive(drive: Drive, other: Port) -> None:
     """Settings read over the new port are those that the connected ports hold.
 
     Serial buses tell no identity, and a swapped cable must not write another motor's data. Two
-    drives with equal settings cannot be told apart this way.
+    drives with equal settings cannot be distinguished this way.
 
     Raises:
         LinkTimeout: nothing answers there.

@@ -31,7 +31,7 @@ LOOK_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One look at an axis: monotonic time, raw position and speed (None: not told)."""
+    """One look at an axis: monotonic time, raw position and speed (None: not reported)."""
 
     at_s: float
     state: State
@@ -79,16 +79,16 @@ class SpeedWatch:
         drive = self._axis.drive
         roles = ("status_word", "position_actual", "velocity_actual")
         keys = [key for role in roles if (key := drive.key(role)) is not None]
-        session, told = self._axis.session, {}
+        session, reported = self._axis.session, {}
         if session is not None:
-            told = drive.take(session.newest(drive, keys, _NEWEST_S))
-        missing = [key for key in keys if key not in told]
+            reported = drive.take(session.newest(drive, keys, _NEWEST_S))
+        missing = [key for key in keys if key not in reported]
         if len(missing) > 1 or drive.require("status_word") in missing:
             # A drive whose mailbox is mute is not asked for what the process data tell already.
-            told |= await drive.read_many(missing)
-        word, position, velocity = (integer(told.get(drive.key(role) or "")) for role in roles)
+            reported |= await drive.read_many(missing)
+        word, position, velocity = (integer(reported.get(drive.key(role) or "")) for role in roles)
         if word is None or (position is None and velocity is None):
-            problem = next((r.error for r in told.values() if r.error), "no answer")
+            problem = next((r.error for r in reported.values() if r.error), "no answer")
             raise LinkTimeout(problem, drive=drive.name)
         return Sample(time.monotonic(), drive.decode_state(word), position, velocity)
 

@@ -14,7 +14,7 @@ from drivers.texts.message import Text, text
 
 #: Slower is noise, or a shaft that is held and trembles.
 TURNS_RPM = 8.0
-#: For how long it must turn, so that the end of a permitted ramp is none, and at most before told.
+#: How long it must turn (the end of a permitted ramp counts as none), and the latest report.
 _FOR_S = 0.35
 #: After the last reason to turn: a ramp ends meanwhile.
 _GRACE_S = 0.5
@@ -91,7 +91,7 @@ class TurnWatch:
         )
 
 
-def told(name: str, turning: Turning) -> Text:
+def turning_message(name: str, turning: Turning) -> Text:
     """For the log."""
     powered = turning.kind is not TurnKind.DISABLED
     return text(

@@ -17,8 +17,8 @@ from dataclasses import replace
 from backend.axis import loop
 from backend.axis.axis import Axis
 from backend.axis.restoring import shielded
-from backend.stopping.facts import AxisStop, StepCode, Verdict
-from backend.stopping.settings import (
+from backend.axis.stop.facts import AxisStop, StepCode, Verdict
+from backend.axis.stop.settings import (
     OPTION,
     deceleration_rpm_s,
     known_settings,
@@ -301,7 +301,7 @@ class StopWatch:
         watch, axis = self._watch, self._axis
         units = watch.units
         names = {} if units is None else units.names
-        told = watch.newest is not None
+        reported = watch.newest is not None
         travelled = float(watch.travelled_inc) if units is None else units.position(
             watch.travelled_inc
         )  # fmt: skip
@@ -309,9 +309,9 @@ class StopWatch:
             drive=axis.drive.id,
             verdict=verdict,
             took_s=time.monotonic() - self._began_s,
-            speed=watch.speed() if told else None,
+            speed=watch.speed() if reported else None,
             speed_unit=names.get("velocity", "inc/s"),
-            travelled=travelled if told else None,
+            travelled=travelled if reported else None,
             travel_unit=names.get("position", "inc"),
             steps=tuple(axis.stop_steps),
             problem=problem,

@@ -1,4 +1,4 @@
-"""Results of all tools that have a descriptor, told apart by their field ``tool``.
+"""Results of all tools that have a descriptor, distinguished by their field ``tool``.
 
 Apart from the tools themselves, so that who only reads results imports no analysis.
 """

@@ -102,7 +102,7 @@ class JobRunner:
         # A page outlives a restart of the server: its old jobs must not be taken for new ones.
         self._run_mark = secrets.token_hex(3)
         self._changed = changed
-        self._last_told: dict[str, float] = {}
+        self._last_reported: dict[str, float] = {}
 
     def all(self) -> list[Job]:
         """Jobs, oldest first."""
@@ -210,17 +210,17 @@ class JobRunner:
             self._changed(job)
 
     def _tell(self, job: Job) -> None:
-        """Progress at 10 Hz at most; the end is always told by `_run`."""
+        """Progress at 10 Hz at most; the end is always shown by `_run`."""
         now = time.monotonic()
-        if now - self._last_told.get(job.id, 0.0) >= 0.1:
-            self._last_told[job.id] = now
+        if now - self._last_reported.get(job.id, 0.0) >= 0.1:
+            self._last_reported[job.id] = now
             self._changed(job)
 
     def _drop_old(self) -> None:
         ended = [job for job in self._jobs.values() if not _runs(job)]
         for job in ended[: max(0, len(ended) - self.KEEP)]:
             del self._jobs[job.id]
-            self._last_told.pop(job.id, None)
+            self._last_reported.pop(job.id, None)
 
 
 def _runs(job: Job) -> bool:

@@ -74,7 +74,7 @@ class Judge:
         self._history: dict[int, deque[Truth]] = defaultdict(lambda: deque(maxlen=400))
         self._over = threading.Event()
         self._lock = threading.Lock()
-        self._told: dict[str, float] = {}
+        self._reported: dict[str, float] = {}
         self._thread = threading.Thread(target=self._run, daemon=True, name="judge")
         self._poller = threading.Thread(target=self._poll, daemon=True, name="poller")
         #: Until when nothing is said of the server's answers, and of the drives.
@@ -100,9 +100,9 @@ class Judge:
     def violated(self, text: str, key: str = "") -> bool:
         """Note it; the same again within some seconds is the same. Returns whether it is new."""
         now = time.monotonic()
-        if now - self._told.get(key or text, -60.0) < 20.0:
+        if now - self._reported.get(key or text, -60.0) < 20.0:
             return False
-        self._told[key or text] = now
+        self._reported[key or text] = now
         self.record.violations.append(text)
         self._say(f"VIOLATION: {text}")
         return True

@@ -243,10 +243,10 @@ class Trial:
             problem = job["problem"]
             if problem and problem["type"] == "urn:servodeck:internal":
                 self.judge.violated(f"{job['title']}: {problem['detail']}", problem["detail"][:60])
-        told = [j["problem"]["detail"] for j in jobs if j["problem"]]
-        # What an earlier server was killed with is put back when the axis stands, and told.
-        told += [str(j["result"]) for j in jobs if j["kind"] == "put-back" and j["result"]]
-        self._told = " ".join(told)
+        reported = [j["problem"]["detail"] for j in jobs if j["problem"]]
+        # What an earlier server was killed with is put back when the axis stands, and reported.
+        reported += [str(j["result"]) for j in jobs if j["kind"] == "put-back" and j["result"]]
+        self._reported = " ".join(reported)
 
     def _values(self) -> dict[int, dict[int, bytes]]:
         found: dict[int, dict[int, bytes]] = {}
@@ -267,7 +267,7 @@ class Trial:
                 after = now[axis].get(index)
                 if index == 0x6060 and self._mode_was_chosen:
                     continue
-                if after != value and f"{index:04X}:00" not in self._told:
+                if after != value and f"{index:04X}:00" not in self._reported:
                     self.judge.violated(
                         f"{spec.name}: {index:04X} was {value.hex()} and is "
                         f"{'' if after is None else after.hex()}, and nothing says so",

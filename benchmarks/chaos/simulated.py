@@ -9,7 +9,7 @@ tampered with, STOP is pressed at any moment, of one axis or of all. What must h
 - STOP's answer equals the shaft: who is said to stand stands, and goes on standing; who is said
   to move moves; "unreachable" is a drive whose mailbox is mute.
 - No axis turns without a grant: after STOP nothing moves again by itself, and an axis that turns
-  although nobody here moves it is told within a second of turning, and no other is.
+  although nobody here moves it is reported within a second of turning, and no other is.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from benchmarks.stopping.motions import FAMILIES, MOTIONS
 from benchmarks.stopping.rig import Rig, rig
 
 #: A second, and the time between two looks of a page at a drive that is slow to answer.
-TOLD_S = 1.0 + 0.1
+REPORTED_S = 1.0 + 0.1
 _STANDS_RPM, _TURNS_RPM = 3.0, 12.0
 _EPISODES = 4
 #: Motions that no job of the server knows.
@@ -80,7 +80,7 @@ class Mix:
         except AssertionError:
             return False  # what happened to it before does not let it begin
         if motion not in _SERVERS and self.random.random() < 0.4:
-            await self._must_be_told(bench, motion)
+            await self._must_be_reported(bench, motion)
         tampered = bench.family != "ds_c" and motion in ("profile velocity", "jog", "homing")
         if tampered and self.random.random() < 0.3:
             bench.poke("605A:00", 0)
@@ -114,19 +114,19 @@ class Mix:
                 self.found(bench, f"{motion}: turns again after STOP, {bench.shaft_rpm:.1f} rpm")
         return verdict
 
-    async def _must_be_told(self, bench: Rig, motion: str) -> None:
+    async def _must_be_reported(self, bench: Rig, motion: str) -> None:
         loop = asyncio.get_running_loop()
-        end = loop.time() + TOLD_S
+        end = loop.time() + REPORTED_S
         while bench.connected.monitor.snapshot.turning is None:
             if bench.shaft_rpm < _TURNS_RPM:
                 return
             if loop.time() > end:
-                self.found(bench, f"{motion}: turns without a grant and is not told")
+                self.found(bench, f"{motion}: turns without a grant and is not reported")
                 return
             await asyncio.sleep(0.02)
 
     async def _by_hand(self, bench: Rig) -> None:
-        """Somebody turns the shaft of a disabled axis: told, and not as an enabled one."""
+        """Somebody turns the shaft of a disabled axis: reported, and not as an enabled one."""
         for n in range(60):
             bench.link.catch_up()
             bench.device.inject("turn_to_rev", bench.shaft_deg / 360.0 + 0.04)
@@ -134,15 +134,15 @@ class Mix:
             found = bench.connected.monitor.snapshot.turning
             if found is not None:
                 if found.kind.value != "disabled":
-                    self.found(bench, f"turned by hand, told as {found.kind.value}")
+                    self.found(bench, f"turned by hand, reported as {found.kind.value}")
                 break
             if n == 59:
-                self.found(bench, "turned by hand for 1.2 s and not told")
+                self.found(bench, "turned by hand for 1.2 s and not reported")
         await asyncio.sleep(1.0)
 
     @contextlib.asynccontextmanager
     async def _watched(self, bench: Rig) -> AsyncIterator[None]:
-        """Nothing is told of an axis that a job moves, or that stands."""
+        """Nothing is reported about an axis that a job moves, or that stands."""
         over = asyncio.Event()
 
         async def look() -> None:
@@ -150,13 +150,13 @@ class Mix:
             while not over.is_set():
                 await asyncio.sleep(0.05)
                 stood_s = 0.0 if bench.shaft_rpm > 1.0 else stood_s + 0.05
-                told = bench.connected.monitor.snapshot.turning
+                reported = bench.connected.monitor.snapshot.turning
                 job = bench.bench.jobs.moving(bench.connected.drive.id)
-                wrong = told is not None and (stood_s > 1.0 or job is not None)
+                wrong = reported is not None and (stood_s > 1.0 or job is not None)
                 wrong_s = wrong_s + 0.05 if wrong else 0.0
                 # What was read before a job began is shown until the next poll.
-                if told is not None and wrong_s > 0.3:
-                    self.found(bench, f"told to turn at {told.speed:.0f}, without a reason")
+                if reported is not None and wrong_s > 0.3:
+                    self.found(bench, f"reported to turn at {reported.speed:.0f}, without a reason")
                     return
 
         looking = asyncio.create_task(look())

@@ -253,10 +253,12 @@ class TrialStation:
     def object(self, axis: int, index: int, subindex: int = 0) -> bytes:
         """An object's value by the drive's own word."""
         if self.bus == "ethercat":
-            told = self.trouble("read", slave=axis, index=index, subindex=subindex)
+            reported = self.trouble("read", slave=axis, index=index, subindex=subindex)
         else:
-            told = self.trouble("read", axis=self.specs[axis].name, index=index, subindex=subindex)
-        return bytes.fromhex(str(told))
+            reported = self.trouble(
+                "read", axis=self.specs[axis].name, index=index, subindex=subindex
+            )
+        return bytes.fromhex(str(reported))
 
     def truth(self, axis: int) -> Truth | None:
         """None while the virtual drives themselves cannot be asked."""
@@ -291,13 +293,13 @@ class TrialStation:
     def figures(self) -> dict[str, Any]:
         """Tasks, threads, file descriptors, memory in MiB."""
         assert self.process is not None
-        told = self.tell_server(do="tell")
+        reported = self.tell_server(do="tell")
         folder = Path(f"/proc/{self.process.pid}")
         status = (folder / "status").read_text()
         rss = next(line for line in status.splitlines() if line.startswith("VmRSS"))
-        told["files"] = len(list((folder / "fd").iterdir()))
-        told["mib"] = int(rss.split()[1]) / 1024
-        return dict(told)
+        reported["files"] = len(list((folder / "fd").iterdir()))
+        reported["mib"] = int(rss.split()[1]) / 1024
+        return dict(reported)
 
     def client(self) -> httpx.Client:
         return httpx.Client(base_url=f"{self.root}/api/v1", timeout=30)

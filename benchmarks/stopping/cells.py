@@ -50,7 +50,7 @@ class Outcome:
 
     @property
     def held(self) -> bool:
-        """It stood, or nothing could be told to the drive and that was said."""
+        """It stood, or nothing could be commanded to the drive and that was said."""
         if self.trouble == "mailbox mute" and self.motion != _BY_PROCESS_DATA:
             return self.truthful and self.verdict == "unreachable"
         # What no command brakes must be said: a drive's own fault reaction, and EP3E's CST.

@@ -110,8 +110,8 @@ class RigLink(DirectLink):
         if not self.running:
             return {}
         values = self._unpack.unpack(self._latched)
-        told = {name: values[place] for place, name in self._columns[1]}
-        return {name: told[name] for name in channels if name in told}
+        reported = {name: values[place] for place, name in self._columns[1]}
+        return {name: reported[name] for name in channels if name in reported}
 
 
 @dataclass

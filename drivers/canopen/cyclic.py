@@ -251,8 +251,8 @@ class CanopenCyclic:
 
     def newest(self, channels: Sequence[str], within_s: float) -> dict[str, int | float]:
         """See `drivers.link.TellsNewest`."""
-        told = {} if self._loop is None else self._loop.newest(within_s)
-        return {channel: told[channel] for channel in channels if channel in told}
+        reported = {} if self._loop is None else self._loop.newest(within_s)
+        return {channel: reported[channel] for channel in channels if channel in reported}
 
     # Power states (drivers.link.OwnsPowerState)
 

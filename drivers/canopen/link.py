@@ -86,7 +86,7 @@ class CanopenLink:
         self._workers: ThreadPoolExecutor | None = None
         self._listeners: list[Callable[[LinkEvent], None]] = []
         self._used: set[int] = set()
-        self._strays_told = dict.fromkeys(range(1, 128), 0)
+        self._strays_reported = dict.fromkeys(range(1, 128), 0)
         self._cyclic = CanopenCyclic(
             self._port, self._settings, self._sdo_read, self._sdo_write, self._in_worker, clock
         )
@@ -268,7 +268,7 @@ class CanopenLink:
         )
 
     def listen(self, listener: Callable[[LinkEvent], None]) -> Unsubscribe:
-        """Be told of boot-ups, emergencies, lost nodes, bus-off …, on the event loop's thread."""
+        """Subscribe to boot-ups, emergencies, lost nodes, bus-off …; on the event loop's thread."""
         self._listeners.append(listener)
 
         def leave() -> None:
@@ -359,8 +359,8 @@ class CanopenLink:
                 ask, lost = self._watch.guard_due(self._settings.guard_s, now_s)
                 events += lost
             for node, channel in self._channels.items():
-                if channel.strays > self._strays_told[node]:
-                    self._strays_told[node] += 1
+                if channel.strays > self._strays_reported[node]:
+                    self._strays_reported[node] += 1
                     event = self._watch.stray_answer(node, now_s)
                     events += [event] if event else []
         for event in events:

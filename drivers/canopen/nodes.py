@@ -44,7 +44,7 @@ _BOOTS_KEPT = 8
 _DUPLICATE_WINDOW_S = 10.0
 _FORGIVEN_S = 60.0
 """Two nodes with one number go on answering twice; what a busy computer mixed up does not."""
-#: A drive that flickers sends hundreds of emergencies a second: so many of a node are told in one.
+#: A drive that flickers sends hundreds of emergencies a second; so many of a node are reported.
 _EMERGENCIES_PER_S = 10
 
 
@@ -73,7 +73,7 @@ class NodeRecord:
     open_emergency: int | None = None
     """The last emergency, until it is taken back (code 0) or the node restarts."""
     emergency_window_s: float | None = None
-    emergencies_told: int = 0
+    emergencies_reported: int = 0
     emergencies_untold: int = 0
     guard_toggle: int | None = None
     toggle_repeated_s: float | None = None
@@ -199,27 +199,27 @@ class NodeWatch:
         text = emergency_text(code)
         if code == 0x8150:
             record.conflict = text
-        if record.emergencies_told >= _EMERGENCIES_PER_S:
+        if record.emergencies_reported >= _EMERGENCIES_PER_S:
             record.emergencies_untold += 1
             return events
-        record.emergencies_told += 1
+        record.emergencies_reported += 1
         extra = f", maker's bytes {data[3:8].hex(' ')}" if any(data[3:8]) else ""
-        told = LinkEvent(
+        reported = LinkEvent(
             "emergency",
             record.node,
             f"node {record.node}: {text} (emergency {code:04X}h, "
             f"error register {data[2]:02X}h{extra})",
             code,
         )
-        return [*events, told]
+        return [*events, reported]
 
     def _end_of_storm(self, record: NodeRecord, now_s: float) -> list[LinkEvent]:
-        """Every second emergencies are told again, after how many were not."""
+        """Every second emergencies are reported again, after how many were not."""
         if record.emergency_window_s is not None and now_s - record.emergency_window_s < 1.0:
             return []
         untold, code = record.emergencies_untold, record.last_emergency
         record.emergency_window_s = now_s
-        record.emergencies_told = record.emergencies_untold = 0
+        record.emergencies_reported = record.emergencies_untold = 0
         if not untold:
             return []
         text = (
@@ -229,7 +229,7 @@ class NodeWatch:
         return [LinkEvent("emergency", record.node, text, code)]
 
     def overdue(self, now_s: float) -> list[LinkEvent]:
-        """Nodes whose heartbeat stopped, each told of once; and emergencies not told yet."""
+        """Nodes whose heartbeat stopped, each once; and emergencies not reported yet."""
         events = []
         for record in self.nodes.values():
             if record.emergencies_untold:

@@ -208,4 +208,4 @@ class CanPort:
             try:
                 bus.shutdown()
             except ADAPTER_ERRORS:
-                return  # a dead adapter cannot be told to close; its descriptor is gone with it
+                return  # a dead adapter cannot be closed; its descriptor is gone with it

@@ -67,7 +67,7 @@ def upload(index: int, subindex: int, block_above: int | None = None) -> Transfe
 
     Raises:
         Rejected: the server aborted.
-        ProtocolError: an answer that CiA 301 does not allow; the server has been told.
+        ProtocolError: an answer that CiA 301 does not allow; the server has been informed.
     """
     mux = multiplexer(index, subindex)
     answer = yield Exchange((bytes([0x40]) + mux + bytes(4),), mux)
@@ -130,7 +130,7 @@ def download(index: int, subindex: int, data: bytes) -> Transfer[None]:
 
     Raises:
         Rejected: the server aborted.
-        ProtocolError: an answer that CiA 301 does not allow; the server has been told.
+        ProtocolError: an answer that CiA 301 does not allow; the server has been informed.
     """
     mux = multiplexer(index, subindex)
     if 1 <= len(data) <= 4:
@@ -162,7 +162,7 @@ def block_upload(index: int, subindex: int) -> Transfer[bytes]:
 
     Raises:
         Rejected: the server aborted; code 05040001h means that it has no block transfer.
-        ProtocolError: wrong CRC, length or answer; the server has been told.
+        ProtocolError: wrong CRC, length or answer; the server has been informed.
     """
     mux = multiplexer(index, subindex)
     answer = yield Exchange((b"\xa4" + mux + bytes([_BLOCK, 0, 0, 0]),), mux)
@@ -214,7 +214,7 @@ def block_download(index: int, subindex: int, data: bytes) -> Transfer[None]:
 
     Raises:
         Rejected: the server aborted; code 05040001h means that it has no block transfer.
-        ProtocolError: an answer that CiA 301 does not allow; the server has been told.
+        ProtocolError: an answer that CiA 301 does not allow; the server has been informed.
     """
     mux = multiplexer(index, subindex)
     answer = yield Exchange((b"\xc6" + mux + struct.pack("<I", len(data)),), mux)

@@ -31,7 +31,7 @@ _BRAKE_WHEN_SILENT_S = 0.05
 _GIVE_UP_WHEN_SILENT_S = 0.3
 _LATENESS_KEPT = 4096
 _SILENT = Halted(HaltCause.LOST, note=text("canopen.cyclic-data-stopped-coming"))
-_SILENT_BRAKED = Halted(HaltCause.LOST, note=text("canopen.cyclic-data-stopped-coming-told"))
+_SILENT_BRAKED = Halted(HaltCause.LOST, note=text("canopen.cyclic-data-stopped-coming-reported"))
 
 
 class LoopClock(Protocol):

@@ -194,7 +194,7 @@ class EthercatLink:
         )
 
     def listen(self, listener: Callable[[LinkEvent], None]) -> Unsubscribe:
-        """Be told of lost and returned stations, emergencies, states, and restarts of the host."""
+        """Subscribe to lost and returned stations, emergencies, states, restarts of the host."""
         self._listeners.append(listener)
 
         def unsubscribe() -> None:

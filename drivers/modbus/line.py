@@ -57,7 +57,7 @@ class Counters:
 class Line:
     """Master of one serial line. Not thread-safe: one thread calls it.
 
-    ``on_change`` is told of loss (False) and return (True) of the adapter, on the line's thread.
+    ``on_change`` gets loss (False) and return (True) of the adapter, on the line's thread.
     ``clock`` and ``sleep`` count seconds; ``opener`` makes the port: tests give their own.
     """
 

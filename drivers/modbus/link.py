@@ -158,7 +158,7 @@ class RegisterLink:
         *,
         stop_after: int | None = None,
     ) -> list[Found]:
-        """Ask each address once (1 to 247 unless told) and identify those that answer.
+        """Ask each address once (1 to 247 unless given) and identify those that answer.
 
         A refusal counts as an answer. Where an answer seems to have come too late, those that it
         may be of are asked again at the end. ``stop_after`` ends the search after so many drives.
@@ -233,7 +233,7 @@ class RegisterLink:
         return self._line.quality(station)
 
     def listen(self, listener: Callable[[LinkEvent], None]) -> Unsubscribe:
-        """Be told of loss and return of the adapter."""
+        """Be notified of loss and return of the adapter."""
         self._listeners.append(listener)
 
         def unsubscribe() -> None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from drivers.halt import HaltCause, Halted
-from drivers.motion.feedback import (
+from drivers.feedback import (
     LIMIT_MARGIN,
     WINDOW_S,
     Contradiction,
     FeedbackScale,
     FeedbackWatch,
 )
+from drivers.halt import HaltCause, Halted
 
 
 class SpeedGuard:
@@ -60,5 +60,5 @@ class SpeedGuard:
 def _of(contradiction: Contradiction) -> Halted:
     kind = contradiction.kind
     return Halted(
-        HaltCause.CONTRADICTION, "speed", contradiction.told, contradiction.seen, kind.value
+        HaltCause.CONTRADICTION, "speed", contradiction.reported, contradiction.seen, kind.value
     )

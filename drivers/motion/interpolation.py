@@ -11,4 +11,4 @@ def interpolation_period(cycle_ns: int) -> tuple[int, int]:
         unit_ns = 10 ** (9 + exponent)
         if cycle_ns % unit_ns == 0 and cycle_ns // unit_ns <= 255:
             return cycle_ns // unit_ns, exponent
-    raise NotAllowed("cyclic.cycle-cannot-told-drive", cycle_us=cycle_ns / 1000)
+    raise NotAllowed("cyclic.cycle-cannot-reported-drive", cycle_us=cycle_ns / 1000)

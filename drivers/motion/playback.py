@@ -52,7 +52,7 @@ _DISABLED = Halted(HaltCause.COMMANDED, note=text("cyclic.axis-being-disabled"))
 _PAUSED = Halted(HaltCause.COMMANDED, note=text("cyclic.motion-ended"))
 _RESTLESS_STILL = Halted(HaltCause.COMMANDED, note=text("cyclic.not-come-rest-ramp"))
 _STALE_CYCLES = 3
-"""Samples that may be older than what a mailbox told before an axis was enabled anew."""
+"""Samples that may be older than what a mailbox reported before an axis was enabled anew."""
 _SETTLES = 2
 """An axis that lags behind its ramp may take so many times its length longer to be held."""
 _REST_S, _GIVE_UP = 0.05, 30
@@ -254,7 +254,7 @@ class AxisLoop:
     def blind(self) -> None:
         """A cycle without trusted inputs: setpoints go on, nothing is concluded from inputs.
 
-        Once it has braked, the axis is told to quick-stop whether or not it is heard: nobody knows
+        Once it has braked, a quick stop is commanded whether or not it is heard: nobody knows
         whether it stands, and disabled by other words it would coast.
         """
         self._cycles += 1
@@ -315,7 +315,7 @@ class AxisLoop:
                 self.stop(Halted.beyond("following error", error, limits.following_error_max))
 
     def _no_faster_than_it_turns(self, values: Sequence[int]) -> None:
-        """What does not follow (a blocked axis) is braked from its own speed, not from the told.
+        """What does not follow (a blocked axis) is braked from its own speed, not that of the ramp.
 
         Else its loop would push on, and with more and more torque, for as long as it brakes.
         """
@@ -326,9 +326,9 @@ class AxisLoop:
             self._setpoint = min(max(actual, low), high)
 
     def _following_error(self, values: Sequence[int]) -> float:
-        told = self._value(values, FOLLOWING)
-        if told is not None:
-            return told
+        reported = self._value(values, FOLLOWING)
+        if reported is not None:
+            return reported
         actual = self._value(values, ACTUAL_POSITION)
         moving = self._motion is not None and self._motion.target == POSITION
         return self._setpoint - actual if moving and actual is not None else 0.0

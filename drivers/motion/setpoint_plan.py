@@ -10,7 +10,7 @@ from typing import Any
 
 from drivers import cia402
 from drivers.errors import NotAllowed
-from drivers.motion.feedback import FeedbackScale
+from drivers.feedback import FeedbackScale
 
 #: The objects of CiA 402-2 that a motion commands and watches.
 CONTROL, MODE, POSITION, VELOCITY, TORQUE = 0x6040, 0x6060, 0x607A, 0x60FF, 0x6071

@@ -27,7 +27,7 @@ def import_file(
     product_code: int | None = None,
     revision: int | None = None,
 ) -> ImportedProfile:
-    """A profile from an ESI, EDS or DCF file, told apart by their contents.
+    """A profile from an ESI, EDS or DCF file, distinguished by their contents.
 
     Of an ESI file with several devices the one with ``product_code`` (and ``revision``) is
     taken; without them the newest revision of the first product that has 6040h. The result says

@@ -46,7 +46,7 @@ class FileTask:
 
 @dataclass(frozen=True, slots=True)
 class DescriptionTask:
-    """Make a profile called ``name`` from what a drive told and write it to ``folder``."""
+    """Make a profile called ``name`` from what a drive reported and write it to ``folder``."""
 
     description: Description
     report: ImportReport

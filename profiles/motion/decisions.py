@@ -53,14 +53,14 @@ def classify(
         OSError: the profile's folder cannot be written.
     """
     parameter = _changeable(drive, key)
-    told = " ".join(reason.split())[:_MAX_REASON]
-    if not told:
+    reported = " ".join(reason.split())[:_MAX_REASON]
+    if not reported:
         raise CannotClassify(f"{parameter.key}: say why it has this class")
     rule = MotionRule(
         keys=(parameter.key,),
         motion=motion,
         safe_in_motion=safe_in_motion,
-        reason=told,
+        reason=reported,
         origin="person",
     )
     _write(drive, (rule, *_without(drive, parameter.key)))

@@ -36,13 +36,13 @@ def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
 
 
 def test_what_the_drive_lists_is_a_profile(station: Station) -> None:
-    body = {"url": URL, "station": 1, "profile": "as_told"}
+    body = {"url": URL, "station": 1, "profile": "as_reported"}
     made = station.done(station.http.post("/descriptions/from-drive", json=body), 60)
     assert made["links"] == ["ethercat"]
     assert made["parameters"] > 50
     twice = station.http.post("/descriptions/from-drive", json=body)
     assert twice.status_code == 409
-    drive = station.add(1, URL, "as_told", "T")
+    drive = station.add(1, URL, "as_reported", "T")
     try:
         rows = {r["key"]: r for r in station.ok(station.http.get(f"/drives/{drive}/parameters"))}
         assert rows["6083:00"]["type"] == "UINT32"

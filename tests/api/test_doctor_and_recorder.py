@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 from backend import cli
-from backend.recording import capture
+from backend.station.recording import capture
 from drivers.virtual.wires.netns import unavailable
 from tests.support.station import HANG_S, Station, until
 
@@ -109,8 +109,8 @@ def test_a_bus_that_is_not_open_is_not_found(station: Station) -> None:
 
 def test_the_command_writes_the_file(station: Station, tmp_path: Path) -> None:
     out = tmp_path / "bus.pcapng"
-    told = command(station, "bus", "record", CAN, "--out", str(out))
-    assert told == f"{out}: {out.stat().st_size} bytes\n"
+    reported = command(station, "bus", "record", CAN, "--out", str(out))
+    assert reported == f"{out}: {out.stat().st_size} bytes\n"
     assert decoded(out.read_bytes(), tmp_path, "can")
 
 

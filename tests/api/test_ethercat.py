@@ -261,11 +261,11 @@ def test_command_line_finds_reads_writes_and_saves(station: Station, axes: tuple
     best = [(row["station"], row["profiles"][0]) for row in found]
     assert best == [(1, "mms7"), (2, "mms7")]
     at_b = ("--station", "2")
-    told = command(station, "params", "set", URL, "2005:03=160", *at_b)
-    assert told.startswith("2005:03  ")
-    assert "= 160.0 " in told
-    assert "[raw 1600]" in told
-    assert told in command(station, "params", "get", URL, "2005:03", "6041:00", *at_b)
+    reported = command(station, "params", "set", URL, "2005:03=160", *at_b)
+    assert reported.startswith("2005:03  ")
+    assert "= 160.0 " in reported
+    assert "[raw 1600]" in reported
+    assert reported in command(station, "params", "get", URL, "2005:03", "6041:00", *at_b)
     assert "saved in the drive's memory" in command(station, "params", "save", URL, *at_b)
     _, b = axes
     reading = station.ok(station.http.get(f"/drives/{b}/parameters/2005:03"))
@@ -289,8 +289,10 @@ def test_command_line_compares_and_loads(
     shown = command(station, "params", "diff", URL, str(file), *at_b, code=1)
     assert "2005:03" in shown
     assert "drive 180.0 Hz  [raw 1800] → file 170.0 Hz  [raw 1700]" in shown
-    told = json.loads(command(station, "params", "diff", URL, str(file), "--json", *at_b, code=1))
-    assert [(row["key"], row["drive_value"], row["unit"]) for row in told] == [
+    reported = json.loads(
+        command(station, "params", "diff", URL, str(file), "--json", *at_b, code=1)
+    )
+    assert [(row["key"], row["drive_value"], row["unit"]) for row in reported] == [
         ("2005:03", 180.0, "Hz")
     ]
     done = command(station, "params", "load", URL, str(file), "--yes", *at_b)
@@ -334,11 +336,11 @@ def test_command_line_jogs_and_records(
     assert station.state(b)["position"] > before + 0.5
     assert station.ok(station.http.get("/buses"))[0]["cyclic"] is None, "as it was before"
     file = tmp_path / "x.csv"
-    told = command(
+    reported = command(
         station, "scope", URL, "6064:00", "606C:00", "--station", "1", "--station", "2",
         "--seconds", "1", "--out", str(file), "--cycle-us", "1000",
     )  # fmt: skip
-    assert "lost on the way" in told
+    assert "lost on the way" in reported
     head, *rows = file.read_text().splitlines()
     assert head.startswith("time [s],")
     assert [title.split()[:2] for title in head.replace('"', "").split(",")[1:]] == [

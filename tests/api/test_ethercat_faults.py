@@ -1,6 +1,6 @@
 """Trouble on an EtherCAT segment, as a user of the interface sees it.
 
-Each fault: told in words, the server answers meanwhile, the axis stands, and all is well again
+Each fault: reported in words, the server answers meanwhile, the axis stands, and all is well again
 without a restart once the cause is gone. Times of the drives follow the frames, so a busy test
 machine changes nothing but how long this takes.
 """
@@ -63,7 +63,7 @@ class Segment:
         answer = self.station.http.get("/ethercat/segment", params={"url": URL})
         return self.station.ok(answer)
 
-    def told(self, *words: str, after: int, within_s: float = 10.0) -> str:
+    def reported(self, *words: str, after: int, within_s: float = 10.0) -> str:
         """The line of the log with all these words that is newer than `lines`."""
 
         def seen() -> str:
@@ -215,7 +215,7 @@ def test_cut_cable_stops_the_axis_behind_it_and_heals(running: Segment) -> None:
         running.trouble("cut", cable=1)
         ended = page.wait("jog_ended", drive=running.b, timeout_s=20)
     assert LOST.search(reason(ended)), ended
-    running.told("station 2", "no longer answers: supply off or cable cut", after=before)
+    running.reported("station 2", "no longer answers: supply off or cable cut", after=before)
     running.stands()
     view = running.view()
     assert [station["answers"] for station in view["stations"]] == [True, False]
@@ -228,7 +228,7 @@ def test_cut_cable_stops_the_axis_behind_it_and_heals(running: Segment) -> None:
     )
     assert (second["behind_station"], second["behind_port"]) == (1, 1), "although it is cut"
     running.trouble("heal", cable=1)
-    running.told("station 2 is in OP again", after=before)
+    running.reported("station 2 is in OP again", after=before)
     assert running.station.state(running.b)["state"] != "Operation enabled"
     running.settled()
     running.jogs()
@@ -240,9 +240,9 @@ def test_power_cycle_of_a_slave(running: Segment) -> None:
         running.trouble("power_cycle", slave=B, off_s=1.0)
         ended = page.wait("jog_ended", drive=running.b, timeout_s=20)
     assert LOST.search(reason(ended)), ended
-    running.told("station 2", "no longer answers", after=before)
-    running.told("station 2 was switched on again", after=before)
-    running.told("station 2 is in OP again", after=before)
+    running.reported("station 2", "no longer answers", after=before)
+    running.reported("station 2 was switched on again", after=before)
+    running.reported("station 2 is in OP again", after=before)
     running.stands()
     assert running.station.state(running.b)["state"] != "Operation enabled"
     running.settled()
@@ -254,9 +254,9 @@ def test_mute_mailbox_ends_in_words_while_process_data_go_on(running: Segment) -
     began = time.monotonic()
     answer = running.station.http.get(f"/drives/{running.b}/parameters/2005:03")
     assert time.monotonic() - began < 6
-    told = answer.json()
-    words = told.get("detail") or told.get("error")
-    assert "did not answer in time" in words, told
+    reported = answer.json()
+    words = reported.get("detail") or reported.get("error")
+    assert "did not answer in time" in words, reported
     assert running.view()["stations"][1]["state"] == "OP", "its process data still come"
     answer = running.station.http.get(f"/drives/{running.a}/parameters/2005:03")
     assert answer.json()["raw"] is not None, "the neighbour is served"
@@ -313,7 +313,7 @@ def test_wrong_working_counters_are_counted_and_brake_when_they_stay(running: Se
     with running.station.live() as page, turning(page, running):
         running.trouble("counter", by=-1)
         page.wait("jog_ended", drive=running.b, timeout_s=20)
-    running.told("no valid process data", "the axis is braked", after=before)
+    running.reported("no valid process data", "the axis is braked", after=before)
     within(10, lambda: running.view()["exchange"]["wkc_errors"] >= 30, "they are counted")
     running.stands()
     running.trouble("peace")
@@ -396,10 +396,10 @@ def test_killed_host_ends_the_motion_and_is_replaced(running: Segment) -> None:
         os.kill(first, signal.SIGKILL)
         ended = page.wait("jog_ended", drive=running.b, timeout_s=20)
     assert reason(ended).strip()
-    running.told("the EtherCAT process died", after=before)
-    running.told("the cyclic exchange broke off: the EtherCAT process died", after=before)
-    running.told("the EtherCAT process runs again", after=before)
-    running.told(
+    running.reported("the EtherCAT process died", after=before)
+    running.reported("the cyclic exchange broke off: the EtherCAT process died", after=before)
+    running.reported("the EtherCAT process runs again", after=before)
+    running.reported(
         "the cyclic exchange runs again; every axis is disabled until you enable it",
         after=before, within_s=20,
     )  # fmt: skip
@@ -417,7 +417,7 @@ def test_an_exchange_that_is_being_set_up_again_can_be_ended(running: Segment) -
     before = running.lines()
     running.trouble("refuse", slave=B, state="SAFEOP", code=0x001D)
     os.kill(host_process(), signal.SIGKILL)
-    running.told("could not be set up again", "invalid output configuration", after=before)
+    running.reported("could not be set up again", "invalid output configuration", after=before)
     assert not running.exchange()["running"]
     assert "refuses SAFEOP" in running.exchange()["problem"]
     enabling = {"goal": "Operation enabled", "mode": 1}
@@ -438,11 +438,11 @@ def test_killed_segment_ends_the_motion_and_is_found_again(running: Segment) -> 
         running.station.drives.segments[URL].kill()
         ended = page.wait("jog_ended", drive=running.b, timeout_s=20)
     assert reason(ended).strip()
-    running.told("station 1", "no longer answers", after=before)
-    running.told("station 2", "no longer answers", after=before)
+    running.reported("station 1", "no longer answers", after=before)
+    running.reported("station 2", "no longer answers", after=before)
     assert [s["answers"] for s in running.view()["stations"]] == [False, False]
     running.start_again()
-    running.told("station 2 is in OP again", after=before, within_s=20)
+    running.reported("station 2 is in OP again", after=before, within_s=20)
     running.settled()
     running.stands()
     running.jogs()

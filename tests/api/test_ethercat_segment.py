@@ -157,10 +157,10 @@ def test_firmware_that_fails_says_how_far_it_came_and_what_to_do(station: Statio
     until(lambda: station.ok(station.http.get(f"/jobs/{job['id']}"))["state"] != "running", 60)
     ended = station.ok(station.http.get(f"/jobs/{job['id']}"))
     assert ended["state"] == "failed", ended
-    told = ended["problem"]["detail"]
-    assert "flash memory error" in told
-    assert "after 1500 of 4000 bytes" in told
-    assert "it may be without firmware" in told
+    reported = ended["problem"]["detail"]
+    assert "flash memory error" in reported
+    assert "after 1500 of 4000 bytes" in reported
+    assert "it may be without firmware" in reported
     segment.command("firmware", slave=0)
     job = station.ok(load(station, "a", bytes(4000), confirmed=True))
     until(lambda: station.ok(station.http.get(f"/jobs/{job['id']}"))["state"] == "done", 60)
@@ -168,9 +168,9 @@ def test_firmware_that_fails_says_how_far_it_came_and_what_to_do(station: Statio
 
 def test_permissions_of_an_interface_that_is_not_there(station: Station) -> None:
     query = {"url": "ethercat://nosuch0"}
-    told = station.ok(station.http.get("/ethercat/permissions", params=query))
-    assert told["ready"] is False
-    assert told["text"] == "there is no network interface 'nosuch0' on this computer"
+    reported = station.ok(station.http.get("/ethercat/permissions", params=query))
+    assert reported["ready"] is False
+    assert reported["text"] == "there is no network interface 'nosuch0' on this computer"
     wrong = station.http.get("/ethercat/permissions", params={"url": "canopen://x"})
     assert wrong.status_code == 422
     unknown = station.http.get("/ethercat/segment", params={"url": "ethercat://other"})

@@ -143,7 +143,7 @@ def test_what_a_killed_server_left_in_the_drive_is_put_back(
         within(5, lambda: again.http.get(f"/drives/{x}/state").json()["fresh"], "it is back")
 
         def let_go() -> bool:
-            """Nobody holds the axis any more: it is told to, unless the server just stops it."""
+            """Nobody holds the axis any more: it is reported, unless the server just stops it."""
             shown = again.http.get(f"/drives/{x}/state").json()["state"]
             body = {"goal": "Switch on disabled"}
             path = f"/drives/{x}/transition"
@@ -151,13 +151,13 @@ def test_what_a_killed_server_left_in_the_drive_is_put_back(
 
         def put_back() -> bool:
             """On one press, again where the server was just about it by itself."""
-            owed = {
+            pending = {
                 o["key"]: o["raw"]
                 for o in again.http.get(f"/drives/{x}").json()["pending_restores"]
             }
-            if not owed:
+            if not pending:
                 return True
-            assert owed.get("6083:00", before) == before
+            assert pending.get("6083:00", before) == before
             assert again.http.post(f"/drives/{x}/jobs/put-back").status_code in (202, 409)
             return False
 

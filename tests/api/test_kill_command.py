@@ -51,14 +51,14 @@ class Bench:
 
     def run(self, *arguments: str) -> tuple[str, str]:
         process = self.start(*arguments)
-        out, told = process.communicate(timeout=HANG_S)
-        assert process.returncode == 0, told
-        return out, told
+        out, reported = process.communicate(timeout=HANG_S)
+        assert process.returncode == 0, reported
+        return out, reported
 
     def held(self, *keys: str) -> tuple[dict[str, int], str]:
         """Raw values in the drive, and what the command says besides."""
-        out, told = self.run("params", "get", self.url, *keys, "--station", "1", "--json")
-        return {row["key"]: row["raw"] for row in json.loads(out)}, told
+        out, reported = self.run("params", "get", self.url, *keys, "--station", "1", "--json")
+        return {row["key"]: row["raw"] for row in json.loads(out)}, reported
 
     def noted(self) -> dict[str, dict[str, object]]:
         """Values of the one restore list, by key."""
@@ -103,17 +103,17 @@ def canopen(tmp_path: Path) -> Iterator[Bench]:
         yield Bench(tmp_path, drives.addresses["canopen://virtual0"], drives, list)
 
 
-def test_a_sweep_killed_on_ethercat_is_told_and_restored_by_a_command(ethercat: Bench) -> None:
+def test_a_sweep_killed_on_ethercat_is_reported_and_restored_by_a_command(ethercat: Bench) -> None:
     before, quiet = ethercat.held(MODE, QUICK_STOP)
     assert "borrowed" not in quiet
     ethercat.sweep_killed(QUICK_STOP)
     noted = ethercat.noted()
     assert {key: noted[key]["raw"] for key in before} == before, "noted before the first write"
-    left, told = ethercat.held(MODE, QUICK_STOP)
+    left, reported = ethercat.held(MODE, QUICK_STOP)
     assert left[QUICK_STOP] != before[QUICK_STOP]
-    assert "`servodeck sweep` was cut off" in told
-    assert f"{QUICK_STOP} (was {before[QUICK_STOP]})" in told
-    assert "servodeck params restore ethercat://ec0m --station 1" in told
+    assert "`servodeck sweep` was cut off" in reported
+    assert f"{QUICK_STOP} (was {before[QUICK_STOP]})" in reported
+    assert "servodeck params restore ethercat://ec0m --station 1" in reported
     _, restored = ethercat.run("params", "restore", ethercat.url, "--station", "1")
     assert f"restored: {QUICK_STOP} = {before[QUICK_STOP]}" in restored
     after, quiet = ethercat.held(MODE, QUICK_STOP)
@@ -125,9 +125,9 @@ def test_a_sweep_killed_on_ethercat_is_told_and_restored_by_a_command(ethercat: 
 def test_a_sweep_killed_on_canopen_is_restored_by_the_next_server(canopen: Bench) -> None:
     before, _ = canopen.held(MODE, RAMP)
     canopen.sweep_killed(RAMP, "--consent", "--cycle-ms", "4")
-    left, told = canopen.held(MODE, RAMP)
+    left, reported = canopen.held(MODE, RAMP)
     assert left != before
-    assert f"{RAMP} (was {before[RAMP]})" in told
+    assert f"{RAMP} (was {before[RAMP]})" in reported
     server = ServerProcess(canopen.state)
     try:
         body = {"url": canopen.url, "station": 1, "profile": "ds_c"}

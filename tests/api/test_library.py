@@ -292,7 +292,7 @@ async def audit_status(http: httpx.AsyncClient, *, troubled: bool) -> Any:
             await asyncio.sleep(0.02)
 
 
-async def test_a_database_that_cannot_be_used_is_told_and_motion_goes_on(
+async def test_a_database_that_cannot_be_used_is_reported_and_motion_goes_on(
     tmp_path: Path, http: httpx.AsyncClient, bench: Bench
 ) -> None:
     await bench.audit.settled(5.0)

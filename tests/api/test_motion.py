@@ -1,4 +1,4 @@
-"""Motion through the interface: the axis moves as told, and stops in every way it must."""
+"""Motion through the interface: the axis moves as reported, and stops in every way it must."""
 
 from __future__ import annotations
 
@@ -143,8 +143,8 @@ def test_pulled_cable_ends_within_the_lead(station: Station, x: str, page: Live)
 
 def past_the_wire(station: Station) -> float:
     """The drive's own position, in revolutions."""
-    told = station.drives.command(do="read", axis="Feed screw", index=0x6064, subindex=0)
-    return int.from_bytes(bytes.fromhex(str(told)), "little", signed=True) / 65536
+    reported = station.drives.command(do="read", axis="Feed screw", index=0x6064, subindex=0)
+    return int.from_bytes(bytes.fromhex(str(reported)), "little", signed=True) / 65536
 
 
 def test_somebody_else_cannot_move_a_held_axis(station: Station, x: str, page: Live) -> None:

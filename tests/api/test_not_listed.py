@@ -129,8 +129,8 @@ def test_a_person_classifies_an_object_of_an_imported_profile(station: Station) 
         body = {"motion": "at_enable", "safe_in_motion": True, "reason": "page 12"}
         now = station.ok(station.http.put(where, json=body))
         assert (now["motion"], now["origin"], now["reason"]) == ("at_enable", "person", "page 12")
-        told = station.ok(station.http.get("/audit"))["events"]
-        line = next(each for each in told if each["target"] == where)
+        reported = station.ok(station.http.get("/audit"))["events"]
+        line = next(each for each in reported if each["target"] == where)
         assert (line["action"], line["kind"]) == ("changed", "station")
         assert "energises" in str(line["old"])
         assert "page 12" in str(line["new"])

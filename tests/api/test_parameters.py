@@ -39,7 +39,7 @@ def test_read_all(station: Station, x: str) -> None:
     assert "MLink cannot tell" in answer.json()["detail"]
 
 
-def test_write_is_read_back_and_told_to_everybody(station: Station, x: str) -> None:
+def test_write_is_read_back_and_reported_to_everybody(station: Station, x: str) -> None:
     with station.live() as page:
         answer = station.ok(
             station.http.put(f"/drives/{x}/parameters/6081:00", json={"raw": 123456})
@@ -47,8 +47,8 @@ def test_write_is_read_back_and_told_to_everybody(station: Station, x: str) -> N
         assert answer["raw"] == 123456
         seen: list[int] = []
         while 123456 not in seen:
-            told = page.wait("values", drive=x)
-            seen += [v["raw"] for v in told["values"] if v["key"] == "6081:00"]
+            reported = page.wait("values", drive=x)
+            seen += [v["raw"] for v in reported["values"] if v["key"] == "6081:00"]
     assert station.ok(station.http.get(f"/drives/{x}/parameters/6081:00"))["raw"] == 123456
 
 
@@ -136,7 +136,7 @@ def test_compare_with_defaults_and_with_another_axis(station: Station, x: str) -
         station.ok(station.http.delete(f"/drives/{y}"))
 
 
-def test_pulled_cable_is_told_and_recovers(station: Station, x: str) -> None:
+def test_pulled_cable_is_reported_and_recovers(station: Station, x: str) -> None:
     with station.live() as page:
         page.send(type="watch_state", drives=[x])
         page.wait("state")
@@ -169,7 +169,7 @@ def test_exchanged_drive_is_noticed_before_anything_is_written(station: Station)
     try:
         station.drives.command(do="swap", wire="mlink://virtual0", first=1, second=2)
         station.drives.command(do="pull", wire="mlink://virtual0")
-        within(5, lambda: not station.state(x)["fresh"], "its silence is told")
+        within(5, lambda: not station.state(x)["fresh"], "its silence is reported")
         station.drives.command(do="heal", wire="mlink://virtual0")
         warned = until(
             lambda: station.ok(station.http.get(f"/drives/{x}"))["identity_warning"], HANG_S

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.recording import capture
+from backend.station.recording import capture
 from tests.support.station import HANG_S, Station, until
 
 POSITION, VELOCITY, STATUS = "6064:00", "606C:00", "6041:00"

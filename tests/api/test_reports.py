@@ -51,7 +51,7 @@ def test_a_stored_measurement_is_evaluated_anew(station: Station, drive: str) ->
     assert content["settings"]["envelope"]["torque_percent"] == 80.0
 
 
-def test_damage_and_absence_are_told_apart(station: Station, drive: str) -> None:
+def test_damage_and_absence_are_distinguished(station: Station, drive: str) -> None:
     station.ok(_upload(station, drive, "whole", known.step()))
     data = station.http.get("/measurements/whole.sdmeas/file").content
     answer = station.http.post("/measurements", params={"name": "cut"}, content=data[:-100])

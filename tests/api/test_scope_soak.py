@@ -109,7 +109,7 @@ def test_sixteen_channels_at_4_khz(station: Station, monkeypatch: pytest.MonkeyP
         for number in range(1, AXES + 1):
             assert unbroken(awake.binary, number) > 1000
         assert sum(h[1] for h in heads(awake.binary)[1:]) == 0, "nobody else's sleep is felt"
-        # What waited for the sleeping page comes in order, and then what was lost is told.
+        # What waited for the sleeping page comes in order, and then what was lost is reported.
         until(lambda: asleep.receive() and len(heads(asleep.binary)) > 60, 60)
         for number in range(1, AXES + 1):
             unbroken(asleep.binary, number)

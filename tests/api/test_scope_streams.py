@@ -153,7 +153,7 @@ def test_a_drive_that_comes_back_is_sampled_again(station: Station, serial: str)
         until(lambda: page.receive() and len(page.binary) > 2, HANG_S, "samples of the new one")
 
 
-def test_units_of_the_axis_are_told(station: Station, serial: str) -> None:
+def test_units_of_the_axis_are_reported(station: Station, serial: str) -> None:
     with station.live() as page:
         position, torque = begin(page, serial, (POSITION, TORQUE))["channels"]
         assert position["axis_unit"] == "rev"
@@ -202,7 +202,7 @@ def test_a_sleeping_page_loses_only_its_own_view_and_every_sample_is_counted(
     came: list[tuple[Any, ...]] = []
     lost = 0  # since the first block
     while not (lost > 1000 and came[-1][1] == 0):
-        message = asleep.recv(timeout=10)  # more than a second was lost, and it is told
+        message = asleep.recv(timeout=10)  # more than a second was lost, and it is reported
         for head in heads([message] if isinstance(message, bytes) else []):
             lost += head[1] if came else 0
             came.append(head)

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from backend.recording import capture
+from backend.station.recording import capture
 from profiles import load_profile
 from tests.support.jogging import jogged
 from tests.support.machine import within
@@ -58,8 +58,8 @@ def test_two_ports_carry_everything(station: Station, z: str) -> None:
     again = station.http.post("/drives", json={"url": MODBUS, "station": 1, "profile": "ds_c"})
     assert again.status_code == 409
     assert "already connected as Z" in again.json()["detail"]
-    told = station.ok(station.http.get("/audit?kind=station"))["events"]
-    assert [(e["action"], e["axis"], e["target"]) for e in told[:2]] == [
+    reported = station.ok(station.http.get("/audit?kind=station"))["events"]
+    assert [(e["action"], e["axis"], e["target"]) for e in reported[:2]] == [
         ("connected", "Z", f"ds_c, {MODBUS}, station 1"),
         ("connected", "Z", f"ds_c, {CAN}, station 3"),
     ]
@@ -137,7 +137,7 @@ def test_the_scope_knows_which_bit_is_the_alarm(station: Station, z: str) -> Non
 
 def test_unplugged_adapter_recovers(station: Station, z: str) -> None:
     station.drives.command(do="pull", wire=CAN)
-    within(5, lambda: not station.state(z)["fresh"], "its silence is told")
+    within(5, lambda: not station.state(z)["fresh"], "its silence is reported")
     station.drives.command(do="heal", wire=CAN)
     until(lambda: station.state(z)["fresh"], HANG_S, "the drive answers again")
 
@@ -159,16 +159,16 @@ def test_a_second_port_where_nobody_answers_is_refused(station: Station, z: str)
     assert len(station.ok(station.http.get(f"/drives/{z}"))["ports"]) == 1
 
 
-def test_a_restarted_node_is_told_and_read_anew(station: Station, z: str) -> None:
+def test_a_restarted_node_is_reported_and_read_anew(station: Station, z: str) -> None:
     key = "6083:00"
     station.ok(station.http.put(f"/drives/{z}/parameters/{key}", json={"raw": 777}))
     station.drives.command(do="power_cycle", axis="Low-voltage axis", off_s=0.3)
 
-    def told() -> bool:
+    def reported() -> bool:
         texts = [entry["text"] for entry in station.ok(station.http.get("/log"))]
         return any("restarted" in text for text in texts)
 
-    until(told, HANG_S, "the log tells of the restart")
+    until(reported, HANG_S, "the log tells of the restart")
 
     # What was not saved is gone, and the page must not show it any more.
     def row() -> Any:
@@ -253,7 +253,7 @@ def bundle_of(
         station.http.delete(f"/bundles/{row['name']}")
 
 
-def told_of(bundle: Bundle, drive: str) -> None:
+def reported_of(bundle: Bundle, drive: str) -> None:
     """The fault with its remedy from the manual, the axis' settings, and where it was read."""
     (axis,) = bundle.facts["axes"]
     (shown,) = axis["state"]["faults"]
@@ -278,7 +278,7 @@ def test_a_fault_keeps_what_was_read(
         bundle = bundle_of(drive)
     finally:
         station.ok(station.http.delete(f"/drives/{drive}"))
-    told_of(bundle, drive)
+    reported_of(bundle, drive)
     assert "samples.csv" not in bundle.files, "no cyclic exchange ran"
     times = [row["time"] for row in bundle.tables["history.csv"] if row["key"] == POSITION]
     assert len(times) > 2
@@ -298,7 +298,7 @@ def test_a_fault_keeps_every_cycle_of_a_can_bus(
         bundle = bundle_of(z)
     finally:
         station.http.delete("/buses/cyclic", params={"url": CAN})
-    told_of(bundle, z)
+    reported_of(bundle, z)
     seconds = [float(next(iter(row.values()))) for row in bundle.tables["samples.csv"]]
     steps = sorted(b - a for a, b in itertools.pairwise(seconds))
     assert steps[len(steps) // 2] == pytest.approx(0.004, rel=0.05)

@@ -16,7 +16,7 @@ MOVING_RPM = 20.0
 STOP_S = 2.0
 #: Within this time a page tells what people must know: that it lost the server, that somebody
 #: pressed STOP and what it reached, that an axis has a fault.
-TOLD_MS = 5_000
+REPORTED_MS = 5_000
 #: Why a jog ends, rightly, when a computer has no time for the page for a tenth of a second.
 SILENT = (
     "the page fell silent",

@@ -3,7 +3,7 @@
     python -m tests.browser.scope_screenshots [FOLDER]
 
 A speed step with an earlier one as reference and the spectrum of a sine, into ``docs/images``
-unless told otherwise.
+unless set otherwise.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ COLOURS = 256
 def save(page: Page, path: Path) -> None:
     """As small as a picture of few colours can be."""
     picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
-    # Fewer colours would cost thin lines theirs, by which they are told apart.
+    # Fewer colours would cost thin lines theirs, by which they are distinguished.
     picture.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
 
 

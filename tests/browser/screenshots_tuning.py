@@ -119,10 +119,10 @@ def _automatic(page: Page, station: Station, drive: str, folder: Path, colours: 
     page.get_by_role("heading", name="Verification").wait_for()
     page.wait_for_timeout(SETTLE_MS)
     panel = _panel(page, "Tune automatically")
-    whole, told = panel.bounding_box(), panel.locator(".note.good").first.bounding_box()
+    whole, reported = panel.bounding_box(), panel.locator(".note.good").first.bounding_box()
     assert whole is not None
-    assert told is not None
-    above = round(told["y"] - whole["y"])
+    assert reported is not None
+    above = round(reported["y"] - whole["y"])
     _store(panel, folder / "tuning-automatic.png", colours, above)
 
 

@@ -1,4 +1,4 @@
-"""Alarms on the page: faults told with cause and remedy, reset, refused reset, bundle."""
+"""Alarms on the page: faults reported with cause and remedy, reset, refused reset, bundle."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
-from tests.browser.driving import TOLD_MS, Bench, open_axis
+from tests.browser.driving import REPORTED_MS, Bench, open_axis
 from tests.support.station import until
 
 
@@ -21,7 +21,7 @@ def test_a_fault_is_explained_and_reset(laptop: Page, bench: Bench) -> None:
     expect(page.get_by_text("No fault is active.")).to_be_visible()
     inject(bench, "over_current")
     fault = page.locator(".faults > li.fault").first
-    expect(fault).to_contain_text(re.compile("over.?current", re.IGNORECASE), timeout=TOLD_MS)
+    expect(fault).to_contain_text(re.compile("over.?current", re.IGNORECASE), timeout=REPORTED_MS)
     for words in ("Possible causes", "What to do", "Reset:", "Source: manual 004:"):
         expect(fault).to_contain_text(words)
     # The tool's own log has it, with the time.

@@ -9,7 +9,7 @@ from pathlib import Path
 from playwright.sync_api import Page, expect
 
 from tests.browser.cable import Cable
-from tests.browser.driving import TOLD_MS, Bench, open_axis
+from tests.browser.driving import REPORTED_MS, Bench, open_axis
 from tests.support.station import HANG_S, until
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -117,9 +117,9 @@ def test_what_is_shown_is_not_taken_for_current_without_a_connection(
     expect(state).to_contain_text("Switch on disabled")
     expect(page.locator(".quantities")).to_be_visible()
     cable.cut()
-    expect(page.get_by_text("What is shown is from")).to_be_visible(timeout=TOLD_MS)
-    expect(state).to_contain_text("No answer", timeout=TOLD_MS)
-    expect(page.locator(".quantities")).to_have_class(re.compile("stale"), timeout=TOLD_MS)
+    expect(page.get_by_text("What is shown is from")).to_be_visible(timeout=REPORTED_MS)
+    expect(state).to_contain_text("No answer", timeout=REPORTED_MS)
+    expect(page.locator(".quantities")).to_have_class(re.compile("stale"), timeout=REPORTED_MS)
     cable.mend()
     expect(state).to_contain_text("Switch on disabled")
 

@@ -7,7 +7,7 @@ import re
 from playwright.sync_api import Page, expect
 
 from tests.browser.cable import Cable
-from tests.browser.driving import TOLD_MS, Bench, open_axis
+from tests.browser.driving import REPORTED_MS, Bench, open_axis
 from tests.support.machine import within
 from tests.support.station import until
 
@@ -72,7 +72,7 @@ def test_forcing_ends_with_stop(laptop: Page, bench: Bench) -> None:
     begin_forcing(page, bench)
     page.keyboard.press("Escape")
     within(3, lambda: bench.raw("60FE:02") == 0, "STOP lets go")
-    expect(page.get_by_text("STOP was pressed")).to_be_visible(timeout=TOLD_MS)
+    expect(page.get_by_text("STOP was pressed")).to_be_visible(timeout=REPORTED_MS)
 
 
 def test_forcing_ends_with_the_connection(laptop: Page, bench: Bench, cable: Cable) -> None:

@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.cable import Cable
-from tests.browser.driving import TOLD_MS, Bench, open_axis, says_no
+from tests.browser.driving import REPORTED_MS, Bench, open_axis, says_no
 from tests.support.station import until
 
 PLUS = "Hold to move in the positive direction"
@@ -165,8 +165,8 @@ def test_the_jog_ends_when_page_and_worker_are_frozen(laptop: Page, bench: Bench
     _press(laptop, bench)
     browser = laptop.context.browser
     assert browser is not None
-    told = browser.new_browser_cdp_session().send("SystemInfo.getProcessInfo")
-    frozen = [process["id"] for process in told["processInfo"] if process["type"] == "renderer"]
+    reported = browser.new_browser_cdp_session().send("SystemInfo.getProcessInfo")
+    frozen = [process["id"] for process in reported["processInfo"] if process["type"] == "renderer"]
     try:
         for process in frozen:
             os.kill(process, signal.SIGSTOP)
@@ -181,7 +181,7 @@ def test_lost_connection_is_said_and_comes_back(laptop: Page, bench: Bench, cabl
     open_axis(laptop, bench.drive, "overview")
     expect(laptop.get_by_label("State of the drive")).to_contain_text("Switch on disabled")
     cable.cut()
-    expect(laptop.get_by_text("Connection to the server lost.")).to_be_visible(timeout=TOLD_MS)
+    expect(laptop.get_by_text("Connection to the server lost.")).to_be_visible(timeout=REPORTED_MS)
     cable.mend()
     expect(laptop.get_by_text("Connection to the server lost.")).to_have_count(0)
     expect(laptop.get_by_label("State of the drive")).to_contain_text("Switch on disabled")
@@ -191,7 +191,7 @@ def test_escape_stops_a_jog(laptop: Page, bench: Bench) -> None:
     _press(laptop, bench)
     laptop.keyboard.press("Escape")
     bench.wait_standing()
-    expect(laptop.get_by_text("Stopped: X")).to_be_visible(timeout=TOLD_MS)
+    expect(laptop.get_by_text("Stopped: X")).to_be_visible(timeout=REPORTED_MS)
 
 
 def _start_sequence(page: Page, bench: Bench) -> None:
@@ -220,7 +220,7 @@ def test_stop_on_every_page(laptop: Page, bench: Bench, where: str) -> None:
     assert box["x"] + box["width"] >= 1279
     button.click()
     bench.wait_standing()
-    expect(page.get_by_text("Stopped: X")).to_be_visible(timeout=TOLD_MS)
+    expect(page.get_by_text("Stopped: X")).to_be_visible(timeout=REPORTED_MS)
 
 
 def test_stop_is_reached_through_an_open_dialog(phone: Page, bench: Bench) -> None:

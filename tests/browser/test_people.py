@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, Dialog, Locator, Page, expect
 from backend.people.rights import Right, Role
 from backend.people.station import People
 from tests.browser.conftest import HERE, LAPTOP, PATIENCE_MS
-from tests.browser.driving import TOLD_MS, Bench, open_axis, says_no
+from tests.browser.driving import REPORTED_MS, Bench, open_axis, says_no
 from tests.browser.test_motion import PLUS, _centre
 from tests.support.guarded import CHEAP, NAMES, PASSWORD
 from tests.support.machine import OwnTime, within
@@ -163,8 +163,8 @@ def test_a_viewer_moves_nothing_and_can_stop(opened: Open, bench: Bench) -> None
     bench.press(olaf.mouse.down, olaf.mouse.up, says_no(olaf))
     vera.keyboard.press("Escape")
     bench.wait_standing()
-    # Who stopped it is told where it was moved from, and not on the page that pressed.
-    expect(olaf.get_by_text("Vera pressed STOP.")).to_be_visible(timeout=TOLD_MS)
+    # Who stopped it is reported where it was moved from, and not on the page that pressed.
+    expect(olaf.get_by_text("Vera pressed STOP.")).to_be_visible(timeout=REPORTED_MS)
     expect(vera.get_by_text("Vera pressed STOP.")).to_have_count(0)
     olaf.mouse.up()
 
@@ -246,12 +246,12 @@ def invited(host: Page, opened: Open, bench: Bench, *allowed: str) -> Page:
     for each in allowed:
         host.get_by_label(each, exact=True).first.check()
     button(host, "Make an invitation").click()
-    told = host.locator(".note.info")
-    link = told.locator(".mono").first.inner_text()
-    code = told.locator("strong.mono").inner_text()
+    reported = host.locator(".note.info")
+    link = reported.locator(".mono").first.inner_text()
+    code = reported.locator("strong.mono").inner_text()
     host.context.grant_permissions(["clipboard-read", "clipboard-write"])
-    button(told, "Copy").click()
-    expect(button(told, "Copied")).to_be_visible()
+    button(reported, "Copy").click()
+    expect(button(reported, "Copied")).to_be_visible()
     assert host.evaluate("navigator.clipboard.readText()") == link
     guest = opened(link.split("/", 3)[3])
     guest.get_by_label("Code").fill(code.lower().replace("-", " "))
@@ -367,7 +367,9 @@ def test_a_guest_moves_only_while_the_button_on_site_is_held(opened: Open, bench
     x, y = _centre(guest, PLUS)
     guest.mouse.move(x, y)
     guest.mouse.down()
-    expect(guest.get_by_text("does not hold the enabling button")).to_be_visible(timeout=TOLD_MS)
+    expect(guest.get_by_text("does not hold the enabling button")).to_be_visible(
+        timeout=REPORTED_MS
+    )
     guest.mouse.up()
     assert not bench.moves()
     times = []
@@ -431,7 +433,7 @@ def test_a_guest_who_may_only_look_can_stop(opened: Open, bench: Bench) -> None:
     bench.press(olaf.mouse.down, olaf.mouse.up, says_no(olaf))
     guest.get_by_role("button", name="Stop all axes (Esc)").click()
     bench.wait_standing()
-    expect(olaf.get_by_text("pressed STOP.")).to_be_visible(timeout=TOLD_MS)
+    expect(olaf.get_by_text("pressed STOP.")).to_be_visible(timeout=REPORTED_MS)
     olaf.mouse.up()
     button(olaf.locator(".stop-report"), "Close").click()
     end_visit(olaf)

@@ -118,8 +118,8 @@ def test_a_press_that_begins_nothing_says_why(laptop: Page, bench: Bench) -> Non
     start = page.get_by_role("button", name="Start the move")
     page.get_by_text("Move", exact=True).first.click()
     start.click(force=True)
-    told = page.locator(".not-begun")
-    expect(told).to_contain_text("A field above is empty")
+    reported = page.locator(".not-begun")
+    expect(reported).to_contain_text("A field above is empty")
     page.get_by_text("Jog", exact=True).first.click()
     try:
         bench.station.drives.command(do="pull", wire="mlink://virtual0")
@@ -127,10 +127,10 @@ def test_a_press_that_begins_nothing_says_why(laptop: Page, bench: Bench) -> Non
         # Taking the power off is tried all the same.
         expect(page.get_by_role("button", name="Disable", exact=True)).to_be_enabled()
         button.click(force=True)
-        expect(told).to_contain_text("did not answer when the button was pressed")
+        expect(reported).to_contain_text("did not answer when the button was pressed")
         page.get_by_text("Move", exact=True).first.click()
         start.click(force=True)
-        expect(told).to_contain_text("did not answer when the button was pressed")
+        expect(reported).to_contain_text("did not answer when the button was pressed")
     finally:
         bench.station.drives.command(do="heal", wire="mlink://virtual0")
     until(lambda: bench.state()["fresh"], what="the drive answers again")

@@ -71,9 +71,9 @@ def test_a_measurement_is_explained(laptop: Page, axis: str) -> None:
         read = tuning.number_in(row(table, kind).inner_text(), "Hz")
         assert read == pytest.approx(truth, rel=0.01)
     # 1.5e-4 behind the spring against 5e-5 before it, and an antiresonance at 100 Hz.
-    told = page.get_by_text(re.compile("Behind the soft part hangs")).inner_text()
-    assert "medium stiffness" in told
-    assert tuning.number_in(told, "times") == pytest.approx(3.0, rel=0.05)
+    reported = page.get_by_text(re.compile("Behind the soft part hangs")).inner_text()
+    assert "medium stiffness" in reported
+    assert tuning.number_in(reported, "times") == pytest.approx(3.0, rel=0.05)
     page.get_by_text("What the shape of the curve tells").click()
     expect(page.get_by_text("tighten the coupling, then put a notch")).to_be_visible()
 

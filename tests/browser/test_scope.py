@@ -230,7 +230,9 @@ def test_a_sine_has_its_frequency_and_amplitude(page: Page, station: Station, cy
         expect(page.get_by_role("img", name=tab)).to_be_visible()
 
 
-def test_timing_is_told_and_follows_the_exchange(page: Page, station: Station, axis: str) -> None:
+def test_timing_is_reported_and_follows_the_exchange(
+    page: Page, station: Station, axis: str
+) -> None:
     timing = page.locator(f'[data-trace="{VELOCITY}"] .timing')
     expect(timing).to_contain_text("polled")
     body = {"url": URL, "cycle_us": 1000}
@@ -333,7 +335,7 @@ class Fingers:
                 "touchMove",
                 *((a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])) for a, b in ways),
             )
-        # The browser tells of places between two that it was told, by their times.
+        # The browser tells of places between two that it was reported, by their times.
         self._page.evaluate("() => new Promise(requestAnimationFrame)")
         self.touch("touchMove", *(end for _, end in ways))
         self.touch("touchEnd")

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.driving import TOLD_MS, Bench, open_axis
+from tests.browser.driving import REPORTED_MS, Bench, open_axis
 from tests.browser.test_frame import SIDEWAYS, TOO_SMALL
 from tests.support.station import Station, until
 
@@ -86,21 +86,21 @@ def turned_rpm(bench: Bench) -> float:
     return float(abs(end - start) / (ended_s - began_s) * 60)
 
 
-def test_an_axis_that_turns_unasked_is_told_on_every_page(
+def test_an_axis_that_turns_unasked_is_reported_on_every_page(
     laptop: Page, pulled: Bench, station: Station
 ) -> None:
     page = laptop
     note = page.get_by_role("alert").filter(has_text="X turns without power")
     for place in ("connect", "files", f"axis/{pulled.drive}/motion"):
         page.evaluate(f"location.hash = '#/{place}'")
-        expect(note).to_be_visible(timeout=TOLD_MS)
+        expect(note).to_be_visible(timeout=REPORTED_MS)
     # It stays in sight where the page is scrolled.
     page.locator("main").evaluate("main => main.scrollTo(0, main.scrollHeight)")
     expect(note).to_be_in_viewport()
-    told = float(re.findall(r"([\d.]+) rpm", note.inner_text())[0])
-    assert told == pytest.approx(turned_rpm(pulled), rel=0.05)
+    reported = float(re.findall(r"([\d.]+) rpm", note.inner_text())[0])
+    assert reported == pytest.approx(turned_rpm(pulled), rel=0.05)
     note.get_by_role("button", name="STOP").click()
-    expect(page.locator(".stop-report")).to_be_visible(timeout=TOLD_MS)
+    expect(page.locator(".stop-report")).to_be_visible(timeout=REPORTED_MS)
     pull(station, 0.0)
     expect(note).to_have_count(0)
 

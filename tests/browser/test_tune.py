@@ -63,11 +63,11 @@ def gains_of(station: Station, axis: str) -> tuple[float, float]:
     return gains["speed_hz"], gains["inertia_kgm2"]
 
 
-def expect_step(page: Page, name: str, told: str) -> None:
+def expect_step(page: Page, name: str, reported: str) -> None:
     """What the path tells of a step: done, next or open."""
     path = page.get_by_role("navigation", name="Steps of commissioning")
     step = path.get_by_role("link", name=re.compile(name)).locator("small")
-    expect(step).to_have_text(re.compile(f"^(?:{told})$"))
+    expect(step).to_have_text(re.compile(f"^(?:{reported})$"))
 
 
 def test_identify(page: Page, axis: str, station: Station) -> None:
@@ -223,15 +223,15 @@ def test_autotune_shows_designs_and_writes_nothing_unasked(
 ) -> None:
     before = settings_of(station, axis)
     tuning.run_job(page, station, axis, "Start tuning")
-    told = page.locator("details", has=page.locator("summary", has_text="What was measured"))
-    told.locator("summary").click()
-    read = row(told.get_by_role("table", name="Inertia and friction"), "Inertia").inner_text()
+    reported = page.locator("details", has=page.locator("summary", has_text="What was measured"))
+    reported.locator("summary").click()
+    read = row(reported.get_by_role("table", name="Inertia and friction"), "Inertia").inner_text()
     assert tuning.number_in(read, "kg·m²") == pytest.approx(INERTIA, rel=0.02)
-    read = row(told.get_by_role("table", name="Resonances"), "resonance").inner_text()
+    read = row(reported.get_by_role("table", name="Resonances"), "resonance").inner_text()
     assert tuning.number_in(read, "Hz") == pytest.approx(RESONANCE_HZ, rel=0.01)
-    told = page.locator("details", has=page.locator("summary", has_text="Designs"))
-    told.locator("summary").click()
-    designs = told.get_by_role("table", name="Designs")
+    reported = page.locator("details", has=page.locator("summary", has_text="Designs"))
+    reported.locator("summary").click()
+    designs = reported.get_by_role("table", name="Designs")
     for mark in ("Robust", "Balanced", "Fast"):
         expect(designs.get_by_role("row").filter(has_text=mark).first).to_be_visible()
     assert settings_of(station, axis) == before

@@ -91,7 +91,7 @@ _TRIES = 3
 
 def run_job(page: Page, station: Station, axis: str, button: str) -> None:
     """Press a button that starts a job on the axis, and wait for the job's good end."""
-    told = ""
+    reported = ""
     for _ in range(_TRIES):
         page.get_by_role("button", name=button, exact=True).click()
         progress = page.locator(".job")
@@ -100,13 +100,13 @@ def run_job(page: Page, station: Station, axis: str, button: str) -> None:
         failed = page.locator(".note.fault")
         if failed.count() == 0:
             return
-        told = "; ".join(failed.all_inner_texts())
-        print(f"{button} is repeated: {told}")
-        assert any(words in told for words in BUSY), told
+        reported = "; ".join(failed.all_inner_texts())
+        print(f"{button} is repeated: {reported}")
+        assert any(words in reported for words in BUSY), reported
         failed.first.get_by_role("button", name="Close").click()
         until(lambda: station.state(axis)["moving_job"] is None, HANG_S, "the axis is free")
         until(lambda: _without_fault(station, axis), 60, "the drive answers without a fault")
-    raise AssertionError(f"{button}: {told}")
+    raise AssertionError(f"{button}: {reported}")
 
 
 def sweep(station: Station, axis: str, **settings: object) -> None:

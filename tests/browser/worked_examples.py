@@ -56,7 +56,7 @@ def cursors(page: Page, a: str, b: str) -> None:
     page.wait_for_timeout(1500)
 
 
-def told(page: Page, trace: str, *names: str) -> str:
+def reported(page: Page, trace: str, *names: str) -> str:
     """Cells of the table, as they are shown."""
     return ", ".join(f"{name} {figure(page, trace, name).inner_text()}" for name in names)
 
@@ -88,8 +88,8 @@ def step(page: Page, station: Station, axis: str) -> None:
     page.get_by_label("Level").fill("120")
     caught(page, station, axis, mode="CSV", shape="step", amplitude=240, duration_s=2.4)
     cursors(page, "-0.05", "0.3")
-    print("step:", told(page, VELOCITY, "rise", "overshoot", "settling", "max"))
-    print("  torque:", told(page, TORQUE, "max", "mean"))
+    print("step:", reported(page, VELOCITY, "rise", "overshoot", "settling", "max"))
+    print("  torque:", reported(page, TORQUE, "max", "mean"))
 
 
 def following_error(page: Page, station: Station, axis: str) -> None:
@@ -98,7 +98,12 @@ def following_error(page: Page, station: Station, axis: str) -> None:
     caught(page, station, axis, mode="CSP", shape="ramp", amplitude=4, duration_s=2.4,
            acceleration=5)  # fmt: skip
     cursors(page, "0.2", "0.7")
-    print("move:", told(page, ERROR, "min", "max", "mean"), "; speed", told(page, VELOCITY, "mean"))
+    print(
+        "move:",
+        reported(page, ERROR, "min", "max", "mean"),
+        "; speed",
+        reported(page, VELOCITY, "mean"),
+    )
     print("  of", page.locator(f'[data-trace="{ERROR}"] .timing').inner_text())
 
 

@@ -154,11 +154,11 @@ async def test_a_damaged_database_claims_only_what_is_known(station: Path) -> No
     (station / DATABASE).write_bytes(b"this is no database" * 100)
     with pytest.raises(DatabaseFailed) as failed:
         await accounts_needed(station, Serving())
-    told = f"{failed.value.message} {failed.value.remedy}"
-    assert "damaged" in told
-    assert "restore a backup" in told
-    assert "unharmed" not in told
-    assert "PostgreSQL" not in told
+    reported = f"{failed.value.message} {failed.value.remedy}"
+    assert "damaged" in reported
+    assert "restore a backup" in reported
+    assert "unharmed" not in reported
+    assert "PostgreSQL" not in reported
 
 
 def serve(folder: Path) -> subprocess.Popen[str]:
@@ -180,10 +180,10 @@ def test_a_second_server_on_a_folder_does_not_start(tmp_path: Path) -> None:
         link.symlink_to(folder)
         for path in (folder, link):
             second = serve(path)
-            _, told = second.communicate(timeout=100)
+            _, reported = second.communicate(timeout=100)
             assert second.returncode == 1
-            assert "another servodeck uses the state folder" in told
-            assert "--config" in told
+            assert "another servodeck uses the state folder" in reported
+            assert "--config" in reported
     finally:
         first.send_signal(signal.SIGKILL)
         first.communicate()

@@ -141,9 +141,9 @@ async def test_a_saved_list_of_drives_opens_none(tmp_path: Path, listener: Liste
     bench = Bench(state)
     try:
         await bench.restore()
-        told = " ".join(entry.text for entry in bench.journal.entries())
+        reported = " ".join(entry.text for entry in bench.journal.entries())
         for number in range(len(urls)):
-            assert f"d{number}: not connected" in told
+            assert f"d{number}: not connected" in reported
     finally:
         await bench.close()
     assert not kept.exists()

@@ -172,9 +172,9 @@ def test_a_password_costs_what_rfc_9106_asks() -> None:
     assert not Passwords(PasswordHasher(1, 8, 1)).verify("no hash", PASSWORD)
 
 
-def test_no_secret_is_kept_or_told(server: GuardedServer, cast: Cast) -> None:
+def test_no_secret_is_kept_or_reported(server: GuardedServer, cast: Cast) -> None:
     script = server.token(Role.OPERATOR, Right.LOOK)
-    told = [
+    reported = [
         caller.ask("GET", path).text
         for caller in (cast.administrator, cast.guest)
         for path in ("/accounts", "/sessions", "/tokens", "/log", "/people", "/invitations",
@@ -183,7 +183,7 @@ def test_no_secret_is_kept_or_told(server: GuardedServer, cast: Cast) -> None:
     files = [f.read_bytes() for f in Path(server.folder).rglob("*") if f.is_file()]
     for secret in (PASSWORD, cast.operator.cookie, cast.guest.cookie, script.token):
         assert secret
-        assert not any(secret in text for text in told)
+        assert not any(secret in text for text in reported)
         assert not any(secret.encode() in data for data in files)
     database = next(Path(server.folder).glob("servodeck.db"))
     assert database.stat().st_mode & 0o077 == 0, "only its user may read it"

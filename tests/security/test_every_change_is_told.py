@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from backend.api.audit.audited import CHANGES_NOTHING, TOLD_THERE, AuditedAnswers
+from backend.api.audit.audited import CHANGES_NOTHING, REPORTED_THERE, AuditedAnswers
 from backend.api.models import JobInfo
 from backend.api.security.rights import API, ROUTES
 from backend.audit import Fact
@@ -33,7 +33,7 @@ ELSEWHERE = {f"POST {API}{path}" for path in ("/setup", "/drives", "/drives/{dri
 SUCCESS = ("200", "201", "202")
 
 
-# --- routes that are told by the wrapper ----------------------------------------------
+# --- routes that are shown by the wrapper ----------------------------------------------
 
 
 @dataclass
@@ -51,7 +51,7 @@ class Heard:
 
 
 def through_wrapper(operation: str, body: bytes, status: int = 200) -> list[Fact]:
-    """What is told of one request when the application only says that it went well."""
+    """What is informed of one request when the application only says that it went well."""
     method, path = operation.split(" ")
     heard = Heard()
 
@@ -72,17 +72,17 @@ def through_wrapper(operation: str, body: bytes, status: int = 200) -> list[Fact
     return heard.facts
 
 
-def test_each_change_is_told_by_one_or_the_other(server: GuardedServer) -> None:
-    assert TOLD_THERE <= CHANGING
+def test_each_change_is_reported_by_one_or_the_other(server: GuardedServer) -> None:
+    assert REPORTED_THERE <= CHANGING
     assert CHANGES_NOTHING <= CHANGING
-    assert not TOLD_THERE & CHANGES_NOTHING
+    assert not REPORTED_THERE & CHANGES_NOTHING
     asked = {f"{each.method} {API}{each.path}" for each in REQUESTS}
-    assert TOLD_THERE - jobs(server) - ELSEWHERE - asked == set()
+    assert REPORTED_THERE - jobs(server) - ELSEWHERE - asked == set()
 
 
-def test_every_other_change_is_told_by_the_wrapper() -> None:
+def test_every_other_change_is_reported_by_the_wrapper() -> None:
     body = {"name": "n", "password": "hidden", "list": [1, 2]}
-    for operation in CHANGING - TOLD_THERE - CHANGES_NOTHING:
+    for operation in CHANGING - REPORTED_THERE - CHANGES_NOTHING:
         method, path = operation.split(" ")
         (fact,) = through_wrapper(operation, json.dumps(body).encode())
         assert fact.target == address(path).removeprefix(API)
@@ -99,7 +99,7 @@ def test_a_body_that_is_no_small_json_hinders_nothing(body: bytes) -> None:
 
 
 def jobs(server: GuardedServer) -> set[str]:
-    """Routes that answer with a job. Each job is told by one listener, whatever it does."""
+    """Routes that answer with a job. Each job is shown by one listener, whatever it does."""
     return {
         f"{method.upper()} {path}"
         for path, known in server.interface["paths"].items()
@@ -134,7 +134,7 @@ class Scene:
     def entry(self) -> str:
         """Id of the set in the library."""
         found = self.cast.operator.ok("GET", "/library")["entries"]
-        return str(next(each["id"] for each in found if each["name"] == "told.sdset"))
+        return str(next(each["id"] for each in found if each["name"] == "reported.sdset"))
 
     def vera(self) -> str:
         """Another log-in of the viewer's; its id."""
@@ -156,7 +156,7 @@ class Ask:
 
     method: str
     path: str
-    told: Mapping[str, object]
+    reported: Mapping[str, object]
     fill: Mapping[str, str | Found] = field(default_factory=dict)
     who: str = "operator"
     options: Mapping[str, object] = field(default_factory=dict)
@@ -170,7 +170,7 @@ X = "/drives/{drive_id}"
 ON_X: dict[str, str | Found] = {"drive_id": "x"}
 GAIN = ON_X | {"key": "2005:03"}
 SIMULATED = ON_X | {"name": "simulation"}
-FILE: dict[str, str | Found] = {"file": "told.sdset"}
+FILE: dict[str, str | Found] = {"file": "reported.sdset"}
 OLAF = {"person": "Olaf"}
 BY_OLAF = OLAF | {"axis": "X"}
 BY_ANNA = {"person": "Anna"}
@@ -231,16 +231,16 @@ REQUESTS = [
         keep="gains"),
     Ask("POST", f"{X}/tune/undo", BY_OLAF | {"kind": "write"}, ON_X,
         body=lambda scene: scene.made["gains"]),
-    Ask("POST", f"{X}/sets", BY_OLAF | {"kind": "file", "target": "told.sdset"}, ON_X,
-        options={"json": {"file": "told"}}),
-    Ask("PUT", "/sets/{file}", OLAF | {"kind": "file", "target": "told.sdset"}, FILE,
+    Ask("POST", f"{X}/sets", BY_OLAF | {"kind": "file", "target": "reported.sdset"}, ON_X,
+        options={"json": {"file": "reported"}}),
+    Ask("PUT", "/sets/{file}", OLAF | {"kind": "file", "target": "reported.sdset"}, FILE,
         query="?overwrite=true",
         first=lambda scene: scene.made.update(
-            file=scene.cast.operator.ask("GET", "/sets/told.sdset").content)),
+            file=scene.cast.operator.ask("GET", "/sets/reported.sdset").content)),
     Ask("POST", "/sets/list", OLAF | {"kind": "file", "target": "listed.sdset"},
         query="?profile=mms7&file=listed", options={"content": b"key,raw\n2005:03,41\n"}),
-    Ask("PATCH", "/library/{entry_id}", OLAF | {"kind": "file", "target": "told.sdset"}, ENTRY,
-        options={"json": {"notes": "told", "tags": ["a"]}}),
+    Ask("PATCH", "/library/{entry_id}", OLAF | {"kind": "file", "target": "reported.sdset"}, ENTRY,
+        options={"json": {"notes": "reported", "tags": ["a"]}}),
     Ask("DELETE", "/library/{entry_id}", OLAF | {"kind": "file", "action": "deleted"}, ENTRY),
     Ask("DELETE", "/sets/{file}", OLAF | {"kind": "file", "action": "deleted"},
         {"file": "listed.sdset"}),
@@ -264,9 +264,9 @@ REQUESTS = [
         "administrator", {"json": {"role": "operator"}}),
     Ask("DELETE", "/accounts/{account_id}", BY_ANNA | {"action": "deleted", "target": "Theo"},
         ACCOUNT, "administrator"),
-    Ask("POST", "/tokens", OLAF | {"action": "token made", "target": "told", "new": "look"}, {},
-        options={"json": {"name": "told", "scopes": ["look"]}}, keep="token"),
-    Ask("DELETE", "/tokens/{token_id}", OLAF | {"action": "token revoked", "target": "told"},
+    Ask("POST", "/tokens", OLAF | {"action": "token made", "target": "reported", "new": "look"}, {},
+        options={"json": {"name": "reported", "scopes": ["look"]}}, keep="token"),
+    Ask("DELETE", "/tokens/{token_id}", OLAF | {"action": "token revoked", "target": "reported"},
         {"token_id": lambda scene: scene.made["token"]["token"]["id"]}),
     Ask("POST", "/invitations", OLAF | {
         "kind": "invitation", "action": "made", "target": "Gina", "new": "parameters, 5 min"}, {},
@@ -291,13 +291,13 @@ REQUESTS = [
 ]  # fmt: skip
 
 
-def agrees(entry: Mapping[str, Any], told: Mapping[str, object]) -> bool:
+def agrees(entry: Mapping[str, Any], reported: Mapping[str, object]) -> bool:
     flat = {**entry, **{f"detail.{key}": value for key, value in entry["detail"].items()}}
     return all(
         value.search(str(flat.get(key)))
         if isinstance(value, re.Pattern)
         else flat.get(key) == value
-        for key, value in told.items()
+        for key, value in reported.items()
     )
 
 
@@ -321,6 +321,6 @@ def test_each_change_tells_who_did_what_from_what_to_what(
         if each.keep:
             scene.made[each.keep] = answer.json()
         entries = scene.since(before)
-        if not any(agrees(entry, each.told) for entry in entries):
-            silent.append((each.method, path, each.told, entries))
+        if not any(agrees(entry, each.reported) for entry in entries):
+            silent.append((each.method, path, each.reported, entries))
     assert silent == []

@@ -158,7 +158,7 @@ def test_names_in_lists_are_text(name: str) -> None:
 # --- the state folder -----------------------------------------------------------------
 
 
-def test_a_state_folder_that_is_gone_is_told(tmp_path: Path) -> None:
+def test_a_state_folder_that_is_gone_is_reported(tmp_path: Path) -> None:
     server = GuardedServer(tmp_path / "station", accounts=False)
     (tmp_path / "station").mkdir()
     server.start()
@@ -174,7 +174,7 @@ def test_a_state_folder_that_is_gone_is_told(tmp_path: Path) -> None:
         server.stop()
 
 
-def test_a_database_that_was_replaced_is_told(tmp_path: Path) -> None:
+def test_a_database_that_was_replaced_is_reported(tmp_path: Path) -> None:
     server = GuardedServer(tmp_path, accounts=False).start()
     try:
         me = Caller(server)

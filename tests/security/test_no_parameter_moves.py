@@ -153,7 +153,7 @@ def energises(parameter: Parameter) -> bool:
     return parameter.motion == "energises"
 
 
-def require_told(problem: dict[str, Any], key: str) -> None:
+def require_reported(problem: dict[str, Any], key: str) -> None:
     """Why, and where to go."""
     assert problem["type"] == "urn:servodeck:not-granted", (key, problem)
     assert problem["parameter"] == key
@@ -176,14 +176,14 @@ def test_no_write_by_anybody_moves_the_axis(scene: Scene, wired: bool) -> None:
             by_key = {row["key"]: row for row in results}
             for parameter in filter(energises, parameters):
                 assert not by_key[parameter.key]["ok"], (who, parameter.key)
-                require_told(by_key[parameter.key]["problem"], parameter.key)
+                require_reported(by_key[parameter.key]["problem"], parameter.key)
             scene.require_still(f"{who}, values {turn}, inputs {wired}")
         for key, raw in ATTACK:
             if scene.profile.parameter(key) is None:
                 continue
             answer = caller.ask("PUT", f"/drives/x/parameters/{key}", json={"raw": raw})
             assert answer.status_code == 409, (who, key, answer.text)
-            require_told(answer.json(), key)
+            require_reported(answer.json(), key)
         scene.require_still(f"{who} by single writes, inputs {wired}")
 
 
@@ -275,9 +275,9 @@ def test_the_command_line_moves_nothing(
     for parameter in filter(energises, scene.writable()):
         with pytest.raises(DriveError) as refusal:
             asyncio.run(verbs.put(place, [f"{parameter.key}={values_of(parameter)[0]}"], raw=True))
-        told = f"{refusal.value.message} {refusal.value.advice}"
-        assert parameter.key in told
-        assert "/api/v1/drives/" in told
+        reported = f"{refusal.value.message} {refusal.value.advice}"
+        assert parameter.key in reported
+        assert "/api/v1/drives/" in reported
     if where == "local":
         file = tmp_path / "all.sdset"
         file.write_bytes(a_set(scene))

@@ -137,8 +137,8 @@ class Wires:
 
     def require_still(self, place: Place, after: str) -> None:
         """The shaft stands where it stood, and nothing enabled the motor."""
-        told = str(self._ask(place, "read", index=0x6041, subindex=0))
-        word, own = int.from_bytes(bytes.fromhex(told), "little"), place.family == "ds_c"
+        reported = str(self._ask(place, "read", index=0x6041, subindex=0))
+        word, own = int.from_bytes(bytes.fromhex(reported), "little"), place.family == "ds_c"
         assert cia402.decode_state(word, echoes_control=own) is not State.OPERATION_ENABLED, after
         moved = abs(self.shaft_rev(place) - self.start[place])
         assert moved < STILL_REV, (after, moved)

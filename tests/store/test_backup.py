@@ -19,13 +19,13 @@ from backend.audit import AuditLog, Fact
 from backend.audit.trail import Trail
 from backend.cli import app
 from backend.library import Library
+from backend.library.backup.backup import BackupFailed, make_backup
+from backend.library.backup.restore import restore
 from backend.library.catalogue import INLINE
 from backend.library.entries import Addition, AxisIdentity, Query
-from backend.store.backup import BackupFailed, make_backup
 from backend.store.blobs import Blobs
 from backend.store.database import Store
 from backend.store.lock import FolderLock
-from backend.store.restore import restore
 from drivers.errors import NotAllowed
 from tests.support.postgres import Postgres
 

@@ -47,14 +47,14 @@ class Nursery:
         )  # fmt: skip
 
     def live(self, seed: int, deeds: int, rest_s: float) -> None:
-        """A life that ends ``rest_s`` after so many deeds were told."""
+        """A life that ends ``rest_s`` after so many deeds were reported."""
         assert self._process.stdin is not None
-        before = len(self.told())
+        before = len(self.reported())
         self._process.stdin.write(f"{seed}\n")
         self._process.stdin.flush()
         child = int(self._line().removeprefix("pid "))
         try:
-            until(lambda: len(self.told()) >= before + deeds, 40, f"{deeds} deeds")
+            until(lambda: len(self.reported()) >= before + deeds, 40, f"{deeds} deeds")
             time.sleep(rest_s)
         finally:
             os.kill(child, signal.SIGKILL)
@@ -67,10 +67,10 @@ class Nursery:
         self._process.stdin.flush()
         self._line()
         assert self._line() == "dead"
-        return any(deed["act"] == "end" for deed in self.told()[-3:])
+        return any(deed["act"] == "end" for deed in self.reported()[-3:])
 
-    def told(self) -> list[dict[str, Any]]:
-        return json_lines(self.folder / "told")
+    def reported(self) -> list[dict[str, Any]]:
+        return json_lines(self.folder / "reported")
 
     def _line(self) -> str:
         assert self._process.stdout is not None
@@ -101,8 +101,8 @@ def nursery(folder: Path, database: str) -> Iterator[Nursery]:
         made.close()
 
 
-def check(folder: Path, database: str, told: list[dict[str, Any]]) -> None:
-    """Everything that was told is there, and everything that is there is whole."""
+def check(folder: Path, database: str, reported: list[dict[str, Any]]) -> None:
+    """Everything that was reported is there, and everything that is there is whole."""
     records = Records(folder / "state", Journal(), database)
     library, file = records.library, records.store.sqlite_file
     try:
@@ -115,8 +115,8 @@ def check(folder: Path, database: str, told: list[dict[str, Any]]) -> None:
             str(e.new) for e in records.trail.search(Filter(kinds=("write",)), limit=100_000)
         )
         assert not [token for token, count in events.items() if count > 1]
-        assert {d["token"] for d in told if d["act"] == "event"} <= set(events)
-        for deed in (d for d in told if d["act"] == "save"):
+        assert {d["token"] for d in reported if d["act"] == "event"} <= set(events)
+        for deed in (d for d in reported if d["act"] == "save"):
             data = library.content(deed["entry"], deed["number"])
             assert hashlib.sha256(data).hexdigest() == deed["sha256"]
         with records.store.reading() as session:
@@ -128,7 +128,7 @@ def check(folder: Path, database: str, told: list[dict[str, Any]]) -> None:
             numbers = sorted(n for e, n in rows if e == entry)
             assert numbers == list(range(1, len(numbers) + 1))
         assert records.sets.take_in() == {}
-        for deed in (d for d in told if d["act"] == "file"):
+        for deed in (d for d in reported if d["act"] == "file"):
             data = records.sets.read(deed["name"])
             assert hashlib.sha256(data).hexdigest() == deed["sha256"]
         records.index.refresh()
@@ -152,8 +152,8 @@ def test_killed_at_any_moment(database: str, tmp_path: Path) -> None:
             # The first lives end while the database is being made.
             deeds = 0 if life < 3 else dice.randrange(1, 30)
             lives.live(dice.randrange(10**6), deeds, dice.uniform(0, 0.15 if life < 3 else 0.03))
-            check(tmp_path, database, lives.told())
-        acts = Counter(deed["act"] for deed in lives.told())
+            check(tmp_path, database, lives.reported())
+        acts = Counter(deed["act"] for deed in lives.reported())
     assert set(acts) == {"save", "event", "file", "change"}, "every kind of writing was hit"
 
 
@@ -170,12 +170,12 @@ def test_cut_off_at_every_step_to_the_disk(act: str, database: str, tmp_path: Pa
     with nursery(tmp_path, database) as lives:
         assert lives.cut(1, "save", 10_000), "something is there already"
         for step in range(1, 60):
-            (tmp_path / "told").rename(tmp_path / f"told-{step}")
+            (tmp_path / "reported").rename(tmp_path / f"reported-{step}")
             ended = lives.cut(step + 1, act, step)
-            deeds = [*json_lines(tmp_path / f"told-{step}"), *lives.told()]
-            (tmp_path / "told").write_text("".join(json.dumps(d) + "\n" for d in deeds
+            deeds = [*json_lines(tmp_path / f"reported-{step}"), *lives.reported()]
+            (tmp_path / "reported").write_text("".join(json.dumps(d) + "\n" for d in deeds
                                                    if d["act"] != "end"))  # fmt: skip
-            check(tmp_path, database, lives.told())
+            check(tmp_path, database, lives.reported())
             if ended:
                 break
         assert ended
@@ -192,7 +192,7 @@ def test_two_stations_killed_in_turn_leave_one_chain(postgres: Postgres, tmp_pat
             for lives, folder in ((first, folders[0]), (second, folders[1])):
                 lives.live(2 * life + 10 * dice.randrange(10**5) + (folder.name == "b"),
                            dice.randrange(3, 12), 0)  # fmt: skip
-        told = [*first.told(), *second.told()]
+        reported = [*first.reported(), *second.reported()]
     store = Store(folders[0], url)
     for folder in folders:  # what waits in their files goes into the chain when they start again
         audit = AuditLog(Store(folder / "state", url), "again")
@@ -202,7 +202,7 @@ def test_two_stations_killed_in_turn_leave_one_chain(postgres: Postgres, tmp_pat
     events = Trail(store).search(Filter(kinds=("write",)), limit=100_000)
     store.close()
     assert verdict.ok, verdict.why
-    assert {d["token"] for d in told if d["act"] == "event"} <= {str(e.new) for e in events}
+    assert {d["token"] for d in reported if d["act"] == "event"} <= {str(e.new) for e in events}
 
 
 def test_the_server_of_the_database_may_go_and_come_back(
@@ -227,7 +227,7 @@ def test_the_server_of_the_database_may_go_and_come_back(
 
 
 @pytest.mark.parametrize("full", ["library", "audit"])
-def test_a_full_disk_is_told_and_leaves_everything_whole(full: str, tmp_path: Path) -> None:
+def test_a_full_disk_is_reported_and_leaves_everything_whole(full: str, tmp_path: Path) -> None:
     """SQLite's own limit of pages answers SQLITE_FULL, as a full disk does."""
     records = Records(tmp_path, Journal())
     saved = records.library.add("set", "x.sdset", b"one", Addition())

@@ -10,7 +10,7 @@ import pytest
 from sqlalchemy import update
 
 from backend.health.records import AxisOf, HealthRecords
-from backend.store.copy import copy_rows
+from backend.library.backup.copy import copy_rows
 from backend.store.database import Store
 from backend.store.health_tables import HealthBaseline
 from backend.tools.health.result import HealthRound, HealthValue

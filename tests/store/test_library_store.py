@@ -24,20 +24,20 @@ Y = AxisIdentity("r6l", "Y", serial=12)
 
 
 @pytest.fixture
-def told() -> list[Fact]:
+def reported() -> list[Fact]:
     return []
 
 
 @pytest.fixture
-def library(store: Store, tmp_path: Path, told: list[Fact]) -> Library:
-    return Library(store, Blobs(str(tmp_path / "blobs")), told.append)
+def library(store: Store, tmp_path: Path, reported: list[Fact]) -> Library:
+    return Library(store, Blobs(str(tmp_path / "blobs")), reported.append)
 
 
 def names(library: Library, **wanted: object) -> list[str]:
     return [entry.name for entry in library.search(Query(**wanted))[0]]
 
 
-def test_every_save_is_a_version_that_stays(library: Library, told: list[Fact]) -> None:
+def test_every_save_is_a_version_that_stays(library: Library, reported: list[Fact]) -> None:
     first = library.add("set", "x.sdset", b"one", Addition(X, author="Anna"))
     second = library.add("set", "x.sdset", b"two", Addition(X, author="Bert", notes="stiffer"))
     assert (first.id, first.versions, second.versions) == (second.id, 1, 2)
@@ -47,7 +47,7 @@ def test_every_save_is_a_version_that_stays(library: Library, told: list[Fact]) 
     assert library.content(first.id, 1) == b"one"
     assert second.latest.sha256 == hashlib.sha256(b"two").hexdigest()
     assert second.latest.axis == X
-    assert [(f.action, f.target, f.detail["version"]) for f in told] == [
+    assert [(f.action, f.target, f.detail["version"]) for f in reported] == [
         ("saved", "x.sdset", 1), ("saved", "x.sdset", 2),
     ]  # fmt: skip
 

@@ -14,16 +14,16 @@ from typer.testing import CliRunner
 import backend
 from backend.cli import app
 from backend.library import Library
+from backend.library.backup.backup import make_backup
+from backend.library.backup.restore import restore
 from backend.library.entries import Addition, Query
 from backend.restore.identity import DriveIdentity
 from backend.restore.store import RestoreStore
 from backend.station.drive_list import DriveList
 from backend.station.records import Records
 from backend.store import migrate, state_version
-from backend.store.backup import make_backup
 from backend.store.blobs import Blobs
 from backend.store.database import Store
-from backend.store.restore import restore
 from backend.store.state_version import FILE, VERSION, StateRefused
 from backend.work.journal import Journal
 from drivers.errors import Busy
@@ -39,7 +39,7 @@ BENCH = {
         }
     ],
 }  # fmt: skip
-OWED = {
+PENDING = {
     "serial": 7, "in_motion": False,
     "debts": [{"key": "2005:03", "raw": 400, "left": [900], "unapplied": False}],
 }  # fmt: skip
@@ -52,7 +52,7 @@ def first(tmp_path: Path) -> Path:
     folder = tmp_path / "state"
     for name, text in {
         "bench.json": json.dumps(BENCH),
-        "owed/x-axis.json": json.dumps(OWED),
+        "owed/x-axis.json": json.dumps(PENDING),
         "axes/x-axis.json": json.dumps({"mechanics": None, "watch": ["2005:03"]}),
         "sets/hand.sdset": "by hand",
     }.items():

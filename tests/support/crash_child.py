@@ -3,7 +3,7 @@
     python -m tests.support.crash_child FOLDER DATABASE
 
 For each line on its standard input it forks a child, says ``pid NUMBER``, and ``dead`` when that
-has ended. What the child was told to be stored it writes down in ``FOLDER/told`` at once. A line
+has ended. What was confirmed to the child as stored it notes in ``FOLDER/reported`` at once. A line
 is a seed, for a life until somebody kills it; or a seed, an act and a number: the child does this
 one thing and kills itself at that step on the way to the disk (statement, commit, flush, rename).
 """
@@ -54,13 +54,13 @@ class Life:
         self.seed = seed
         self.folder = folder
         self.dice = random.Random(seed)
-        self.told = (folder / "told").open("ab", buffering=0)
+        self.reported = (folder / "reported").open("ab", buffering=0)
         self.records = Records(folder / "state", Journal(), database)
         self.number = 0
 
     def tell(self, **fact: object) -> None:
         # One write call into the page cache: it outlives the process, whole or not at all.
-        self.told.write(json.dumps(fact).encode() + b"\n")
+        self.reported.write(json.dumps(fact).encode() + b"\n")
 
     def once(self, act: str, step: int) -> None:
         """One thing, cut off before the given step."""

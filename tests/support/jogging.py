@@ -21,7 +21,7 @@ def jogged(
     """Jog until it is ``there``, by the axis' state and where it began; still held inside.
 
     Gives where it began. A computer that stalls for 200 ms ends a jog, rightly: then once more.
-    ``settings`` are those of the message ``jog_start``; the direction is 1 unless told.
+    ``settings`` are those of the message ``jog_start``; the direction is 1 unless given.
     """
     ended = []
     for _ in range(5):

@@ -130,12 +130,12 @@ class ApiWatch:
 
 def _runnable_ns(process: str) -> dict[str, int]:
     """For how long each thread has waited for a processor; none where the kernel does not tell."""
-    told = {}
+    reported = {}
     for thread in Path(f"/proc/{process}/task").glob("*/schedstat"):
         # A thread may end while it is looked at.
         with contextlib.suppress(OSError):
-            told[str(thread)] = int(thread.read_text().split()[1])
-    return told
+            reported[str(thread)] = int(thread.read_text().split()[1])
+    return reported
 
 
 def _children(process: str) -> list[str]:

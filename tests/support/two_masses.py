@@ -68,9 +68,9 @@ class Bench:
         )  # fmt: skip
         rng = np.random.default_rng(seed)
         size = float(np.std(torque))
-        told = torque + self.distortion * size * np.sin(6.0 * torque / size) / 2
-        told = told + rng.normal(size=torque.size) * self.noise * size
-        return told, speed + rng.normal(size=torque.size) * self.noise * float(np.std(speed))
+        reported = torque + self.distortion * size * np.sin(6.0 * torque / size) / 2
+        reported = reported + rng.normal(size=torque.size) * self.noise * size
+        return reported, speed + rng.normal(size=torque.size) * self.noise * float(np.std(speed))
 
 
 @numba.njit(cache=True)

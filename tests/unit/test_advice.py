@@ -23,7 +23,7 @@ def test_a_line_in_trouble_has_its_usual_remedy(kind: type[DriveError]) -> None:
     assert "check" in remedy
 
 
-def test_the_nearest_remedy_is_told() -> None:
+def test_the_nearest_remedy_is_reported() -> None:
     error = LinkTimeout("nothing came", remedy="switch it on")
     assert problem_of(error).remedy == "switch it on"
 

@@ -85,7 +85,7 @@ async def test_a_process_that_cannot_be_started_is_a_lost_link_and_leaves_nothin
     assert descriptors() == before
 
 
-async def test_a_process_that_is_slow_to_start_is_waited_for_and_one_that_hangs_is_told(
+async def test_a_process_that_is_slow_to_start_is_waited_for_and_one_that_hangs_is_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A restart that gave up while the child was still loading would begin anew for ever."""
@@ -131,7 +131,7 @@ def test_a_ring_that_gets_no_memory_leaves_no_descriptor(monkeypatch: pytest.Mon
 
 
 async def test_a_request_that_could_not_be_sent_leaves_no_error_that_nobody_takes() -> None:
-    """The process dies while a request waits for room in its pipe: it was told twice."""
+    """The process dies while a request waits for room in its pipe: it was reported twice."""
     process = host()
     child = await connected(process)
     load = {"op": "play", "trajectories": [{"values": bytes(1_000_000)}]}

@@ -69,7 +69,7 @@ ALLOWED: dict[tuple[str, str], str] = {
         'error.text = prose(error.message.removeprefix(f"bench file {file}: "))',
     ): "the file is a temporary one, which nobody who reads the message knows",
     (
-        "backend/recording/capture.py",
+        "backend/station/recording/capture.py",
         r'words = re.sub(r"[^\w.\-]+", " ", reason, flags=re.ASCII).strip()[:50].strip(" .")',
     ): "the name of a file is made of the words; it is never parsed",
 }

@@ -126,10 +126,10 @@ class LoopVerdict:
                 found.append(Missed(what, value, limit))
         if self.stated.ms > promised.ms * ms_ratio:
             found.append(Missed("peak_sensitivity", self.stated.ms, promised.ms))
-        told = {each.what for each in found}
+        reported = {each.what for each in found}
         ends = (*_short(self.measured, "measured", promised),
                 *_short(self.predicted, "predicted", promised))  # fmt: skip
-        return (*found, *(each for each in ends if each.what not in told))
+        return (*found, *(each for each in ends if each.what not in reported))
 
 
 def _short(band: BandVerdict | None, end: End, promised: Goals) -> list[Missed]:

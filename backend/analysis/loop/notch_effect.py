@@ -30,7 +30,7 @@ from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 #: Images that are counted on each side, multiples of the sample rate.
 _IMAGES = 25
-#: A depth that cannot be told from a deeper one.
+#: A depth that cannot be distinguished from a deeper one.
 _DEEPEST_DB = -45.0
 #: A ratio that nowhere falls below this shows no notch.
 _NO_EFFECT = 0.93

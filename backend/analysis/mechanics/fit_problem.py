@@ -41,8 +41,8 @@ USUAL_CORNER, _CORNER_SPREAD = float(np.log(2000.0)), 1.0
 _USUAL_ZERO = 0.1
 #: Couplings have about this damping ratio, within a factor of e² (one standard deviation).
 USUAL_DAMPING, _DAMPING_SPREAD = 0.03, 2.0
-#: What moves told of the whole inertia holds for the response to this share at best (one
-#: deviation), as one is told by the reported torque and the other by the commanded.
+#: What moves showed of the whole inertia holds for the response to this share at best (one
+#: deviation), as one is shown by the reported torque and the other by the commanded.
 _INERTIA_ALIKE = 0.03
 #: Lines with a larger relative deviation take no part.
 _NOISE = 0.3
@@ -92,7 +92,7 @@ class View:
 
 @dataclass(frozen=True)
 class KnownInertia:
-    """The whole axis' inertia as moves have told it, and its relative standard deviation."""
+    """The whole axis' inertia as moves have shown it, and its relative standard deviation."""
 
     kgm2: float
     deviation: float = 0.0

@@ -1,4 +1,4 @@
-"""Bidirectional trapezoids from which inertia and friction can be told, within an envelope."""
+"""Bidirectional trapezoids from which inertia and friction can be reported, within an envelope."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def design_moves(
     """Bidirectional trapezoids inside travel, speed and torque.
 
     The acceleration uses 70 % of the torque left after friction; every second repetition runs at
-    half speed and 60 % of the acceleration, so that viscous and Coulomb friction can be told
+    half speed and 60 % of the acceleration, so that viscous and Coulomb friction can be reported
     apart. ``smoothing_s`` bounds the jerk.
 
     Raises:

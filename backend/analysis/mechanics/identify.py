@@ -165,8 +165,8 @@ def identify_with_path(
     The torque alone cannot always tell whether setpoints are interpolated; the motion can: a
     wrong answer leaves a delay that is negative, or a roll-off that no mechanics have. Beside a
     closed loop, path and mechanics need each other, and are refined in turn. ``inertia`` is the
-    whole axis', where moves have told it. ``loop`` is the closed loop, where its
-    reference has told it: the path, too, is known then.
+    whole axis', where moves have shown it. ``loop`` is the closed loop, where its
+    reference has shown it: the path, too, is known then.
     """
     closed = quantity == "torque_injection"
     corner_known = path.current_bandwidth_hz is not None
@@ -228,9 +228,9 @@ def _by_motion(
         return task, trials, False
     alone = replace(task, records=tuple(replace(record, torque=None) for record in task.records))
     likeliest = trials[0].path if trials else paths[0]
-    told = likeliest.current_bandwidth_hz if corner_known else None
+    reported = likeliest.current_bandwidth_hz if corner_known else None
     found: list[_Trial] = []
-    for corner in (told or USUAL_CURRENT_HZ, _SLOW_HZ):
+    for corner in (reported or USUAL_CURRENT_HZ, _SLOW_HZ):
         begun = replace(likeliest, current_bandwidth_hz=corner)
         found += [alone.at_cycles(begun, hold) for hold in _HOLDS]
         found.sort(key=_rank)
@@ -405,10 +405,10 @@ class _Task:
             if last.fit.error > max(TRUSTED_ERROR, 1.5 * last.fit.noise):
                 break
             friction_nm = last.views.velocity.coulomb_nm
-            told = with_balanced_reversals(
+            reported = with_balanced_reversals(
                 self.records, self.quantity, last.fit, friction_nm, lag_s
             )
-            task = replace(self, records=told)
+            task = replace(self, records=reported)
             anew = n == 0 and _hidden_by_friction(trial)
             last = task.trial(trial.path, None, motion, None if anew else last.solution)
             least = best[1].views.velocity.scatter_left

@@ -2,7 +2,7 @@
 
 torque = J·a + b·ω + Tc·sign(ω) + Tg, every signal through the *same* zero-phase filter (so that
 the filter drops out of the equation), samples near standstill left out, outliers weighted down
-(Huber 1964), loads that swing told apart from it (`load_swing`), torques that depend on the place
+(Huber 1964), loads that swing kept apart (`load_swing`), torques that depend on the place
 or grow with the square of the speed where they show (`load_terms`), and intervals that know how
 few independent samples a filtered signal holds, and how long what is left swings.
 """
@@ -41,7 +41,7 @@ _FEWEST = 20
 #: Columns of a rigid axis with friction, as `_columns` makes them.
 _RIGID = 6
 #: Share of the Coulomb friction that may have been taken for viscous friction.
-_TOLD_APART = 0.01
+_DISTINGUISHED = 0.01
 
 #: Why data do not support an answer, in the order in which they are stated.
 Reason = Literal[
@@ -232,7 +232,7 @@ def _columns(
     # than the other signals are smoothed, and J would come out small.
     acceleration = _smooth(velocity_rad_s, _slope_kernel(kernel)) * rate
     direction = _smooth(np.clip(velocity_rad_s / max(0.2 * slowest, 1e-12), -1.0, 1.0), kernel)
-    # A speed that is told later than the torque (by the drive's filter, 0.2 ms are enough) bends
+    # A speed reported later than the torque (by the drive's filter, 0.2 ms are enough) bends
     # the two frictions against each other: to first order that is the first derivative.
     late = np.gradient(acceleration) * rate
     # A load behind a spring of antiresonance ω_a seems heavier by (ω/ω_a)²: to first order that is
@@ -278,7 +278,7 @@ def _intervals(
     half = np.hypot(uncertainty[:4], SYSTEMATIC_SHARE * np.abs(x[:4]))
     # What reversals bend of Coulomb friction, viscous friction makes up for at the speeds moved at.
     speed = float(np.sqrt(np.mean(a[:, 1] ** 2)))
-    half[1] = np.hypot(half[1], _TOLD_APART * abs(x[2]) / speed)
+    half[1] = np.hypot(half[1], _DISTINGUISHED * abs(x[2]) / speed)
     return [
         Interval(float(v), float(v - h), float(v + h)) for v, h in zip(x[:4], half, strict=True)
     ]

@@ -63,10 +63,10 @@ def inertia_by_place(
     first = records[0].excitation
     if quantity == "closed_loop" or first.segments or not first.period_samples:
         return None
-    told = tuple(r for r in records if r.position is not None and good_periods(r)[0])
-    if len(told) < 2:
+    reported = tuple(r for r in records if r.position is not None and good_periods(r)[0])
+    if len(reported) < 2:
         return None
-    s = collect(told, path, quantity)
+    s = collect(reported, path, quantity)
     inputs = continuous_input(s, path, quantity, coulomb_nm)
     g, _, s_ur = instrument_estimate(s, inputs)
     f = s.frequency_hz
@@ -87,19 +87,19 @@ def inertia_by_place(
         return None
     columns = []
     for phase in (0.0, np.pi / 2):
-        rows = [_torque(r, phase) / late for r in told]
+        rows = [_torque(r, phase) / late for r in reported]
         columns.append(np.concatenate([c[use] for c in apart(rows)]))
     target = -np.concatenate([r[use] for r in left])
     # Lines weigh by the torque that is left around them: noise and friction rule low lines.
     size = np.sqrt(np.mean([np.abs(r[use]) ** 2 for r in left], axis=0))
-    weight = np.tile(1.0 / np.maximum(_around(size), 1e-12), len(told))
+    weight = np.tile(1.0 / np.maximum(_around(size), 1e-12), len(reported))
     a = np.column_stack(columns) * weight[:, None]
     b = target * weight
     matrix, rhs = np.concatenate([a.real, a.imag]), np.concatenate([b.real, b.imag])
     x = np.linalg.lstsq(matrix, rhs, rcond=None)[0]
     rest = rhs - matrix @ x
     # Realisations share one response, so that one of them tells nothing.
-    freedom = max(rest.size * (len(told) - 1) / len(told) - 2.0, 1.0)
+    freedom = max(rest.size * (len(reported) - 1) / len(reported) - 2.0, 1.0)
     covariance = np.linalg.pinv(matrix.T @ matrix) * float(rest @ rest) / freedom
     amplitude = float(np.hypot(*x))
     if amplitude <= 0.0:

@@ -26,7 +26,7 @@ from backend.analysis.signals.arrays import BoolArray, FloatArray, IntArray
 #: What the search looks at: ratios of neighbouring frequencies, and dampings.
 _STEP, _DAMPINGS = 1.07, (0.008, 0.03, 0.1)
 _LEAST_DAMPING, _MOST_DAMPING = 5e-4, 0.5
-#: Below this frequency a swing is not told from the move itself.
+#: Below this frequency a swing is not distinguished from the move itself.
 _LOWEST_HZ = 3.0
 #: A mode must take this share of the power that is left, or it is not there to be seen.
 _WORTH = 0.5
@@ -53,8 +53,8 @@ def lag_of_load(acceleration: FloatArray, swing: Swing, sample_rate_hz: float) -
     damped = 2 * swing.damping * w
     # As states: the load's way and speed against the motor's way, driven by the acceleration.
     states = np.array([[0.0, 1.0], [-w * w, -damped]]), np.array([[0.0], [1.0]])
-    told = np.array([[w * w, damped]]), np.array([[0.0]])
-    a, b, c, d, _ = cont2discrete((*states, *told), 1.0 / sample_rate_hz, "foh")
+    reported = np.array([[w * w, damped]]), np.array([[0.0]])
+    a, b, c, d, _ = cont2discrete((*states, *reported), 1.0 / sample_rate_hz, "foh")
     numerator, denominator = ss2tf(a, b, c, d)
     return np.asarray(lfilter(numerator[0], denominator, acceleration)) - acceleration
 

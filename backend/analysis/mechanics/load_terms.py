@@ -1,4 +1,4 @@
-"""Torques that some machines need beside inertia and friction, told by the moves themselves.
+"""Torques that some machines need beside inertia and friction, shown by the moves themselves.
 
 A fan, a pump or a stirrer takes a torque that grows with the square of its speed; a spring, an arm
 or a load out of balance one that depends on the place (`place_torque`); and friction is larger near
@@ -102,12 +102,12 @@ class Terms:
         made = columns * sizes[: columns.shape[1]]
         at = int(self.fan) + int(self.static_rad_s > 0)
         # What repeats more than twice in a turn is the motor's own cogging, not the machine's.
-        told = [i for i, period in enumerate(self.periods_rad) if period > COGGING_RAD]
-        place = sum(made[:, at + 2 * i] + made[:, at + 2 * i + 1] for i in told)
+        reported = [i for i, period in enumerate(self.periods_rad) if period > COGGING_RAD]
+        place = sum(made[:, at + 2 * i] + made[:, at + 2 * i + 1] for i in reported)
         return Beside(
             float(np.max(np.abs(made[:, 0]))) if self.fan else 0.0,
             0.5 * float(np.ptp(place)),
-            tuple(self.periods_rad[i] for i in told),
+            tuple(self.periods_rad[i] for i in reported),
             made.sum(axis=1),
         )
 

@@ -72,7 +72,7 @@ def fit_sampled_model(
     0.4 of the sample rate with enough coherence take part. A delay is looked for within
     ``longest_delay_s`` (three bus cycles in torque mode, a quarter of one in a closed loop)
     where none explains nothing. With ``start`` only the numbers of another solution are refined.
-    ``inertia`` is the whole axis', where moves have told it.
+    ``inertia`` is the whole axis', where moves have shown it.
 
     Raises:
         ValueError: too few lines are coherent.
@@ -148,7 +148,7 @@ def _best(chain: Problem, longest_delay_s: float, max_modes: int) -> tuple[Found
     views, period_s = chain.views, chain.period_s
     found = _grown(chain, _rigid_start(views[0], 0.0), max_modes)
     if found.error > 0.05:
-        # Perhaps there is a delay that no path told.
+        # Perhaps there is a delay that no path showed.
         late = np.arange(0.25 * period_s, longest_delay_s + 1e-9, 0.25 * period_s) / period_s
         tried = [_grown(chain, _rigid_start(views[0], float(d)), 1) for d in late]
         start = min([found, *tried], key=lambda t: t.score)

@@ -25,7 +25,7 @@ from backend.analysis.signals.line_spectra import Quantity, Record, own_torque
 #: speed tells more. It tells an interval to 0.3; but errors of the balance are those of speeds at
 #: samples, which cancel from one interval to the next, so that it is better on the lower lines.
 _ROUGH, _LEAST_WEIGHT = 0.4, 0.5
-#: What the balance is off by is told by so many intervals to each side, to this share.
+#: What the balance is off by is shown by so many intervals to each side, to this share.
 _SLOW, _JITTER = 12, 0.01
 #: Fewer intervals without a reversal say nothing of the balance.
 _FEWEST = 50
@@ -46,22 +46,22 @@ def with_balanced_reversals(
     missing = any(r.valid is not None and not np.all(r.valid) for r in records)
     if coulomb_nm <= 0 or by_torque <= 0 or missing:
         return records
-    told = []
+    reported = []
     for record in records:
-        direction = _told(
+        direction = _reported(
             record, record.direction(lag_s), quantity, fit, coulomb_nm, 1.0 / by_torque
         )
         if direction is None:
             return records
-        told.append(replace(record, told_direction=direction))
-    return tuple(told)
+        reported.append(replace(record, known_direction=direction))
+    return tuple(reported)
 
 
-def _told(
+def _reported(
     record: Record, by_speed: FloatArray, quantity: Quantity, fit: SampledFit, coulomb_nm: float,
     motor_kgm2: float,
 ) -> FloatArray | None:  # fmt: skip
-    """Mean direction between each sample and the next [n]; None where it is better not told so."""
+    """Mean direction between each sample and the next [n]; None where the balance is too weak."""
     path, period_s = fit.path, 1.0 / fit.path.sample_rate_hz
     velocity, drawn_nm = _motion(record, quantity, fit, motor_kgm2)
     after = np.append(velocity[1:], velocity[-1])
@@ -82,8 +82,8 @@ def _told(
         return None
     # Cut above one only: what noise adds would else no longer cancel.
     most = 1.0 + spread
-    told = np.clip(left_nm / coulomb_nm - wrong - mean, -most, most)
-    return np.where(steady, sign, weight * told + (1.0 - weight) * by_speed)
+    reported = np.clip(left_nm / coulomb_nm - wrong - mean, -most, most)
+    return np.where(steady, sign, weight * reported + (1.0 - weight) * by_speed)
 
 
 def _between(off: FloatArray, known: BoolArray, wanted: BoolArray) -> tuple[FloatArray, float]:
@@ -155,14 +155,14 @@ def _bands(
     position nothing is known of what is folded.
     """
     rate, corner = fit.path.sample_rate_hz, fit.path.response_bandwidth_hz
-    told_s = fit.path.response_delay_s
-    late = delay_response(f, fit.delay_s + told_s)
+    reported_s = fit.path.response_delay_s
+    late = delay_response(f, fit.delay_s + reported_s)
     seen = np.fft.rfft(record.response, size) / late
     if record.position is None:
         return np.asarray(seen / lag_response(f, corner)), np.zeros_like(seen)
     gone = np.diff(record.position, append=record.position[-1]) * rate
     mean = np.sinc(f / rate) * np.exp(1j * np.pi * f / rate)
-    late = delay_response(f, fit.position_delay_s + told_s)
+    late = delay_response(f, fit.position_delay_s + reported_s)
     moved = np.fft.rfft(gone, size) / (mean * late)
     weaker = f / (f - rate)
     here, there = lag_response(f, corner), lag_response(f - rate, corner)

@@ -86,7 +86,7 @@ class SpeedModel:
         if self.best.speed is None:
             raise ValueError("no Stribeck curve was found")
         speeds = [each.speed for each in self.alike if each.speed is not None]
-        # Half a step of the grid is not told apart.
+        # Half a step of the grid is not distinguished.
         size = np.abs(self.speed)
         half = (size.max() / size.min()) ** (0.5 / (_GRID - 1))
         return self.best.speed, float(min(speeds) / half), float(max(speeds) * half)

@@ -77,7 +77,7 @@ def contradiction(
 
 
 def rigid_part(found: ForeignResponse, filter_hz: float | None) -> RigidPart | None:
-    """Inertia and friction of the fitted model; nothing where no friction pole is told."""
+    """Inertia and friction of the fitted model; nothing where no friction pole is reported."""
     fit = found.fit
     if fit is None:
         return None

@@ -142,7 +142,7 @@ def distortion(
             return Distortion(np.asarray(np.interp(frf.frequency_hz, f, share)))
         upper = highest
     return Distortion(
-        # What lies below the first empty bins is told by all of them, not by one beside a valley.
+        # What lies below the first empty bins is shown by all of them, not by one beside a valley.
         np.asarray(np.interp(frf.frequency_hz, f, share, left=float(np.median(share)))),
         float(np.median(share[upper])), float(np.median(plain[upper])), _ratio(falls),
     )  # fmt: skip
@@ -173,7 +173,7 @@ class _Way:
 
     A motion shows in both; what only one of them shows is the noise that it has. Behind a coarse
     encoder the reported speed is noisier by far than the way of a cycle, and a position that is
-    told in coarse units noisier than the speed.
+    reported in coarse units noisier than the speed.
     """
 
     late: ComplexArray

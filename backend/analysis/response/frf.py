@@ -136,11 +136,11 @@ def estimate_periodic(
     # What friction did to the answer is known in part only; that is charged to the band (more of
     # it would also weigh lines less that tell the speed filter well).
     plain = instrument_estimate(s, continuous_input(s, path, quantity, position=position))[0]
-    told = all(record.told_direction is not None for record in records)
+    reported = all(record.known_direction is not None for record in records)
     # Where friction takes most of the torque, a share of it is much of what is left.
-    uncertainty = _BY_BALANCE * (g / plain - 1.0) if told else _BY_SPEED * np.log(g / plain)
+    uncertainty = _BY_BALANCE * (g / plain - 1.0) if reported else _BY_SPEED * np.log(g / plain)
     size, turn = np.abs(uncertainty.real), np.abs(uncertainty.imag)
-    if told:
+    if reported:
         # What the balance leaves is no share of what friction did: it may turn a line as well.
         size = turn = _EACH_BY_BALANCE * np.abs(g / plain - 1.0)
     power = np.asarray(sum(np.abs(r.mean(axis=0)) ** 2 for r in s.sent))

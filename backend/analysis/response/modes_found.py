@@ -24,7 +24,7 @@ _DAMPING_FLOOR = 0.15
 
 @dataclass(frozen=True)
 class FoundMode:
-    """``pair`` is its number in the model; ``row`` what is told of it."""
+    """``pair`` is its number in the model; ``row`` what is reported about it."""
 
     pair: int
     row: Resonance

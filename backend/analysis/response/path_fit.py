@@ -46,7 +46,7 @@ _NEARLY = 1.5
 #: A delay so near to whole cycles is one of whole cycles.
 _WHOLE = 0.06
 #: Deviations of delays (cycles) and of corners (logarithm) where nothing but habit tells them.
-_STEADY, _UNSTEADY, _TOLD, _UNTOLD = 0.02, 0.1, 0.03, 0.7
+_STEADY, _UNSTEADY, _REPORTED, _UNTOLD = 0.02, 0.1, 0.03, 0.7
 #: So much stays unexplained by rounding alone.
 _ROUNDING = 1.5e-7
 
@@ -91,7 +91,7 @@ def path_covariance(
     """
     usual = [_STEADY if at_whole_cycles(path) else _UNSTEADY]
     if path.current_bandwidth_hz is not None:
-        usual.append(_TOLD if corner_known else _UNTOLD)
+        usual.append(_REPORTED if corner_known else _UNTOLD)
     information = np.diag(np.array(usual) ** -2.0)
     if any(r.torque is None for r in records):
         return np.asarray(np.linalg.inv(information))

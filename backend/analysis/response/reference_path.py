@@ -3,7 +3,7 @@
 A closed loop T is the measured response over what hold and delay make of the reference. Where the
 open loop is large T is 1 whatever the plant is, so that a phase left there is the reference's and
 none of the loop's; an error of the plant shows in T by its sensitivity S = 1 - T. Delay of the
-reference, size and delay of the loop are therefore told apart by least squares, for each hold.
+reference, size and delay of the loop are therefore distinguished by least squares, for each hold.
 """
 
 from __future__ import annotations

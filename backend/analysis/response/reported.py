@@ -21,7 +21,7 @@ from backend.analysis.signals.line_spectra import Record, good_periods, period_s
 _MOST_CYCLES, _SAME = 16, 0.01
 #: A torque that follows its command faster than this is the command; current loops are slower.
 _COMMANDED_HZ, _USUAL_HZ = 3500.0, 1000.0
-#: A lag that is not told is not slower, and what is left of its delay, one deviation.
+#: A lag that is not reported is not slower, and what is left of its delay, one deviation.
 _SLOWEST_HZ, _LATE_S = 250.0, 60e-6
 
 
@@ -50,10 +50,10 @@ def _apart(record: Record, cycles: int) -> FloatArray:
         return np.ones(1)
     before = np.concatenate([np.full(cycles, place[0]), place[:-cycles]])
     mean = (place - before) * (e.sample_rate_hz / cycles)
-    told, made = (period_spectra(x, e, good).mean(axis=0) for x in (record.response, mean))
+    reported, made = (period_spectra(x, e, good).mean(axis=0) for x in (record.response, mean))
     # Low lines are alike whatever the speed is.
     upper = e.line_hz >= 0.5 * e.line_hz[-1]
-    return np.asarray((np.abs(told - made) / np.maximum(np.abs(told), 1e-300))[upper])
+    return np.asarray((np.abs(reported - made) / np.maximum(np.abs(reported), 1e-300))[upper])
 
 
 def commanded(path: SignalPath) -> bool:
@@ -100,6 +100,6 @@ def charged(frf: Frf, lines_hz: FloatArray, uncertainty: ComplexArray) -> Frf:
     )
 
 
-def _without_delay(f: FloatArray, told: ComplexArray) -> ComplexArray:
-    late = float(np.sum(f * told.imag) / np.sum(f**2))
-    return np.asarray(told - 1j * late * f)
+def _without_delay(f: FloatArray, reported: ComplexArray) -> ComplexArray:
+    late = float(np.sum(f * reported.imag) / np.sum(f**2))
+    return np.asarray(reported - 1j * late * f)

@@ -62,7 +62,7 @@ class Sampler:
     controller: ComplexArray
     seen_as: ComplexArray
     command: ComplexArray
-    told: ComplexArray
+    as_reported: ComplexArray
 
     @staticmethod
     def of(
@@ -82,10 +82,10 @@ class Sampler:
             weaker = f[None, :] / all_f
             seen_as = np.asarray(weaker * delay_response(all_f, path.response_delay_s))
         command = hold_response(f, path.sample_rate_hz, path.hold) * lag[images] * delay[images]
-        told = seen_as[images] if integrated else filtered[images]
+        as_reported = seen_as[images] if integrated else filtered[images]
         return Sampler(
             all_f, images, hold_response(all_f, path.sample_rate_hz, path.hold) * lag * delay,
-            filtered, controller * filtered, seen_as, command, told,
+            filtered, controller * filtered, seen_as, command, as_reported,
         )  # fmt: skip
 
     def thinned(self, lines: npt.NDArray[np.int64]) -> Sampler:
@@ -93,7 +93,7 @@ class Sampler:
         return Sampler(
             self.frequency_hz[:, lines], self.true, self.torque[:, lines],
             self.reported[:, lines], self.controller[:, lines], self.seen_as[:, lines],
-            self.command[lines], self.told[lines],
+            self.command[lines], self.as_reported[lines],
         )  # fmt: skip
 
     def nearest(self, images: int) -> Sampler:
@@ -102,7 +102,7 @@ class Sampler:
         return Sampler(
             self.frequency_hz[rows], min(self.true, images), self.torque[rows],
             self.reported[rows], self.controller[rows], self.seen_as[rows], self.command,
-            self.told,
+            self.as_reported,
         )  # fmt: skip
 
     def single(self) -> Sampler:
@@ -120,7 +120,7 @@ class Sampler:
         driven = self.torque / (1.0 + self.controller * plants)
         measured = np.sum(seen_as * plants * driven, axis=-2)
         own = -np.sum(self.controller * plants * driven, axis=-2)
-        return np.asarray(measured / ((self.command + own) * self.told))
+        return np.asarray(measured / ((self.command + own) * self.as_reported))
 
     def seen(
         self, plant: ComplexArray, further: ComplexArray | None = None
@@ -135,10 +135,10 @@ class Sampler:
         driven = self.torque * inner
         measured = np.sum(seen_as * plant * driven, axis=0)
         own = -np.sum(self.controller * plant * driven, axis=0)
-        whole = (self.command + own) * self.told
+        whole = (self.command + own) * self.as_reported
         squared = driven * inner
         slope = seen_as * squared / whole
-        slope = slope + measured / whole**2 * self.told * self.controller * squared
+        slope = slope + measured / whole**2 * self.as_reported * self.controller * squared
         by_further = self.seen_as * plant * driven / whole
         return np.asarray(measured / whole), np.asarray(slope), np.asarray(by_further)
 

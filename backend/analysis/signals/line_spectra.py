@@ -49,7 +49,7 @@ class Record:
     torque: FloatArray | None = None
     valid: BoolArray | None = None
     position: FloatArray | None = None
-    told_direction: FloatArray | None = None
+    known_direction: FloatArray | None = None
     _directions: dict[float, FloatArray] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
@@ -57,7 +57,7 @@ class Record:
     def __post_init__(self) -> None:
         n = self.excitation.samples.size
         for signal in (
-            self.response, self.torque, self.valid, self.position, self.told_direction,
+            self.response, self.torque, self.valid, self.position, self.known_direction,
         ):  # fmt: skip
             if signal is not None and signal.shape != (n,):
                 raise ValueError(f"signals must have {n} samples, as the excitation has")
@@ -248,8 +248,8 @@ def speed_lag_s(records: tuple[Record, ...], path: SignalPath) -> float:
 
     Without positions it is what ``path`` tells of a filter.
     """
-    told = path.response_bandwidth_hz
-    known = 0.0 if told is None else 1.0 / (2 * np.pi * told)
+    reported = path.response_bandwidth_hz
+    known = 0.0 if reported is None else 1.0 / (2 * np.pi * reported)
     if any(record.position is None for record in records):
         return known
     turned = weights = 0.0
@@ -276,8 +276,8 @@ def friction_direction(
     ``lag_s`` as from :func:`speed_lag_s`.
     """
     centre = _centre_of_interval(e.line_hz, e.sample_rate_hz)
-    if record.told_direction is not None:
-        return np.asarray(period_spectra(record.told_direction, e, periods) * centre)
+    if record.known_direction is not None:
+        return np.asarray(period_spectra(record.known_direction, e, periods) * centre)
     spectra = period_spectra(record.direction(lag_s), e, periods)
     return np.asarray(spectra * centre / delay_response(e.line_hz, path.response_delay_s))
 

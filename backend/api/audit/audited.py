@@ -1,7 +1,7 @@
-"""Changes through the interface and the audit: none is forgotten, none is told before it is safe.
+"""Changes through the interface and the audit: none forgotten, none reported before it is safe.
 
-What changes a drive's parameters, control, people or the library is told where it happens, with
-values. Every other change is told here, so that a new route cannot forget it: what it asked for,
+What changes a drive's parameters, control, people or the library is reported where it happens, with
+values. Every other change is recorded here, so that no new route can forget it: what it asked for,
 and what was there before where the route says so (`backend.audit.asked.note_before`).
 """
 
@@ -23,9 +23,9 @@ from backend.tools.registry import TOOLS
 WAIT_S = 1.0
 _ACTIONS = {"POST": "made", "PUT": "changed", "PATCH": "changed", "DELETE": "deleted"}
 _DRIVE = "/drives/{drive_id}"
-#: Routes whose changes are told where they happen: value by value, or as jobs, or as what people
+#: Routes whose changes are recorded where they happen: value by value, as jobs, or as what people
 #: do. `tests/security/test_every_change_is_told.py` asks each of them.
-TOLD_THERE = frozenset(
+REPORTED_THERE = frozenset(
     f"{method} {API}{path}"
     for method, paths in {
         "POST": (
@@ -59,7 +59,7 @@ TOLD_THERE = frozenset(
     for path in paths
 )  # fmt: skip
 #: Routes that compute or read, and change nothing that stays. (Some records of faults are read
-#: through a selector, which is written and put back; each such write is told as a write.)
+#: through a selector, which is written and put back; each such write is reported as a write.)
 CHANGES_NOTHING = frozenset(
     f"POST {API}{path}"
     for path in (
@@ -103,7 +103,7 @@ class AuditedAnswers:
             if message["type"] == "http.response.start":
                 if matched is not None and message["status"] < 400:
                     self._tell(matched, scope, axis, said)
-                # While the audit has a problem everybody is told of it; waiting would not help.
+                # While the audit has a problem everybody is informed of it; waiting would not help.
                 if not self._audit.problem:
                     await self._audit.settled(WAIT_S)
             await send(message)
@@ -116,7 +116,7 @@ class AuditedAnswers:
 
     def _tell(self, matched: Matched, scope: Scope, axis: str, said: Asked) -> None:
         """Record a change that nobody else tells."""
-        if matched.route in TOLD_THERE or matched.route in CHANGES_NOTHING:
+        if matched.route in REPORTED_THERE or matched.route in CHANGES_NOTHING:
             return
         path: str = scope["path"]
         kind: Kind = "file" if matched.need.right is Right.FILES else "station"

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from backend.api.drive import models_axis
 from backend.api.errors import message_of, message_or_none, words_of
+from backend.axis.stop.facts import AxisStop, Verdict
 from backend.station.bench import Bench
-from backend.stopping.facts import AxisStop, Verdict
-from backend.stopping.told import told
+from backend.stopping.stop_message import stop_message
 from backend.stopping.turning import Turning
 from drivers.texts.message import text
 
@@ -56,7 +56,7 @@ def stop_result(
     failed = {
         each.drive: why
         for each in found
-        if (why := told(bench.name_of(each.drive), each)) is not None
+        if (why := stop_message(bench.name_of(each.drive), each)) is not None
     }
     judged = {each.drive for each in found}
     failed |= {drive: text("stopping.not-on-bench") for drive in wanted if drive not in judged}

@@ -30,7 +30,7 @@ class SmallMovesInfo(Message):
 
     moved: int = Field(description="increments of the last one")
     raw_per_inc_s: float | None = Field(
-        description="what 606Ch told in it, per increment per second; null where not found"
+        description="what 606Ch showed in it, per increment per second; null where not found"
     )
     next_most: int = Field(description="increments that the next one may have")
 
@@ -69,7 +69,7 @@ class SmallMoveRequest(Message):
 
 
 class SmallMoveResult(Message):
-    """What a small move told."""
+    """What a small move showed."""
 
     kind: Literal["small_move"] = "small_move"
     moved_increments: int

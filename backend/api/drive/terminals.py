@@ -132,12 +132,12 @@ async def overrule(
     if request.values:
         await session.set(request.values)
         session.renew()
-        told = ", ".join(
+        reported = ", ".join(
             f"{n} {'released' if v is None else 'on' if v else 'off'}"
             for n, v in request.values.items()
         )
         bench.journal.add(
-            f"{connected.drive.name}: {session.spec.title}: {told}",
+            f"{connected.drive.name}: {session.spec.title}: {reported}",
             level="warning",
             drive=connected.drive.id,
         )

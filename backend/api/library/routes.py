@@ -26,8 +26,8 @@ from backend.api.times import in_utc
 from backend.library import NotInLibrary, sharing
 from backend.library.entries import Entry
 from backend.library.entries import Query as LibraryQuery
-from backend.recording.service import Recordings
 from backend.station.bench import Bench
+from backend.station.recording.service import Recordings
 from drivers.errors import NotAllowed
 
 router = APIRouter(prefix="/library")
@@ -222,7 +222,7 @@ async def delete_library_entry(
             recordings.library.delete(entry.name)
         elif (path := records.index.path(entry.kind, entry.name)) is not None:
             path.unlink(missing_ok=True)
-        records.library.told_deleted(entry)
+        records.library.reported_deleted(entry)
         records.index.refresh(recordings.running)
 
     await bench.records.store.call(work)

@@ -287,7 +287,7 @@ class Connection:
 
     async def _poll(self, request: WatchValues) -> None:
         while (connected := self._bench.connected_drives.get(request.drive)) is not None:
-            # A lost link is told by the monitor; polling goes on until the drive is back.
+            # A lost link is shown by the monitor; polling goes on until the drive is back.
             with contextlib.suppress(DriveError):
                 await connected.drive.read_many(request.keys)
             await asyncio.sleep(request.period_s)

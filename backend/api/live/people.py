@@ -67,7 +67,7 @@ class PeopleLive:
     def left(self, page: Page) -> None:
         """A page is gone: what it moved stops, what it held is free.
 
-        Each of it whatever becomes of the rest: a defect in what is told must not leave a motion.
+        Each step whatever becomes of the others: a defect in a report must not leave a motion.
         """
         with contextlib.ExitStack() as then:
             then.callback(self.changed)

@@ -2,7 +2,7 @@
 
 A subscription may be carried by several streams: what the cyclic exchange brings with every cycle,
 and what is polled. When an exchange starts or ends, or a drive comes back, the streams are made
-anew by themselves and the page is told with another ScopeInfo.
+anew by themselves and the page is informed with another ScopeInfo.
 """
 
 from __future__ import annotations
@@ -240,7 +240,7 @@ class ScopeStreams:
                         self.bench_changed()  # wakes `run`, which ends the connection
                         return
                     # A send that need not wait gives nobody else a turn: without this one all
-                    # that is queued would go to a line that broke, before anyone is told.
+                    # that is queued would go to a line that broke, before anyone is reported.
                     await asyncio.sleep(0)
 
     def _waiting(self) -> bytes:

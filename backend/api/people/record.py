@@ -1,4 +1,4 @@
-"""What people do to one another is told twice: in the log of the session, and in the audit."""
+"""What people do to one another is reported twice: in the log of the session, and in the audit."""
 
 from __future__ import annotations
 

@@ -31,13 +31,13 @@ from backend.api.scope.recording_models import (
 )
 from backend.audit.asked import note_before
 from backend.people.identity import acting_person
-from backend.recording.capture import AFTER_S, BEFORE_S, FaultCapture
 from backend.recording.library import Retention, Stored
 from backend.recording.reader import RecordingReader
-from backend.recording.recorder import Recorder, Settings, Trigger
-from backend.recording.service import Recordings
-from backend.recording.streams import describe_streams
 from backend.recording.writer import RESERVE_BYTES
+from backend.station.recording.capture import AFTER_S, BEFORE_S, FaultCapture
+from backend.station.recording.recorder import Recorder, Settings, Trigger
+from backend.station.recording.service import Recordings
+from backend.station.recording.streams import describe_streams
 from drivers.errors import NotAllowed
 
 router = APIRouter()

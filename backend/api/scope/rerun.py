@@ -11,7 +11,7 @@ from fastapi.responses import FileResponse
 
 from backend.api.errors import NotFound
 from backend.recording.rerun_assets import FILES, ViewerAssets
-from backend.recording.rerun_feed import RerunFeed
+from backend.station.recording.rerun_feed import RerunFeed
 from drivers.errors import NotAllowed
 
 _FOLDER = Path(__file__).resolve().parents[2] / "recording" / "viewer"

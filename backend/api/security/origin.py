@@ -17,7 +17,7 @@ def header(headers: Iterable[tuple[bytes, bytes]], name: bytes) -> str | None:
     """The value of a header, or None.
 
     Raises:
-        Forbidden: it is there twice; who reads which could not be told.
+        Forbidden: it is there twice; who reads which could not be known.
     """
     found = [value for key, value in headers if key == name]
     if len(found) > 1:

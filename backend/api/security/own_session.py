@@ -1,4 +1,4 @@
-"""Who asks by which log-in: the session that the page is told, its cookie, its account."""
+"""Who asks by which log-in: the session that the page is informed, its cookie, its account."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from backend.people.station import People
 
 
 def session_of(people: People, identity: Identity | None, cookie: str | None) -> Session:
-    """What a page is told of who asks; ``identity`` is None where nobody is logged in."""
+    """What a page is informed of who asks; ``identity`` is None where nobody is logged in."""
     by_cookie = identity is not None and identity.kind in ("session", "guest") and cookie
     return Session(
         person=None if identity is None else identity.person,

@@ -210,7 +210,7 @@ class PatientProtocol(H11Protocol):
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
         """A websocket has limits of its own."""
         self._disarm()
-        # Its end is not told here any more; messages and silence are bounded elsewhere.
+        # Its end is not reported here any more; messages and silence are bounded elsewhere.
         self._uncount()
         super().handle_websocket_upgrade(event)
 

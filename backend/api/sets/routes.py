@@ -190,7 +190,7 @@ _OTHER_FAMILY = "of another drive family: nothing of it can be written here"
 
 
 def _identity(content: ParameterSet, drive: Drive) -> tuple[bool, bool | None, list[str]]:
-    """Same family; same drive, None where that cannot be told; and what to warn of."""
+    """Same family; same drive, None where that cannot be known; and what to warn of."""
     same_profile = content.profile == drive.profile.drive
     differing = differences(content, drive)
     serial = drive.found.serial if drive.found else None

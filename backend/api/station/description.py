@@ -78,8 +78,8 @@ def _require_new(name: str) -> None:
 @router.post("/descriptions/devices", openapi_extra=_BODY)
 async def described_devices(request: Request, file: FileName) -> list[DescribedDevice]:
     """The devices of an ESI file, to choose from; empty for an EDS or DCF file, which has one."""
-    told = await import_in_process(DevicesTask(await _upload(request, file), file))
-    return [DescribedDevice.model_validate(device) for device in told["devices"]]
+    reported = await import_in_process(DevicesTask(await _upload(request, file), file))
+    return [DescribedDevice.model_validate(device) for device in reported["devices"]]
 
 
 @router.post("/descriptions", status_code=202, openapi_extra=_BODY)

@@ -46,7 +46,7 @@ _FIRMWARE_WARNING = (
 )
 _ALIAS_WARNING = (
     "The alias is written to the drive's EEPROM and is valid after its supply was switched off"
-    " and on. Machines whose controller addresses drives by alias must be told"
+    " and on. Machines whose controller addresses drives by alias must be reported"
 )
 _FIRMWARE_BODY = {
     "requestBody": {
@@ -189,9 +189,9 @@ async def _require_loadable(connected: ConnectedDrive, link: EthercatLink, stati
     seen = next((s for s in (await link.survey()).stations if s.station == station), None)
     if seen is not None and seen.al & 0x0F in (AlState.INIT, AlState.BOOT):
         known = drive.found
-        told = (seen.vendor_id, seen.product_code)
-        expected = (known.vendor_id, known.product_code) if known else told
-        if told != expected and None not in expected:
+        reported = (seen.vendor_id, seen.product_code)
+        expected = (known.vendor_id, known.product_code) if known else reported
+        if reported != expected and None not in expected:
             raise NotAllowed(
                 "api-station.another-drive-answers-station", drive=drive.name, station=station
             )

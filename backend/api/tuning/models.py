@@ -195,7 +195,7 @@ class MeasurementContent(Message):
         description="whether the result is the one that was concluded at the time; null: unknown"
     )
     differences: list[str] = Field(description="fields that differ, at most five")
-    program: str = Field(description="version of servodeck that measured; empty: not told")
+    program: str = Field(description="version of servodeck that measured; empty: not reported")
     profile_version: str = Field(description="digest of the profile it was measured with")
 
 

@@ -87,7 +87,7 @@ class Again:
         """Whether a second verification counts."""
         return self.outcome in ("same", "other")
 
-    def told(self, verified: Verified) -> Text:
+    def reported(self, verified: Verified) -> Text:
         """Everything; ``verified`` is the last verification that counts."""
         parts = [*contradictions(self.predicted, self.measured), self._outcome()]
         have, want = verified.measured_bandwidth_hz, verified.predicted_bandwidth_hz
@@ -137,17 +137,17 @@ async def first_that_holds(
     Raises:
         DriveError: the drive has a fault, or the link is lost; nothing stays written.
     """
-    told: Again | None = None
+    reported: Again | None = None
     while order:
         applied = await trials.first(order, how.plant)
         if applied is None:
             break
-        held, told = await again(trials, applied, how)
+        held, reported = await again(trials, applied, how)
         if held is not None:
-            return held, told
+            return held, reported
         gain = (1.0 - _SAME) * applied.candidate.gains.speed_nms
         order = [row for row in order if row.gains.speed_nms < gain]
-    return None, told
+    return None, reported
 
 
 async def again(
@@ -165,34 +165,34 @@ async def again(
         return first, None  # What the axis had: nothing was designed.
     candidate = first.candidate
     async with nothing_stays(trials.axis, first.before):
-        told = Again(
+        reported = Again(
             expected(trials, first, how.plant), _measured(first.verified), "unclear",
             first.verified.sweep.motion_s,
         )  # fmt: skip
-        if not contradictions(told.predicted, told.measured):
+        if not contradictions(reported.predicted, reported.measured):
             return first, None
         # Where the second one fails, a more careful design must still be possible.
         if trials.time_left.verifications() < LOOKS:
-            return first, replace(told, outcome="time")
+            return first, replace(reported, outcome="time")
         trials.progress(0.6, text("autotune.designing-axis-loop-shows", step=4, steps=6))
         lines = loop_lines(first.verified.seen)
         controller = _controller(trials, candidate, lines.frequency_hz)
         try:
             plant = seen_in_loop(how.plant, lines, controller)
         except ValueError:
-            return first, told
+            return first, reported
         second = await asyncio.to_thread(_designed, trials, candidate, how, plant)
     if second is None or (trials.had.slower(second) and not trials.had.slower(candidate)):
-        return first, replace(told, outcome="none")
-    told = replace(told, gain_ratio=second.gains.speed_nms / candidate.gains.speed_nms)
+        return first, replace(reported, outcome="none")
+    reported = replace(reported, gain_ratio=second.gains.speed_nms / candidate.gains.speed_nms)
     same = _alike(candidate, second)
     applied = await _in_place_of(trials, first, second, plant, fall_back=not same)
     if applied is None or applied.candidate is candidate:
-        return applied, replace(told, outcome="not kept")
+        return applied, replace(reported, outcome="not kept")
     f = lines.frequency_hz
     closed = _closed(trials, second, plant, f)
     return applied, replace(
-        told, outcome="same" if same else "other", plant=plant,
+        reported, outcome="same" if same else "other", plant=plant,
         frequency_hz=f, closed_db=magnitude_db(closed), closed_deg=phase_deg(closed),
     )  # fmt: skip
 

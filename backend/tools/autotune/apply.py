@@ -53,7 +53,7 @@ async def first_kept(
         DriveError: the drive has a fault or was disabled by others, or the link is lost; nothing
             stays written.
     """
-    told = stages(progress)
+    reported = stages(progress)
     clock = time_left or TimeLeft()
     waiting, softened = list(candidates), 0
     while waiting:
@@ -74,7 +74,7 @@ async def first_kept(
             try:
                 with clock.verifying():
                     verified = await verify(
-                        axis, session, check, candidate, promised, told, keep, clock
+                        axis, session, check, candidate, promised, reported, keep, clock
                     )
             except DriveError as error:
                 await take_back(axis, before)
@@ -133,10 +133,10 @@ async def nothing_stays(axis: Axis, before: dict[str, int]) -> AsyncIterator[Non
 def part(progress: Progress, low: float, high: float, step: Text) -> Progress:
     """A step's own progress, shown as a part of the whole."""
 
-    def told() -> None:
+    def reported() -> None:
         inner = own.step
         whole = joined((step, own.step_text), ": ") if inner else step
         progress(low + (high - low) * own.fraction, whole)
 
-    own = Progress(told)
+    own = Progress(reported)
     return own

@@ -57,7 +57,7 @@ class Present:
             return False
         return self.speed_nms is not None and design.gains.speed_nms < _SLOWER * self.speed_nms
 
-    def told(self, design: Candidate, tried: bool) -> Text | None:
+    def reported(self, design: Candidate, tried: bool) -> Text | None:
         """That a design is slower than what the axis had, and why it is taken all the same."""
         if not self.slower(design) or not self.speed_nms:
             return None
@@ -82,16 +82,16 @@ async def present(
     now = await gain_tool.read_gains(axis, facts)
     if not now.speed_nms:
         return Present(None)
-    told = Present(now.speed_nms)
+    reported = Present(now.speed_nms)
     notches = []
     if drive.profile.notch is not None:
         for slot in await notch_tool.read_notches(drive, meaning_of(drive)):
             if slot.enabled and slot.notch is None:
-                return told
+                return reported
             if slot.enabled and slot.notch is not None:
                 notches.append(slot.notch)
     if notches and meaning_of(drive) is None and unknown(drive):
-        return told
+        return reported
     gains = Gains(
         now.speed_nms, now.integral_hz or 0.0, now.position_1_s or 0.0,
         now.speed_nms / (_TURN * inertia_kgm2),
@@ -102,7 +102,7 @@ async def present(
             LoopFilters(facts.speed_filter_hz, facts.torque_filter_hz), goals,
         )  # fmt: skip
     except (NotAllowed, ValueError):
-        return told
+        return reported
     return Present(now.speed_nms, candidate, sound)
 
 
@@ -224,4 +224,4 @@ class Trials:
         """What the result says of the axis as it was; None where it became faster."""
         if applied.candidate is self.had.candidate:
             return KEPT
-        return self.had.told(applied.candidate, self.had_failed)
+        return self.had.reported(applied.candidate, self.had_failed)

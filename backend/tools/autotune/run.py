@@ -228,7 +228,7 @@ async def _pre_checks(axis: Axis, settings: AutotuneSettings) -> AxisFacts:
             drive=drive.name,
             pending_count=len(drive.pending),
         )
-    # Gains without a meaning and a motor whose inertia is not known are told before it moves.
+    # Gains without a meaning and a motor whose inertia is not known are reported before it moves.
     if settings.apply or gain_tool.spec_of(drive).convention == "unit":
         rotor = await gain_tool.rotor_inertia(axis, settings.motor_inertia_kgm2)
         gain_tool.plan_gains(drive, Gains(1.0, 1.0, 1.0, 1.0), rotor or 1e-4, rotor)
@@ -356,12 +356,12 @@ async def apply_and_verify(
         raise NotAllowed(
             "autotune.no-candidate-kept-promise",
             drive=axis.drive.name,
-            detail=joined([each for each in (*trials.tried, clock.told()) if each is not None]),
+            detail=joined([each for each in (*trials.tried, clock.reported()) if each is not None]),
         )
     verified = applied.verified
-    twice = again.told(verified) if again else None
+    twice = again.reported(verified) if again else None
     said = (
-        None if verified.sweep.margins else _BY_STEP, trials.note(applied), clock.told(), twice,
+        None if verified.sweep.margins else _BY_STEP, trials.note(applied), clock.reported(), twice,
         None if again and not again.verified_anew else otherwise(verified),
         unseen(applied.candidate.nominal.crossover_hz, verified),
     )  # fmt: skip

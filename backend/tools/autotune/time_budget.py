@@ -120,7 +120,7 @@ class TimeLeft:
             took_s = max(took_s, _AROUND_S)
             self.longest_s = max(self.longest_s, took_s)
 
-    def told(self) -> Text | None:
+    def reported(self) -> Text | None:
         """That designs were left out for their time; else None."""
         if not self.left_out:
             return None

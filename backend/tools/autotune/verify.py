@@ -117,10 +117,10 @@ class Check:
 
 async def verify(
     axis: Axis, session: CyclicSession, check: Check, candidate: Candidate, promised: Goals,
-    told: tuple[Progress, Progress, Progress], keep: Keep | None,
+    reported: tuple[Progress, Progress, Progress], keep: Keep | None,
     time_left: TimeLeft | None = None,
 ) -> Verified:  # fmt: skip
-    """Stand still, measure the closed speed loop, make a step; ``told`` is one progress for each.
+    """Stand still, measure the closed speed loop, make a step; ``reported``: a progress each.
 
     The loop is measured once more, with as many pairs of realisations as ``time_left`` allows,
     where the first pair tells too little, or another bandwidth than was predicted.
@@ -128,7 +128,7 @@ async def verify(
     Raises:
         NotAllowed: it does not stand still, or the envelope or a fault ended it.
     """
-    standing, measuring, stepping = told
+    standing, measuring, stepping = reported
     standing(0.0, prose(""))
     await holding_torque(axis, session, check.facts)
     if check.home_raw is not None:
@@ -285,7 +285,7 @@ def _joined(
     """A loop measured again with more realisations, and what to read from both.
 
     The bandwidth is that of the mean over all of them. What they differ by blurs lines, so margins
-    stay with the first where it told any, which reached further up.
+    stay with the first where it showed any, which reached further up.
     """
     again = sharp_margins(more)
     moved_s = first.motion_s + more.motion_s

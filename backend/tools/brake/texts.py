@@ -33,7 +33,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "warning": (
         "WARNING. The shaft may turn suddenly. Keep away from everything that it drives. On a "
-        "drive that is told of no brake (its output has another function) nothing but this brake "
+        "drive that knows of no brake (its output has another function) nothing but this brake "
         "holds the axis.",
         "警告。轴可能突然转动，请远离其驱动的所有部件。驱动器在测试期间不控制抱闸（其输出已改为"
         "其他功能），轴仅由该抱闸保持。",

@@ -266,7 +266,7 @@ def _level(
 def _acceleration(angle: FloatArray, whole: int, rate: float) -> float:
     """Mean in rad/s², from the times of the first and the last revolution; 0 with fewer than two.
 
-    Within one revolution the ripple of the speed cannot be told from an acceleration.
+    Within one revolution the ripple of the speed cannot be distinguished from an acceleration.
     """
     if whole < 2:
         return 0.0

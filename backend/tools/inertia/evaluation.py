@@ -148,8 +148,8 @@ def reevaluate(arrays: Arrays, meta: Meta) -> InertiaAnswer:
     Raises:
         ValueError: not the raw data of an inertia measurement.
     """
-    given, told = meta.get("settings"), meta.get("facts")
-    if not isinstance(given, dict) or not isinstance(told, dict) or "torque_nm" not in arrays:
+    given, reported = meta.get("settings"), meta.get("facts")
+    if not isinstance(given, dict) or not isinstance(reported, dict) or "torque_nm" not in arrays:
         raise ValueError("not the raw data of an inertia measurement")
     ends = given.get("ends_rev")
     settings = InertiaSettings(
@@ -162,7 +162,7 @@ def reevaluate(arrays: Arrays, meta: Meta) -> InertiaAnswer:
     valid = np.asarray(arrays["valid"], np.bool_)
     columns = {k: np.asarray(v, np.float64) for k, v in arrays.items() if k != "valid"}
     rate = float(str(meta["sample_rate_hz"]))
-    facts = AxisFacts(**told)
+    facts = AxisFacts(**reported)
     recording = Recording(rate, **columns, valid=valid)
     return answer_of(
         InertiaOutcome(

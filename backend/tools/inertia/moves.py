@@ -233,7 +233,7 @@ async def identification_moves(
     look: FirstLook,
     travel_rev: float,
     shape: Shape,
-    told: Callable[[float], None],
+    reported: Callable[[float], None],
 ) -> Recording:
     """The identification moves; weaker ones where the loop answers with too much torque.
 
@@ -253,7 +253,7 @@ async def identification_moves(
         moves = planned(share * _WEAKER**attempt)
         try:
             return await speed_move(
-                axis, session, moves.speed_rad_s * 60.0 / _TURN, room, facts, told,
+                axis, session, moves.speed_rad_s * 60.0 / _TURN, room, facts, reported,
                 torque_nm=moves.torque_nm if ahead else None,
             )  # fmt: skip
         except NotAllowed as error:

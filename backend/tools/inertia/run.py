@@ -88,9 +88,9 @@ async def inertia(
 
     if begin != home:
         await back_to(begin)
-    told = share(progress, 0.35, 0.65, text("inertia.moving-forth-and-back"))
+    reported = share(progress, 0.35, 0.65, text("inertia.moving-forth-and-back"))
     recording = await identification_moves(
-        axis, session, settings, facts, look, travel, Shape(), told
+        axis, session, settings, facts, look, travel, Shape(), reported
     )
     progress(0.65, text("inertia.going-back-evaluating"))
 
@@ -104,13 +104,13 @@ async def inertia(
         # A load that swings in another way than couplings let it is moved again so that it does
         # not.
         gentle = Shape.against(swing_hz)
-        told = share(progress, 0.66, 0.9, text("inertia.once-more-gently", swing_hz=swing_hz))
+        reported = share(progress, 0.66, 0.9, text("inertia.once-more-gently", swing_hz=swing_hz))
         rough = look.rough
         heavier = max(result.inertia_kgm2.value, rough.inertia_kgm2)
         better = replace(look, rough=RoughFit(heavier, rough.coulomb_nm, rough.gravity_nm))
         await back_to(begin)
         again = await identification_moves(
-            axis, session, settings, facts, better, travel, gentle, told
+            axis, session, settings, facts, better, travel, gentle, reported
         )
         # Too short a travel leaves too little of a gentle move: the first answer stays.
         with contextlib.suppress(NotAllowed):

@@ -32,7 +32,7 @@ from backend.work.jobs import Progress
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed
-from drivers.motion.feedback import FeedbackScale
+from drivers.feedback import FeedbackScale
 from drivers.texts.message import Text
 
 _RENEW_S = 0.03
@@ -98,7 +98,7 @@ class _Catch:
         self.blocks += self._of_motion(block)
 
     def begin(self, first: int) -> None:
-        """The bus has told the number; what came meanwhile is looked through."""
+        """The bus has shown the number; what came meanwhile is looked through."""
         self.first = first
         self.blocks = [part for block in self.blocks for part in self._of_motion(block)]
 

@@ -7,8 +7,8 @@ from contextlib import asynccontextmanager
 
 from backend.axis.axis import Axis
 from backend.axis.restoring import CLEANUP_TIMEOUT_S, PUT_BACK_LATER, RestoreFailed, shielded
+from backend.axis.stop.quick_stop import quick_stop_keys, raise_quick_stop_from
 from backend.drive.optional import existing
-from backend.stopping.quick_stop import quick_stop_keys, raise_quick_stop_from
 from backend.tools.moves.procedures import run_procedure
 from backend.work.jobs import Progress
 from drivers.cia402 import State
@@ -107,8 +107,8 @@ async def put_back_in_time(axis: Axis, before: Mapping[str, Raw]) -> None:
     try:
         await shielded(lambda: put_back(axis, before), CLEANUP_TIMEOUT_S, drive.name)
     except LinkTimeout as error:
-        owed = {entry.key: entry.raw for entry in drive.pending_restores.entries}
-        left = ", ".join(f"{key} (was {owed[key]})" for key in before if key in owed)
+        pending = {entry.key: entry.raw for entry in drive.pending_restores.entries}
+        left = ", ".join(f"{key} (was {pending[key]})" for key in before if key in pending)
         raise RestoreFailed(
             "measuring.not-restored-2",
             drive=drive.name,

@@ -21,7 +21,7 @@ _ATTEMPTS = 3
 #: So much more is asked for at most, in turns and as a share of the travel.
 _MISSED_REV, _MISSED = 0.3, 0.2
 #: What share of a way a loop goes, and moves that are different enough to tell.
-_SHARES, _TOLD_APART_REV = (0.4, 1.5), 0.02
+_SHARES, _DISTINGUISHED_REV = (0.4, 1.5), 0.02
 #: So many times slower a move becomes at most that takes too much torque: a sixteenth of it goes
 #: into acceleration then.
 _SLOWEST = 4.0
@@ -97,7 +97,7 @@ def _to_ask(rest: float, moves: list[tuple[float, float]]) -> float:
         return rest
     asked, gone = moves[-1]
     share = 1.0
-    if len(moves) > 1 and abs(asked - moves[-2][0]) > _TOLD_APART_REV:
+    if len(moves) > 1 and abs(asked - moves[-2][0]) > _DISTINGUISHED_REV:
         share = (gone - moves[-2][1]) / (asked - moves[-2][0])
         share = float(np.clip(share, *_SHARES))
     return (rest + share * asked - gone) / share

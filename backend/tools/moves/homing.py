@@ -92,7 +92,7 @@ async def _attained(axis: Axis, settings: HomingSettings, progress: Progress) ->
     last, travelled = await axis.position_raw(), 0
     busy_seen = False
     guard = PolledGuard(axis, units, settings.envelope.speed_rpm * 1.3 + 30.0)
-    told = [drive.require("position_actual"), drive.require("velocity_actual")]
+    reported = [drive.require("position_actual"), drive.require("velocity_actual")]
     while True:
         status = await axis.status_word()
         if drive.decode_state(status) is not State.OPERATION_ENABLED:
@@ -109,8 +109,8 @@ async def _attained(axis: Axis, settings: HomingSettings, progress: Progress) ->
         if attained and (busy_seen or elapsed > 0.3):
             return
         asked_s = time.monotonic()
-        readings = await drive.read_many(told)
-        position, velocity = (_integer(drive.name, readings[key]) for key in told)
+        readings = await drive.read_many(reported)
+        position, velocity = (_integer(drive.name, readings[key]) for key in reported)
         step, last = abs(position - last), position
         # Taking over the new origin makes the position jump; that is no travel, and no speed.
         if step <= units.position_raw(settings.envelope.speed_rpm / 60.0 * 0.5) + 2:

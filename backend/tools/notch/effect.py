@@ -110,7 +110,7 @@ async def measure_meaning(
 class Player(Protocol):
     """One way of playing the same signal again and again, and of comparing what came."""
 
-    async def plain(self, told: Callable[[float], None]) -> float:
+    async def plain(self, reported: Callable[[float], None]) -> float:
         """Play without a notch, first of all; the lowest centre in Hz to try notches at.
 
         Raises:
@@ -118,7 +118,7 @@ class Player(Protocol):
         """
         ...
 
-    async def notched(self, told: Callable[[float], None]) -> NotchEffect:
+    async def notched(self, reported: Callable[[float], None]) -> NotchEffect:
         """Play with the notch that the drive has now.
 
         Raises:
@@ -164,7 +164,7 @@ async def tried_with(
             if enough and not clock.allow(longest_s):
                 break
             begun_s, low = time.monotonic(), number * part
-            told = share(
+            reported = share(
                 progress, low, low + part, text("notch.trying-notch", number=number, count=count)
             )
             away_rev = units.position(await axis.position_raw() - home)
@@ -172,7 +172,7 @@ async def tried_with(
                 await go_back(axis, session, home, envelope, facts)
             async with temporary(axis, off | raw_of(slot, centre, trial)):
                 try:
-                    effects.append((trial, await player.notched(told)))
+                    effects.append((trial, await player.notched(reported)))
                 except ValueError:
                     effects.append((trial, None))
                 except SamplesLost:
@@ -256,16 +256,16 @@ class _Free:
     _sign: int = 1
     _lessened: int = 0
 
-    async def plain(self, told: Callable[[float], None]) -> float:
-        self._plain = await self._by_sent(told)
+    async def plain(self, reported: Callable[[float], None]) -> float:
+        self._plain = await self._by_sent(reported)
         return 0.0
 
-    async def notched(self, told: Callable[[float], None]) -> NotchEffect:
+    async def notched(self, reported: Callable[[float], None]) -> NotchEffect:
         assert self._plain is not None
-        seen = await self._by_sent(told)
+        seen = await self._by_sent(reported)
         return fit_effect(self.sequence.excitation.line_hz, seen / self._plain, self.path)
 
-    async def _by_sent(self, told: Callable[[float], None]) -> ComplexArray:
+    async def _by_sent(self, reported: Callable[[float], None]) -> ComplexArray:
         """Reported torque over the one sent, at the lines; smaller where the axis is too fast.
 
         How fast it becomes depends on how its load swings. What a notch does is the same at any
@@ -273,7 +273,7 @@ class _Free:
         """
         while True:
             try:
-                torque = await self._torque(told)
+                torque = await self._torque(reported)
                 break
             except NotAllowed as error:
                 too_fast = exceeded(error) is HaltCause.SPEED
@@ -289,7 +289,7 @@ class _Free:
         e = self.sequence.excitation
         return np.asarray(torque / np.fft.rfft(e.one_period)[e.lines])
 
-    async def _torque(self, told: Callable[[float], None]) -> ComplexArray:
+    async def _torque(self, reported: Callable[[float], None]) -> ComplexArray:
         """Spectrum of the reported torque at the lines, over the whole periods.
 
         Raises:
@@ -308,7 +308,8 @@ class _Free:
             async with enabled(axis, self.session, Mode.CST):
                 recording = await play(
                     axis, self.session, Play(Mode.CST, raw),
-                    await bus_limits(axis, self.envelope, self.home), facts.rated_torque_nm, told,
+                    await bus_limits(axis, self.envelope, self.home), facts.rated_torque_nm,
+                    reported,
                 )  # fmt: skip
             torque, _ = periods_of(self.sequence, recording)
             if len(torque):

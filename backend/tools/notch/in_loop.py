@@ -78,8 +78,8 @@ async def measure_meaning_in_loop(
     setup = await setup_of(axis, session, settings, facts, "speed", None)
     if not setup.by_speed:
         # Where torque could be added, too: whether it passes the notch no manual says.
-        told = await gains.read_gains(axis, facts)
-        setup = replace(setup, by_speed=True, integral_hz=told.integral_hz)
+        reported = await gains.read_gains(axis, facts)
+        setup = replace(setup, by_speed=True, integral_hz=reported.integral_hz)
     plant = measured_plant(mechanics.frf, mechanics.model)
     repeats = repeats or Repeats()
     player = _Beside(axis, session, settings, setup, plant, await axis.position_raw(), repeats)
@@ -105,13 +105,13 @@ class _Beside:
     _loop: LoopModel | None = None
     _path: SignalPath | None = None
 
-    async def plain(self, told: Callable[[float], None]) -> float:
+    async def plain(self, reported: Callable[[float], None]) -> float:
         settings, setup = self.settings, self.setup
         sequences = await asyncio.to_thread(sequences_of, setup, settings)
         (self._sequence,) = await scaled_by_speed(
-            self.axis, self.session, settings, setup, sequences[:1], self.home, _progress(told)
+            self.axis, self.session, settings, setup, sequences[:1], self.home, _progress(reported)
         )
-        sent, recording, self._lines = await self._played(self._sequence, told)
+        sent, recording, self._lines = await self._played(self._sequence, reported)
         facts, rate = setup.facts, setup.rate
         hold = settings.hold or ("linear" if facts.interpolates else "zero")
         path = SignalPath(rate, hold=hold, current_bandwidth_hz=facts.current_bandwidth_hz)
@@ -131,18 +131,18 @@ class _Beside:
             raise NotAllowed("notch.speed-loop-stiff-notch", drive=name)
         return lowest
 
-    async def notched(self, told: Callable[[float], None]) -> NotchEffect:
+    async def notched(self, reported: Callable[[float], None]) -> NotchEffect:
         assert self._sequence is not None
         assert self._lines is not None
         assert self._loop is not None
         assert self._path is not None
-        sent, _recording, lines = await self._played(self._sequence, told)
+        sent, _recording, lines = await self._played(self._sequence, reported)
         return fit_effect_in_loop(
             sent.excitation.line_hz, self._lines, lines, self._loop, self._path
         )
 
     async def _played(
-        self, sequence: excite.Sequence, told: Callable[[float], None]
+        self, sequence: excite.Sequence, reported: Callable[[float], None]
     ) -> tuple[excite.Sequence, Recording, LoopLines]:
         """Weaker where the loop answers with too much torque; lines per rad/s sent.
 
@@ -158,7 +158,7 @@ class _Beside:
             tries += 1
             ((sent, recording),) = await play_fitting(
                 self.axis, self.session, self.settings, self.setup, (sequence,), self.home,
-                _progress(told),
+                _progress(reported),
             )  # fmt: skip
             e = sent.excitation
             period = e.samples[e.first_sample :][: e.period_samples]
@@ -192,6 +192,6 @@ def safe_centre_hz(
     return None
 
 
-def _progress(told: Callable[[float], None]) -> Progress:
-    own = Progress(lambda: told(own.fraction))
+def _progress(reported: Callable[[float], None]) -> Progress:
+    own = Progress(lambda: reported(own.fraction))
     return own

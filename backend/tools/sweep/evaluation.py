@@ -68,7 +68,7 @@ class SweepSettings:
     axis that turns freely and the speed loop otherwise; a stepped sine always takes a loop, for
     it lasts too long for an axis that drifts. ``share`` is the excitation's share of the
     envelope's torque. ``rated_torque_nm`` overrides what the drive says. ``inertia_kgm2`` is the
-    whole axis'; where moves have told it with a relative ``inertia_deviation`` the model is held
+    whole axis'; where moves have shown it with a relative ``inertia_deviation`` the model is held
     to it.
     """
 
@@ -162,7 +162,7 @@ def evaluate(
         found = identify_with_path(taken, path, quantity, hold_known=known, inertia=inertia)
     path = found.fit.path
     limit = settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm
-    saturated = _saturated(taken, path, quantity, limit, told=not found.torque_dropped)
+    saturated = _saturated(taken, path, quantity, limit, as_reported=not found.torque_dropped)
     warnings = _warnings(found, saturated, facts)
     if facts.current_bandwidth_hz is None and commanded(path):
         lines = found.direct.frequency_hz
@@ -227,8 +227,8 @@ def evaluate(
 
 def _slow(corner_hz: float, facts: AxisFacts) -> bool:
     """Whether the torque follows more slowly than the drive tells, or than current loops do."""
-    told = facts.current_bandwidth_hz
-    return corner_hz < (_SLOW_HZ if told is None else _SLOWER * told)
+    as_reported = facts.current_bandwidth_hz
+    return corner_hz < (_SLOW_HZ if as_reported is None else _SLOWER * as_reported)
 
 
 def _taken(records: Records) -> tuple[Record, ...]:
@@ -246,16 +246,21 @@ def _by_reference(
 
     The loop's gains need the mechanics, as a light axis' own speed is sampled, too.
     """
-    told = speed_gain(records, path, integral_hz, hold_known=hold_known)
+    as_reported = speed_gain(records, path, integral_hz, hold_known=hold_known)
     for _ in range(_ROUNDS):
-        taken = _taken(told.played)
+        taken = _taken(as_reported.played)
         found = identify_with_path(
-            taken, path, "torque_injection", hold_known=hold_known, inertia=inertia, loop=told.loop
+            taken,
+            path,
+            "torque_injection",
+            hold_known=hold_known,
+            inertia=inertia,
+            loop=as_reported.loop,
         )
         again = speed_gain(records, path, integral_hz, hold_known=hold_known, motion=found.fit)
-        if told.loop.alike(again.loop):
+        if as_reported.loop.alike(again.loop):
             break
-        told = again
+        as_reported = again
     return found, taken
 
 
@@ -277,11 +282,11 @@ def completed(facts: AxisFacts, result: SweepResult) -> AxisFacts:
 
 def _saturated(
     records: tuple[Record, ...], path: SignalPath, quantity: Quantity, limit_nm: float, *,
-    told: bool,
+    as_reported: bool,
 ) -> float:  # fmt: skip
     """Share of samples whose torque is at the envelope's limit, or not what was commanded.
 
-    ``told``: the reported torque is the one that acts, so that a missing one is none of a filter.
+    ``reported``: the reported torque acts itself, so that a missing one is none of a filter.
     Of another torque only a level counts at which it stays while more is commanded: a filter or a
     copy of the demand has no such level.
     """
@@ -294,7 +299,9 @@ def _saturated(
         if quantity == "torque_mode":
             asked = np.abs(sampled_command(r.excitation.samples, path))
             missing = asked - torque > 0.1 * float(np.max(asked))
-            at_limit |= missing if told else missing & (torque >= 0.97 * float(np.max(torque)))
+            at_limit |= (
+                missing if as_reported else missing & (torque >= 0.97 * float(np.max(torque)))
+            )
         shares.append(float(np.mean(at_limit)))
     return max(shares, default=0.0)
 
@@ -413,8 +420,12 @@ def reevaluate(arrays: dict[str, npt.NDArray[np.generic]], meta: dict[str, objec
 
 def _reevaluate(arrays: dict[str, npt.NDArray[np.generic]], meta: dict[str, object]) -> SweepResult:
     rate = float(str(meta["sample_rate_hz"]))
-    given, told, structure = meta["settings"], meta["facts"], meta["excitation"]
-    if not isinstance(given, dict) or not isinstance(told, dict) or not isinstance(structure, list):
+    given, as_reported, structure = meta["settings"], meta["facts"], meta["excitation"]
+    if (
+        not isinstance(given, dict)
+        or not isinstance(as_reported, dict)
+        or not isinstance(structure, list)
+    ):
         raise TypeError("settings, facts or excitation")
     settings = SweepSettings(**{**given, "envelope": Envelope(**given["envelope"])})
     records = []
@@ -440,7 +451,7 @@ def _reevaluate(arrays: dict[str, npt.NDArray[np.generic]], meta: dict[str, obje
     )
     integral = meta.get("integral_hz")
     return evaluate(
-        tuple(records), rate, AxisFacts(**told), settings, closed, bool(meta["dc"]),
+        tuple(records), rate, AxisFacts(**as_reported), settings, closed, bool(meta["dc"]),
         bool(meta.get("by_speed", False)), None if integral is None else float(str(integral)),
     )  # fmt: skip
 

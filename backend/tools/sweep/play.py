@@ -97,12 +97,12 @@ async def _play_all(
     before, count = place or (0, len(sequences))
     played = before
 
-    async def one(sequence: excite.Sequence, told: Callable[[float], None]) -> Recorded:
+    async def one(sequence: excite.Sequence, reported: Callable[[float], None]) -> Recorded:
         nonlocal played
         if played:
             await _near_home(axis, session, settings, setup, home_raw)
         played += 1
-        return await _play_one(axis, session, settings, setup, sequence, home_raw, told)
+        return await _play_one(axis, session, settings, setup, sequence, home_raw, reported)
 
     for number, sequence in enumerate(sequences, before):
         low, high = (0.1 + 0.85 * part / count for part in (number, number + 1))
@@ -133,7 +133,7 @@ async def _near_home(
 
 async def _play_one(
     axis: Axis, session: CyclicSession, settings: SweepSettings, setup: Setup,
-    sequence: excite.Sequence, home_raw: int, told: Callable[[float], None],
+    sequence: excite.Sequence, home_raw: int, reported: Callable[[float], None],
 ) -> Recorded:  # fmt: skip
     """One realisation: enable, play, disable."""
     limits = await bus_limits(axis, settings.envelope, home_raw)
@@ -141,7 +141,7 @@ async def _play_one(
         if setup.loop != "none":
             await quiet(axis)
         sent = await _to_raw(axis, sequence, setup, settings, start)
-        recording = await play(axis, session, sent, limits, setup.facts.rated_torque_nm, told)
+        recording = await play(axis, session, sent, limits, setup.facts.rated_torque_nm, reported)
     return await _as_sent(axis, sequence, settings, setup, sent, start), recording
 
 
@@ -167,7 +167,7 @@ def _kept(sequence: excite.Sequence, recording: Recording) -> tuple[int, int]:
 def _whole(sequence: excite.Sequence, recording: Recording) -> bool:
     """Whether nothing was lost that matters: of the settling neither, which a late loop disturbs.
 
-    Play and free swings are told by what differs between two whole periods, friction at reversals
+    Play and free swings are shown by what differs between two whole periods, friction at reversals
     by a recording without any gap.
     """
     e = sequence.excitation

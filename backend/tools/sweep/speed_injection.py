@@ -108,8 +108,8 @@ def telling_weight(
         ValueError: every period has a gap.
     """
     taken = tuple(_record(s, r) for s, r in records)
-    told = estimate_periodic(taken, SignalPath(rate), "closed_loop", position=True)
-    uncertainty = np.nan_to_num(told.std_db, nan=1.0)
+    reported = estimate_periodic(taken, SignalPath(rate), "closed_loop", position=True)
+    uncertainty = np.nan_to_num(reported.std_db, nan=1.0)
     relative = uncertainty / float(np.median(uncertainty))
     return np.asarray(np.clip(relative, *_WEIGHTS) ** _BY_DOUBT)
 

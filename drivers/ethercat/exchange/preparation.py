@@ -153,12 +153,12 @@ class Preparation:
             return initial
         # Perhaps SOEM missed an answer.
         number, plan = next(iter(wrong.items()))
-        told = self._segment.sizes(number)
+        reported = self._segment.sizes(number)
         raise SpoiltMap(
             "ethercat.station-maps-bytes-outputs",
             station=number,
-            told=told[0],
-            other_told=told[1],
+            reported=reported[0],
+            other_reported=reported[1],
             rx_size=plan.rx.size,
             tx_size=plan.tx.size,
         )

@@ -233,11 +233,11 @@ class EthercatCyclic:
 
     def axis_state(self, station: int) -> LoopState:
         """Power state, phase of the setpoints, and why the last motion was ended by force."""
-        told = self._status.get("axes", {}).get(station)
-        if not told:
+        reported = self._status.get("axes", {}).get(station)
+        if not reported:
             return LoopState(State.UNKNOWN.value, Phase.IDLE.value, None)
-        halt = None if told["halted"] is None else Halted.from_wire(told["halted"])
-        return LoopState(told["state"], told["phase"], halt)
+        halt = None if reported["halted"] is None else Halted.from_wire(reported["halted"])
+        return LoopState(reported["state"], reported["phase"], halt)
 
     async def run(self, trajectories: Sequence[Trajectory]) -> int:
         """Play and renew until all values are out; cancelling brakes the axes.

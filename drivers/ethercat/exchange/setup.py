@@ -266,9 +266,9 @@ def arm_watchdog(station: Station, setup: StationSetup) -> Steps[None]:
             "ethercat.watchdog-ms-not-fit", milliseconds_ms=milliseconds, station=station.number
         )
     yield Write(WATCHDOG_TIME, struct.pack("<H", ticks))
-    told = yield from read_again(WATCHDOG_TIME, 2)
+    reported = yield from read_again(WATCHDOG_TIME, 2)
     watched = yield from _watch_outputs()
-    if told != struct.pack("<H", ticks) or watched < bool(setup.rx.size):
+    if reported != struct.pack("<H", ticks) or watched < bool(setup.rx.size):
         raise NotAllowed("ethercat.station-not-take-process", station=station.number)
 
 
@@ -324,10 +324,10 @@ def check_places(station: Station, setup: StationSetup, clock: Callable[[], floa
         placed += bool(active and length and start >= _PROCESS_MEMORY)
     needed = bool(setup.rx.size) + bool(setup.tx.size)
     if placed < needed:
-        told, within_reach = yield from sii.process_data_places(clock)
-        if told >= needed and not within_reach:
+        reported, within_reach = yield from sii.process_data_places(clock)
+        if reported >= needed and not within_reach:
             raise NotAllowed("ethercat.station-eeprom-tells-process", station=station.number)
-        if told >= needed:
+        if reported >= needed:
             raise FoundInPart("ethercat.station-found-part-eeprom", station=station.number)
         raise NotAllowed("ethercat.station-eeprom-not-tell", station=station.number)
 

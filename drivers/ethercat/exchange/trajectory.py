@@ -12,7 +12,7 @@ from drivers.motion.setpoints import longest_step, require_fits, require_within_
 
 
 def message_of(trajectory: Trajectory) -> Message:
-    """What the host process is told of a trajectory.
+    """What the host process is informed of a trajectory.
 
     Raises:
         NotAllowed: no setpoint for cyclic motion.

@@ -133,7 +133,7 @@ class HostProcess:
         finally:
             self._waiting.pop(number, None)
             if future.done() and not future.cancelled():
-                # Told to whoever waited, by this way or by what kept the request from being sent.
+                # Whoever waited has the error: this one, or what kept the request from being sent.
                 future.exception()
 
     async def _spawn(self, timeout_s: float = START_S) -> None:

@@ -36,7 +36,7 @@ _NS_PER_BYTE = 80
 """100 Mbit/s: a frame may not become so long that process data wait for it."""
 _FIND_TRIES = 3
 _ENDED = Halted(HaltCause.COMMANDED, note=text("ethercat.motion-ended"))
-"""A search that lost a frame has not seen everything; one that loses some each time is told."""
+"""A search that lost a frame has not seen everything; one that loses some each time is reported."""
 
 
 class Operations:
@@ -293,12 +293,14 @@ class Operations:
         if self.loop is not None:
             raise Busy("ethercat.segment-busy")
 
-        def ended(told: int | None, error: DriveError | None) -> None:
-            if error is None and told != alias:
-                error = ProtocolError("ethercat.alias-reads-back-written", told=told, alias=alias)
+        def ended(reported: int | None, error: DriveError | None) -> None:
+            if error is None and reported != alias:
+                error = ProtocolError(
+                    "ethercat.alias-reads-back-written", reported=reported, alias=alias
+                )
             if error is None:
                 self.roster.new_aliases.add(station.number)
-            done({"alias": told}, error)
+            done({"alias": reported}, error)
 
         steps = sii.write_alias(alias, time.monotonic)
         self.lanes.submit(station.number, "register", steps, ended)

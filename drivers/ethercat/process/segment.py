@@ -179,7 +179,7 @@ class Segment:
         except BlockingIOError:
             return
         except OSError:
-            # The interface went down: whoever sends next is told.
+            # The interface went down: whoever sends next is informed.
             return
 
     def exchange(self, requests: Sequence[frames.Request]) -> list[bytes | None]:
@@ -189,9 +189,11 @@ class Segment:
         """
         self.discard_late_frames()
         self._number = (self._number + 1) % frames.INDICES
-        told = self._transmit(requests, frames.build(requests, frames.FIRST_INDEX + self._number))
-        self.silent = told is None
-        return [None] * len(requests) if told is None else told
+        reported = self._transmit(
+            requests, frames.build(requests, frames.FIRST_INDEX + self._number)
+        )
+        self.silent = reported is None
+        return [None] * len(requests) if reported is None else reported
 
     def _transmit(
         self, requests: Sequence[frames.Request], sent: bytes
@@ -212,9 +214,9 @@ class Segment:
                 if not select.select((ear,), (), (), left_s)[0]:
                     return None
                 size = ear.recv_into(scrap, 0, MSG_DONTWAIT)
-                told = frames.answers(requests, sent, scrap[:size])
-                if told is not None:
-                    return told
+                reported = frames.answers(requests, sent, scrap[:size])
+                if reported is not None:
+                    return reported
                 self.late_frames += 1
         except OSError:
             # Nothing to read after all, a full queue, or the interface went down.
@@ -252,14 +254,16 @@ class Segment:
         self.forget_errors()
         self.master.manual_state_change = 1
         for number in entry_by_entry:
-            # Another drive's EEPROM may have told SOEM that this one has it.
+            # Another drive's EEPROM may have shown SOEM that this one has it.
             self.slaves[number - 1]._disable_complete_access()  # noqa: SLF001 - its only name
         try:
             self.master.config_map()
         except pysoem.ConfigMapError as error:
             self.forget_errors()
-            told = sorted({_mapping_error(item) for item in error.error_list})
-            raise SpoiltMap("ethercat.process-data-not-mapped", told="; ".join(told)) from error
+            reported = sorted({_mapping_error(item) for item in error.error_list})
+            raise SpoiltMap(
+                "ethercat.process-data-not-mapped", reported="; ".join(reported)
+            ) from error
         self.mapped = True
 
     def set_output(self, station: int, data: bytes) -> None:

@@ -90,13 +90,13 @@ class Station:
         """
         if self.al_state != AlState.INIT | ERROR_BIT:
             return
-        told = al_status_text(self.al_code)
+        reported = al_status_text(self.al_code)
         raise LinkLost(
             "ethercat.station-al-status-answers",
-            remedy=(told.remedy() or text("ethercat.try-switch-drive-off")),
+            remedy=(reported.remedy() or text("ethercat.try-switch-drive-off")),
             station=self.number,
             state_name=state_name(self.al_state),
-            status=told,
+            status=reported,
             al_code=self.al_code,
         )
 
@@ -125,13 +125,13 @@ def answers(station: Station, clock: Callable[[], float]) -> Steps[bool]:
     deadline = clock() + GONE_S
     untouched = 0
     while True:
-        told = yield from _al_status(station)
-        if told:
+        reported = yield from _al_status(station)
+        if reported:
             return True
-        untouched += told is False
+        untouched += reported is False
         if untouched >= TRIES or clock() > deadline:
             return False
-        if told is None:
+        if reported is None:
             yield Pause(0.005)
 
 
@@ -196,7 +196,7 @@ def _refused(station: Station, target: AlState) -> NotAllowed:
 
 
 def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
-    """Wait for PREOP, then fill identity, alias, ports and mailbox-told names.
+    """Wait for PREOP, then fill identity, alias, ports and mailbox-reported names.
 
     What a slave does not have stays empty; a slave that refuses PREOP keeps a note in words.
     """
@@ -228,9 +228,9 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
         return
     try:
         yield from _to_preop(station, clock)
-        told = yield from _try_read(station, 0x1018, 4)
-        if told is not None and len(told) == 4:
-            station.serial = int.from_bytes(told, "little") or station.serial
+        reported = yield from _try_read(station, 0x1018, 4)
+        if reported is not None and len(reported) == 4:
+            station.serial = int.from_bytes(reported, "little") or station.serial
         for key, index in (("name", 0x1008), ("hardware", 0x1009), ("firmware", 0x100A)):
             text = yield from _try_read(station, index, 0)
             if text is not None:
@@ -257,17 +257,17 @@ def _to_preop(station: Station, clock: Callable[[], float]) -> Steps[None]:
 
 
 def _compare_identity(station: Station) -> Steps[None]:
-    """1018h and the SII should agree; where they do not, the user is told."""
+    """1018h and the SII should agree; where they do not, the user is informed."""
     for sub, label, ours in (
         (1, "vendor", station.vendor_id),
         (2, "product code", station.product_code),
         (3, "revision", station.revision),
     ):
         data = yield from _try_read(station, 0x1018, sub)
-        told = None if data is None else int.from_bytes(data, "little")
-        if told is not None and told != ours:
+        reported = None if data is None else int.from_bytes(data, "little")
+        if reported is not None and reported != ours:
             station.notes.append(
-                f"{label} is {told:#x} in 1018h but {ours:#x} in the EEPROM: "
+                f"{label} is {reported:#x} in 1018h but {ours:#x} in the EEPROM: "
                 "the EEPROM may be of another firmware"
             )
 

@@ -97,7 +97,7 @@ def findings(
 ) -> list[Finding]:
     """Which cable or connector the counters accuse, in words; empty when nothing is wrong.
 
-    ``upstream`` is what `parents` told while every station answered: while a cable is cut its
+    ``upstream`` is what `parents` reported while every station answered: while a cable is cut its
     ports no longer say what is behind them.
 
     Only ``rx_errors`` and ``invalid_frames`` that are not forwarded ones arise at the port

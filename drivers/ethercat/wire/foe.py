@@ -82,10 +82,10 @@ def _until_acknowledged(box: Mailbox, mail: bytes, packet: int, timeout_s: float
         answer = yield from box.request(FOE, mail, _is_foe, timeout_s, gone_s=GONE_S)
         code = answer[0]
         if code == _ACK:
-            told = int.from_bytes(answer[2:6], "little")
-            if told != packet:
+            reported = int.from_bytes(answer[2:6], "little")
+            if reported != packet:
                 raise ProtocolError(
-                    "ethercat.drive-acknowledged-packet-instead", told=told, packet=packet
+                    "ethercat.drive-acknowledged-packet-instead", reported=reported, packet=packet
                 )
             return
         if code == _ERROR:
@@ -101,8 +101,8 @@ def _until_acknowledged(box: Mailbox, mail: bytes, packet: int, timeout_s: float
 def _refused(answer: bytes) -> Rejected:
     code = int.from_bytes(answer[2:6], "little")
     reason = text(f"ethercat.foe-{code:04x}" if code in _ERRORS else "ethercat.foe-other")
-    told = answer[6:].split(b"\0", 1)[0].decode("utf-8", "replace").strip()
-    words = joined((reason, prose(told)), ": ") if told else reason
+    reported = answer[6:].split(b"\0", 1)[0].decode("utf-8", "replace").strip()
+    words = joined((reason, prose(reported)), ": ") if reported else reason
     return Rejected("ethercat.drive-refused-file-foe", abort_code=code, number=code, words=words)
 
 

@@ -31,18 +31,18 @@ def describe_object(box: Mailbox, index: int) -> Steps[ObjectInfo]:
     data = b"".join(parts)
     if len(data) < 6:
         raise ProtocolError("ethercat.description-bytes", index=index, bytes=len(data))
-    told, data_type, max_subindex, code = struct.unpack("<HHBB", data[:6])
-    return ObjectInfo(told, _text(data[6:]), data_type, code & 0x0F, max_subindex)
+    reported, data_type, max_subindex, code = struct.unpack("<HHBB", data[:6])
+    return ObjectInfo(reported, _text(data[6:]), data_type, code & 0x0F, max_subindex)
 
 
 def describe_entry(box: Mailbox, index: int, subindex: int) -> Steps[EntryDescription]:
-    """Type, length, access and name of one entry, with unit, default and limits if told."""
+    """Type, length, access and name of one entry, with unit, default and limits if reported."""
     wanted = 0x08 | 0x10 | 0x20 | 0x40
     parts = yield from _info(box, 0x05, struct.pack("<HBB", index, subindex, wanted), 0x06)
     data = b"".join(parts)
     if len(data) < 10:
         raise ProtocolError("ethercat.description-too-short", index=index, subindex=subindex)
-    told, sub, info, data_type, bits, access = struct.unpack("<HBBHHH", data[:10])
+    reported, sub, info, data_type, bits, access = struct.unpack("<HBBHHH", data[:10])
     rest = data[10:]
     size = (bits + 7) // 8
     unit: int | None = None
@@ -52,7 +52,7 @@ def describe_entry(box: Mailbox, index: int, subindex: int) -> Steps[EntryDescri
     for place, bit in enumerate((0x10, 0x20, 0x40)):
         if info & bit and len(rest) >= size:
             values[place], rest = rest[:size], rest[size:]
-    return EntryDescription(told, sub, data_type, bits, access, _text(rest), unit, *values)
+    return EntryDescription(reported, sub, data_type, bits, access, _text(rest), unit, *values)
 
 
 def _info(box: Mailbox, opcode: int, data: bytes, answer_code: int) -> Steps[list[bytes]]:

@@ -212,8 +212,8 @@ class Lanes:
         except (struct.error, ValueError, IndexError) as error:
             # Whatever a slave sends, the process that moves axes goes on.
             lane.running.remove(job)
-            told = ProtocolError("ethercat.drive-sent-something-cannot", cause=str(error))
-            job.done(None, told)
+            reported = ProtocolError("ethercat.drive-sent-something-cannot", cause=str(error))
+            job.done(None, reported)
             return None
         job.calm = isinstance(step, Gap)
         job.wake_s, job.reply = 0.0, b""

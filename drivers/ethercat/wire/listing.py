@@ -32,7 +32,7 @@ async def read_list(
         DriveError: the process that owns the segment did not answer, or does not know the station.
     """
     items = [(*object_of(address), size_of(address.type)) for address in addresses]
-    told: dict[Item, bytes | Message | NotAsked] = {}
+    reported: dict[Item, bytes | Message | NotAsked] = {}
     silent: list[list[Item]] = []
     # One part is under way while the next one waits, so that the drive is never idle; a third
     # reader comes in between, and a write or a stop before them.
@@ -41,10 +41,10 @@ async def read_list(
     async def part(chunk: list[Item]) -> None:
         async with ahead:
             if len(silent) >= _SILENT_CHUNKS:
-                told.update(dict.fromkeys(chunk, _not_asked(station)))
+                reported.update(dict.fromkeys(chunk, _not_asked(station)))
                 return
             answers = await ask(chunk, 1.5 * _CHUNKS_AHEAD * len(chunk))
-        told.update(zip(chunk, answers, strict=True))
+        reported.update(zip(chunk, answers, strict=True))
         if len(chunk) > 1 and all(_late(answer) for answer in answers):
             silent.append(chunk)
         else:
@@ -59,7 +59,7 @@ async def read_list(
     results: list[bytes | DriveError] = []
     for address, item in zip(addresses, items, strict=True):
         try:
-            results.append(fitted(address, _value(told[item])))
+            results.append(fitted(address, _value(reported[item])))
         except DriveError as error:
             results.append(error.at(parameter=str(address)))
     return results

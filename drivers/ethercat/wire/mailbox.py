@@ -364,8 +364,8 @@ class Mailbox:
                 wanted = None if now is None else now[0] ^ 0x02
             else:
                 yield Write(SM1_ACTIVATE, bytes([wanted]))
-                told = yield Read(SM1_PDI, 1)
-                if told is not None and (told[0] ^ wanted) & 0x02 == 0:
+                reported = yield Read(SM1_PDI, 1)
+                if reported is not None and (reported[0] ^ wanted) & 0x02 == 0:
                     return
             yield Pause(0.0005)
 

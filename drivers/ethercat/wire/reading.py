@@ -81,8 +81,8 @@ def _not_in_use(
     index, subindex, _ = item
     if index not in _LISTS or not subindex:
         return None
-    told = next((results.get(member) for member in members if member[1] == 0), None)
-    if not isinstance(told, bytes) or subindex <= (count := int.from_bytes(told, "little")):
+    reported = next((results.get(member) for member in members if member[1] == 0), None)
+    if not isinstance(reported, bytes) or subindex <= (count := int.from_bytes(reported, "little")):
         return None
     return NotInUse(
         "ethercat.not-use-00-counts",

@@ -114,9 +114,11 @@ def write_alias(alias: int, clock: Callable[[], float]) -> Steps[int]:
 
 def boot_mailbox(clock: Callable[[], float]) -> Steps[BootMailbox | None]:
     """The mailboxes of BOOT; None where the slave names none."""
-    told = BootMailbox(*struct.unpack("<HHHH", (yield from read(BOOT_WORD, 4, clock))))
-    sane = min(told.out_size, told.in_size) >= _LEAST_MAILBOX and told.out_address >= _RAM
-    return told if sane and 0xFFFF not in (told.out_size, told.in_size) else None
+    reported = BootMailbox(*struct.unpack("<HHHH", (yield from read(BOOT_WORD, 4, clock))))
+    sane = (
+        min(reported.out_size, reported.in_size) >= _LEAST_MAILBOX and reported.out_address >= _RAM
+    )
+    return reported if sane and 0xFFFF not in (reported.out_size, reported.in_size) else None
 
 
 def has_mailbox(clock: Callable[[], float]) -> Steps[bool]:

@@ -1,7 +1,7 @@
 """Active faults and warnings of one drive, what resets them, and the record of past ones.
 
 Faults come from two sides: protections of the 50 µs loop, as bits, and entries of the profile's
-table that the firmware or a test raises by their code. Both are told by the same table.
+table that the firmware or a test raises by their code. Both are shown by the same table.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ class DeviceControl:
         self.faults = Faults(core, self, log)
         self.alarms = self.faults.alarms
         self.on_disabled: list[Callable[[], None]] = []
-        """Told whenever the power stage has been switched off."""
+        """Reported whenever the power stage has been switched off."""
         self._stops = Stopping(core, self.modes)
         self.brake = HoldingBrake(core)
         self.jog = TerminalJog(core, self.brake, self._free)
@@ -189,8 +189,8 @@ class DeviceControl:
         if at_once or not self.brake.close(lambda: self.state is State.OPERATION_ENABLED):
             self._stops.after_rest(self._axis)
         self._core.od.activate("stopped")
-        for told in self.on_disabled:
-            told()
+        for reported in self.on_disabled:
+            reported()
 
     def _disable(self, state: State) -> None:
         self._switch_off()

@@ -160,11 +160,15 @@ class ObjectDictionary:
         for code in self.entries:
             highest[code >> 8] = max(highest.get(code >> 8, 0), code & 0xFF)
         for index, last in highest.items():
-            told = self.entries.get(code_of(index, 0))
-            if told is None:
+            reported = self.entries.get(code_of(index, 0))
+            if reported is None:
                 self._add(_constant(index, 0, "Highest subindex", "UINT8", last))
-            elif last and told.parameter.access == "ro" and told.parameter.default_raw is None:
-                self._add(told.parameter.model_copy(update={"default_raw": last}))
+            elif (
+                last
+                and reported.parameter.access == "ro"
+                and reported.parameter.default_raw is None
+            ):
+                self._add(reported.parameter.model_copy(update={"default_raw": last}))
 
     def __iter__(self) -> Iterator[Entry]:
         return iter(self.numbered.values())

@@ -106,10 +106,10 @@ class Faults:
             return
         now_s = self._now_s()
         self._since_s |= {item.name: now_s for item in new}
-        told = next((item for item in new if item.code), new[0])
+        reported = next((item for item in new if item.code), new[0])
         status = self._axis.faults & 0xFFFF
         self.emergencies.append(
-            (told.code or 0xFF00, told.error_register, status.to_bytes(5, "little"))
+            (reported.code or 0xFF00, reported.error_register, status.to_bytes(5, "little"))
         )
         if self._tripped.state not in (State.FAULT, State.NOT_READY):
             self._tripped.trip(new)

@@ -2,7 +2,7 @@
 
 Methods 1–14, 17–30, 33, 34, 35 and 37 (CiA 402-2 clause "homing", 004:3837-3893), and the family's
 own against the mechanical limit.
-Directions are told by ``d``: +1 for the method as printed towards positive positions, −1 for its
+Directions are shown by ``d``: +1 for the method as printed towards positive positions, −1 for its
 mirror image.
 """
 

@@ -299,13 +299,13 @@ class CanopenNode:
         return register | (_COMMUNICATION_ERROR if self._own_errors else 0)
 
     def _raise_own(self, code: int, now: int) -> None:
-        """An error of the network, told once for as long as it lasts (CiA 301 clause 7.2.7.1)."""
+        """A network error, reported once while it lasts (CiA 301 clause 7.2.7.1)."""
         if code not in self._own_errors:
             self._own_errors.add(code)
             self._emergency(code, self._error_register(), bytes(5), now)
 
     def _clear_own(self, code: int, now: int) -> None:
-        """It is over: told with code 0 and what the register still holds."""
+        """It is over: reported with code 0 and what the register still holds."""
         if code in self._own_errors:
             self._own_errors.discard(code)
             self._emergency(0, self._error_register(), bytes(5), now)

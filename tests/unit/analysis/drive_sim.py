@@ -88,7 +88,7 @@ class Drive:
     position_gain: float = 0.0
     speed_filter_hz: float = 0.0
     command_late_steps: int = 0
-    told_late_steps: int = 0
+    reported_late_steps: int = 0
     interpolates: bool = False
     holds_motion: bool = False
     counts_per_rev: int = 2**23
@@ -110,7 +110,7 @@ class Run:
 @numba.njit(cache=True)
 def _simulate(
     steps, m, a, b_ref, b_dist, coulomb, gravity, limit, mode, kp, ki, kv, alpha,
-    torque_in, velocity_in, position_in, counts, noise, told_late, holds, out,
+    torque_in, velocity_in, position_in, counts, noise, reported_late, holds, out,
 ):  # fmt: skip
     n = a.shape[0]
     x = np.zeros(n)
@@ -126,11 +126,11 @@ def _simulate(
         raw = (theta - previous) / dt if i > 0 else 0.0
         previous = theta
         filtered += alpha * (raw - filtered)
-        told = (i + told_late) // m
-        if (i + told_late) % m == 0 and told < out.shape[0]:
-            out[told, 0] = x[n - 1]
-            out[told, 1] = filtered
-            out[told, 2] = theta
+        reported = (i + reported_late) // m
+        if (i + reported_late) % m == 0 and reported < out.shape[0]:
+            out[reported, 0] = x[n - 1]
+            out[reported, 1] = filtered
+            out[reported, 2] = theta
         ref = torque_in[i]
         if mode == 0:
             ref += gravity
@@ -209,7 +209,7 @@ def simulate(mechanics, drive, sample_rate_hz, *, torque=None, velocity=None, po
         zero if velocity is None else np.asarray(velocity, float),
         zero if position is None else np.asarray(position, float),
         float(drive.counts_per_rev), rng.normal(0, max(drive.noise_counts, 1e-12), steps),
-        drive.told_late_steps, drive.holds_motion, out,
+        drive.reported_late_steps, drive.holds_motion, out,
     )  # fmt: skip
     lsb = drive.torque_step * drive.rated_nm
     return Run(

@@ -105,7 +105,7 @@ def random_case(seed: int, rate_hz: float) -> Case:
         command_late_steps=int(rng.integers(round(1.5 * period), round(2.5 * period) + 1))
         if kind == 4
         else period * int(rng.integers(0, 2)),
-        told_late_steps=0,
+        reported_late_steps=0,
         interpolates=bool(kind == 5 and rng.random() < 0.5),
         seed=seed,
     )

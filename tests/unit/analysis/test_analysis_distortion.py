@@ -1,4 +1,4 @@
-"""Friction is told from play by what it leaves between the excited lines."""
+"""Friction is distinguished from play by what it leaves between the excited lines."""
 
 from dataclasses import replace
 
@@ -72,7 +72,7 @@ def test_an_axis_with_play_gets_no_model_and_no_lines_beyond_the_direct_band():
 
 
 @pytest.mark.parametrize("play", [True, False])
-def test_play_is_told_from_the_steps_of_a_coarse_encoder(play):
+def test_play_is_distinguished_from_the_steps_of_a_coarse_encoder(play):
     """A motion that repeats itself repeats its steps as well, as on a DS_C.
 
     They do not scatter from period to period then, and are all that lies between the lines.
@@ -99,8 +99,8 @@ def test_play_is_told_from_the_steps_of_a_coarse_encoder(play):
         exact = np.cumsum(velocity) / RATE
         place = np.floor(exact / step) * step
         # A drive's speed shows four times as much of the steps, as it looks within the cycle.
-        told = velocity + 4.0 * np.gradient(place - exact) * RATE
-        records.append(replace(r, response=told, position=place))
+        reported = velocity + 4.0 * np.gradient(place - exact) * RATE
+        records.append(replace(r, response=reported, position=place))
     frf = estimate_periodic(tuple(records), PATH, "torque_mode")
     found = distortion(tuple(records), PATH, "torque_mode", frf)
     assert found.play is play

@@ -189,8 +189,8 @@ def test_closed_loop_response_of_the_speed_loop():
     assert np.median(np.abs(np.degrees(np.angle(ratio)))) < 1.5
 
 
-@pytest.mark.parametrize("told_nm", [None, 0.04])
-def test_friction_is_taken_out_of_a_closed_speed_loop(told_nm):
+@pytest.mark.parametrize("reported_nm", [None, 0.04])
+def test_friction_is_taken_out_of_a_closed_speed_loop(reported_nm):
     """A soft loop that is moved to and fro slows down by friction: no gain of a linear loop."""
     fs, n = 2000.0, 2000
     mechanics = replace(ONE, coulomb_nm=0.04)
@@ -221,7 +221,7 @@ def test_friction_is_taken_out_of_a_closed_speed_loop(told_nm):
         return float(np.median(ratio)), frf.coulomb_nm
 
     without, _ = error(0.0)
-    corrected, found_nm = error(told_nm)
+    corrected, found_nm = error(reported_nm)
     assert corrected < 0.3 * without
     assert found_nm == pytest.approx(0.04, rel=0.1)
 

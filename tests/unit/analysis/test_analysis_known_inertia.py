@@ -1,4 +1,4 @@
-"""Lines hidden by friction: the inertia that moves told, and the model beside such lines."""
+"""Lines hidden by friction: the inertia that moves showed, and the model beside such lines."""
 
 from dataclasses import replace
 
@@ -39,7 +39,7 @@ def measured(seed: int) -> Frf:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_lines_that_hide_the_whole_inertia_leave_what_moves_told_of_it(seed: int) -> None:
+def test_lines_that_hide_the_whole_inertia_leave_what_moves_reported_of_it(seed: int) -> None:
     frf, whole = measured(seed), MOTOR + LOAD
     plain = fit_sampled_model(frf, PATH, max_modes=2).fit.model
     model = fit_sampled_model(frf, PATH, max_modes=2, inertia=KnownInertia(whole, 0.005)).fit.model
@@ -50,7 +50,7 @@ def test_lines_that_hide_the_whole_inertia_leave_what_moves_told_of_it(seed: int
     assert np.median(np.abs(model.response(LINES) / true - 1.0)[above & HIDDEN]) < 0.15
 
 
-def test_an_inertia_that_moves_hardly_told_holds_nothing() -> None:
+def test_an_inertia_that_moves_hardly_reported_holds_nothing() -> None:
     frf, wrong = measured(0), 2.0 * (MOTOR + LOAD)
     plain = fit_sampled_model(frf, PATH, max_modes=2).fit.model
     vague = KnownInertia(wrong, 5.0)

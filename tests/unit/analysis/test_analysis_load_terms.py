@@ -70,7 +70,7 @@ def test_inertia_and_friction_are_found_beside_it(beside, noise_nm, ratio):
         assert result.viscous_nms.low <= VISCOUS <= result.viscous_nms.high
 
 
-def test_what_it_is_and_how_large_is_told():
+def test_what_it_is_and_how_large_is_reported():
     place = found(2 * MOTOR, unbalanced).beside
     assert place.place_nm == pytest.approx(0.1, rel=0.05)
     assert place.periods_rad == pytest.approx((TURN,), rel=0.01)

@@ -52,7 +52,7 @@ def test_hold_delay_and_corner_are_found_where_no_drive_tells_them(cycles, inter
     found = identify_with_path(records, SignalPath(4000.0), "torque_mode", hold_known=False)
     path = found.fit.path
     assert path.current_bandwidth_hz == pytest.approx(700.0, rel=0.03)
-    # Behind a slow current loop a straight line looks like a late staircase: their mean is told.
+    # Behind a slow current loop a straight line looks like a late staircase: the mean counts.
     period_s = 1 / 4000.0
     mean_s = path.command_delay_s + period_s * (1.0 if path.hold == "linear" else 0.5)
     true_s = round(5 * cycles) * 50e-6 + (period_s - 25e-6 if interpolates else 0.5 * period_s)
@@ -63,7 +63,7 @@ def test_hold_delay_and_corner_are_found_where_no_drive_tells_them(cycles, inter
 
 
 @pytest.mark.parametrize("interpolates", [False, True])
-def test_a_straight_line_is_told_from_a_staircase(interpolates):
+def test_a_straight_line_is_distinguished_from_a_staircase(interpolates):
     case = case_of(1000.0, late_steps=20, interpolates=interpolates, current_hz=1000.0)
     best = find_paths(records_of(case), SignalPath(1000.0), loop_closed=False, hold_known=False)[0]
     assert best.hold == ("linear" if interpolates else "zero")

@@ -141,8 +141,8 @@ def test_mechanics_by_a_speed_loops_reference_have_their_size(mechanics, hold):
         e = replace(s.excitation, samples=s.excitation.samples + s.base)
         run = simulate(mechanics, replace(drive, seed=number), RATE, velocity=e.samples)
         zero, valid = np.zeros(e.samples.size), np.ones(e.samples.size, bool)
-        told = Recording(RATE, run.position, run.velocity, run.torque, zero, zero, valid)
-        records.append((replace(s, excitation=e), told))
+        reported = Recording(RATE, run.position, run.velocity, run.torque, zero, zero, valid)
+        records.append((replace(s, excitation=e), reported))
     facts = AxisFacts(1.27, True, 3000.0, None, None, None, None, False)
     settings = SweepSettings(Envelope(4.0, 1500.0, 100.0, 60.0), hold=hold)
     found = evaluate(tuple(records), RATE, facts, settings, "speed", dc=True, by_speed=True)
@@ -159,7 +159,7 @@ def test_mechanics_by_a_speed_loops_reference_have_their_size(mechanics, hold):
     assert above.phase_deg < 4.0
 
 
-def told(std_deg: np.ndarray) -> Frf:
+def reported(std_deg: np.ndarray) -> Frf:
     f = np.linspace(5.0, 400.0, std_deg.size)
     zero = np.zeros(f.size)
     return Frf(
@@ -169,11 +169,11 @@ def told(std_deg: np.ndarray) -> Frf:
 
 def test_a_band_ends_where_the_model_alone_no_longer_tells_the_lines():
     known, rough = np.full(80, 3.0), np.full(80, 9.0)
-    assert ended_where_unknown(told(known)).valid_band_hz == (5.0, 400.0)
+    assert ended_where_unknown(reported(known)).valid_band_hz == (5.0, 400.0)
     # 95 of 100 cases within 15° are 7.65° of deviation; below 0.25 fs lines are measured.
-    assert ended_where_unknown(told(rough)).valid_band_hz == (5.0, 250.0)
+    assert ended_where_unknown(reported(rough)).valid_band_hz == (5.0, 250.0)
     f = np.linspace(5.0, 400.0, 80)
     beside_a_valley = np.where((f > 260) & (f < 300), 9.0, 3.0)
-    assert ended_where_unknown(told(beside_a_valley)).valid_band_hz == (5.0, 400.0)
+    assert ended_where_unknown(reported(beside_a_valley)).valid_band_hz == (5.0, 400.0)
     upper_end = np.where(f > 320, 9.0, 3.0)
-    assert ended_where_unknown(told(upper_end)).valid_band_hz[1] == pytest.approx(318, abs=6)
+    assert ended_where_unknown(reported(upper_end)).valid_band_hz[1] == pytest.approx(318, abs=6)

@@ -72,7 +72,7 @@ def test_a_balance_that_leaves_realisations_less_alike_is_not_believed(rubbed, m
 
     def late(given, *_):
         directions = [np.roll(r.direction(0.0), 6) for r in given]
-        return tuple(replace(r, told_direction=d) for r, d in zip(given, directions, strict=True))
+        return tuple(replace(r, known_direction=d) for r, d in zip(given, directions, strict=True))
 
     monkeypatch.setattr(identify, "with_balanced_reversals", late)
     settings = SweepSettings(ENVELOPE)

@@ -119,7 +119,7 @@ def test_the_band_holds_another_run_of_a_rough_bench(number: int) -> None:
         assert share_held(found, bench, torque, lines) >= 0.9, name
 
 
-def test_noise_and_chirp_are_told_and_hold_the_truth() -> None:
+def test_noise_and_chirp_are_reported_and_hold_the_truth() -> None:
     bench = Bench(noise=2e-3, damping=0.04)
     n = round(16 * RATE)
     t = np.arange(n) / RATE
@@ -152,8 +152,8 @@ def test_a_periodic_excitation_with_empty_lines_tells_distortion_by_parity() -> 
 
 def test_periods_of_any_length_and_a_measured_input_are_found() -> None:
     one = np.random.default_rng(1).normal(size=777)
-    told = np.tile(one, 5)[: 777 * 5 - 100] + 0.02 * np.random.default_rng(2).normal(size=3785)
-    found = find_excitation(told)
+    reported = np.tile(one, 5)[: 777 * 5 - 100] + 0.02 * np.random.default_rng(2).normal(size=3785)
+    found = find_excitation(reported)
     assert (found.kind, found.period_samples, found.periods) == ("periodic", 777, 4)
     assert find_excitation(np.random.default_rng(4).normal(size=4000)).kind == "noise"
 

@@ -51,9 +51,9 @@ def found(by_place: float, noise: float = 1e-3) -> InertiaByPlace | None:
 
 @pytest.mark.parametrize("share", [0.03, 0.1])
 def test_an_inertia_by_place_is_found_with_its_size(share: float) -> None:
-    told = found(share * J0)
-    assert told is not None
-    assert told.amplitude_kgm2 == pytest.approx(share * J0, rel=0.2)
+    reported = found(share * J0)
+    assert reported is not None
+    assert reported.amplitude_kgm2 == pytest.approx(share * J0, rel=0.2)
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3, 1e-1])

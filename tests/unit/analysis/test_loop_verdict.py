@@ -149,7 +149,7 @@ def test_a_wrong_hold_of_the_reference_is_found(true: str, assumed: str) -> None
     assert np.max(np.abs(np.angle(best.closed / closed, deg=True))) < 3.0
 
 
-def test_delay_of_loop_and_of_reference_are_told_apart() -> None:
+def test_delay_of_loop_and_of_reference_are_distinguished() -> None:
     f = np.linspace(5.0, 246.0, 100)
     predicted, true = loop_of(f, 60.0, 0.5e-3), loop_of(f, 60.0, 0.7e-3)
     closed = true / (1 + true) * np.exp(-2j * np.pi * f * 150e-6)

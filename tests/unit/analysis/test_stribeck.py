@@ -22,7 +22,7 @@ def tanh_law(speed: np.ndarray) -> np.ndarray:
     return np.sign(speed) * (3.0 + 1.5 * (1.0 - np.tanh(size / 40.0))) + 0.002 * speed
 
 
-def test_load_coulomb_and_viscous_are_told_apart() -> None:
+def test_load_coulomb_and_viscous_are_distinguished() -> None:
     found = modelled(0.7 + 3.0 * np.sign(BOTH) + 0.002 * BOTH)
     assert found.best.speed is None
     for index, true in enumerate((0.7, 3.0, 0.002)):

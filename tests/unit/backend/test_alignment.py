@@ -88,7 +88,7 @@ def test_many_gaps() -> None:
     assert len(places(noise(), recorded(noise(), lost=parts, skipped=skipped))) > 450
 
 
-def test_two_columns_are_told_apart_by_either() -> None:
+def test_two_columns_are_distinguished_by_either() -> None:
     sent = np.hstack([np.zeros((600, 1)), noise()])
     assert len(places(sent, recorded(sent, lost=(range(30, 45),)))) >= 590
 

@@ -161,11 +161,11 @@ async def test_an_answer_waits_until_its_entry_is_safe(store: SickStore, audit: 
     assert not await audit.settled(0.05)
 
 
-async def test_a_database_that_fails_is_told_and_nothing_is_lost(
+async def test_a_database_that_fails_is_reported_and_nothing_is_lost(
     store: SickStore, tmp_path: Path
 ) -> None:
-    told: list[str] = []
-    audit = AuditLog(store, "bench-1", changed=told.append)
+    reported: list[str] = []
+    audit = AuditLog(store, "bench-1", changed=reported.append)
     store.sick = True
     audit.add(write(1))
     audit.add(write(2))
@@ -173,7 +173,7 @@ async def test_a_database_that_fails_is_told_and_nothing_is_lost(
     assert "disk full" in audit.problem
     store.sick = False
     flush(audit)
-    until(lambda: told == ["the database failed: disk full", ""])
+    until(lambda: reported == ["the database failed: disk full", ""])
     assert audit.problem == ""
     audit.close()
     assert [e.old for e in Trail(store).search(Filter())] == [2, 1]

@@ -82,7 +82,7 @@ def test_the_torque_where_it_slips(slips_at: float) -> None:
     assert first.slip_rev > 0.01
 
 
-def test_a_creep_below_the_limit_is_told_beside_the_verdict() -> None:
+def test_a_creep_below_the_limit_is_reported_beside_the_verdict() -> None:
     found = found_of(trial(1, creep_rev=0.005), trial(-1))
     assert found.verdict == "held"
     assert found.ways[0].slip_rev == pytest.approx(0.005, rel=0.02)

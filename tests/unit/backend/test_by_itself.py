@@ -32,7 +32,7 @@ def test_work_that_outlives_a_request_is_nobodys() -> None:
         acting.reset(token)
 
 
-async def test_a_drive_that_falls_silent_later_is_not_told_of_who_connected_it(
+async def test_a_drive_that_falls_silent_later_is_not_reported_of_who_connected_it(
     tmp_path: Path,
 ) -> None:
     link = Telling()
@@ -45,6 +45,6 @@ async def test_a_drive_that_falls_silent_later_is_not_told_of_who_connected_it(
     finally:
         acting.reset(token)
         await bench.close()
-    told = {entry.text.split(" ")[0]: entry.person for entry in bench.journal.entries()}
-    assert told["connected"] == "local user"
-    assert told["mlink://virtual0:"] == ""
+    reported = {entry.text.split(" ")[0]: entry.person for entry in bench.journal.entries()}
+    assert reported["connected"] == "local user"
+    assert reported["mlink://virtual0:"] == ""

@@ -64,7 +64,7 @@ async def test_an_axis_that_left_the_bench_unstopped_is_stopped_when_it_comes_ba
     third = await bench.connect(URL, 1, "mms7", "X")
     await third.monitor.close()
     await third.monitor.refresh()
-    assert servo.number(STATUS) == ENABLED, "a stop is owed once"
+    assert servo.number(STATUS) == ENABLED, "a stop is pending once"
 
 
 class SlowSession:

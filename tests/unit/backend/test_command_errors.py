@@ -36,7 +36,7 @@ def bus(monkeypatch: pytest.MonkeyPatch, link: MemoryLink) -> MemoryLink:
     return link
 
 
-def test_an_unknown_profile_is_told_with_those_that_there_are(bus: MemoryLink) -> None:
+def test_an_unknown_profile_is_reported_with_those_that_there_are(bus: MemoryLink) -> None:
     done = CliRunner().invoke(
         cli.app, ["params", "get", "mlink:///x", "6041:00", "--profile", "mms8"]
     )
@@ -67,7 +67,7 @@ async def test_the_bench_refuses_it_too(tmp_path: Path, link: MemoryLink) -> Non
         await bench.close()
 
 
-async def test_a_state_folder_that_cannot_be_used_is_told_in_the_terminal(
+async def test_a_state_folder_that_cannot_be_used_is_reported_in_the_terminal(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "file").write_text("")
@@ -81,7 +81,7 @@ async def test_a_state_folder_that_cannot_be_used_is_told_in_the_terminal(
     assert f"{tmp_path}/file" in said
 
 
-async def test_a_database_out_of_reach_is_told_at_once_and_keeps_no_drive_waiting(
+async def test_a_database_out_of_reach_is_reported_at_once_and_keeps_no_drive_waiting(
     tmp_path: Path, link: MemoryLink, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with socket.socket() as taken:
@@ -108,7 +108,7 @@ async def test_a_database_out_of_reach_is_told_at_once_and_keeps_no_drive_waitin
     assert "secret" not in said
 
 
-async def test_what_goes_wrong_later_is_told_too_but_not_every_drives_trouble(
+async def test_what_goes_wrong_later_is_reported_too_but_not_every_drives_trouble(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bench = Bench(tmp_path)
@@ -238,7 +238,7 @@ def test_values_come_as_json_and_with_their_unit() -> None:
     out = io.StringIO()
     with redirect_stdout(out):
         assert not show_readings(read, as_json=True)
-    told = json.loads(out.getvalue())
-    assert (told[0]["value"], told[0]["unit"], told[0]["raw"]) == (150.0, "Hz", 1500)
-    assert (told[2]["value"], told[2]["error"]) == (None, "no answer")
+    shown = json.loads(out.getvalue())
+    assert (shown[0]["value"], shown[0]["unit"], shown[0]["raw"]) == (150.0, "Hz", 1500)
+    assert (shown[2]["value"], shown[2]["error"]) == (None, "no answer")
     assert line(status, read[1][1]) == "6041:00  Status word = 592 (0x0250)"

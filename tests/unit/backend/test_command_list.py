@@ -17,11 +17,11 @@ HEAVY = ("scipy", "fastapi", "uvicorn", "sqlalchemy", "pysoem", "can")
 
 def imported_by(code: str) -> set[str]:
     """Modules that are there after `code` in a fresh interpreter."""
-    told = subprocess.run(
+    reported = subprocess.run(
         [sys.executable, "-c", f"{code}\nimport json, sys\nprint(json.dumps(list(sys.modules)))"],
         capture_output=True, text=True, check=True,
     )  # fmt: skip
-    return set(json.loads(told.stdout.splitlines()[-1]))
+    return set(json.loads(reported.stdout.splitlines()[-1]))
 
 
 def test_the_list_of_commands_imports_none_of_them() -> None:
@@ -43,12 +43,12 @@ def test_scanning_and_moving_import_neither_server_nor_analysis() -> None:
 @pytest.mark.parametrize("name", cli.COMMANDS)
 def test_the_list_says_what_the_command_says(name: str) -> None:
     where, said = cli.COMMANDS[name]
-    told = cli.imported(name, where).help
-    assert told is not None
-    assert told.splitlines()[0] == said
+    reported = cli.imported(name, where).help
+    assert reported is not None
+    assert reported.splitlines()[0] == said
 
 
-def test_a_command_that_is_not_there_is_told() -> None:
+def test_a_command_that_is_not_there_is_reported() -> None:
     done = CliRunner().invoke(cli.app, ["scam"])
     assert done.exit_code == 2
     assert "No such command 'scam'" in done.output

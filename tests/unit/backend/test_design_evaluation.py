@@ -45,13 +45,13 @@ async def test_they_wait_for_the_one_that_runs(
     assert routes_design._running == {}
 
 
-async def test_a_failure_is_told_to_all_and_tried_anew(
+async def test_a_failure_is_commanded_to_all_and_tried_anew(
     asked: tuple[list[int], threading.Event],
 ) -> None:
     begun, let_go = asked
     let_go.set()
     for _ in range(2):
         both = (routes_design._evaluated_once(Path("damaged.sdmeas"), -1) for _ in range(2))
-        told = await asyncio.gather(*both, return_exceptions=True)
-        assert [type(each) for each in told] == [BadMeasurement, BadMeasurement]
+        reported = await asyncio.gather(*both, return_exceptions=True)
+        assert [type(each) for each in reported] == [BadMeasurement, BadMeasurement]
     assert begun == [-1, -1]

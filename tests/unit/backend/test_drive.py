@@ -126,8 +126,8 @@ async def test_what_is_not_in_use_is_no_failure_and_no_value(
     drive: Drive, link: MemoryLink
 ) -> None:
     link.read_errors[0x2005, 0x10] = NotInUse("not in use: 2005:00 counts 3 entries")
-    told = await read_all(drive, ["2005:03", "2005:10"], lambda _share, _text: None)
-    assert told == {"read": 1, "failed": {}}
+    reported = await read_all(drive, ["2005:03", "2005:10"], lambda _share, _text: None)
+    assert reported == {"read": 1, "failed": {}}
     reading = drive.readings["2005:10"]
     assert (reading.raw, reading.unused) == (None, True)
     assert "counts 3 entries" in reading.error
@@ -149,7 +149,7 @@ def test_no_object_is_cut_between_two_batches_on_ethercat(link: MemoryLink) -> N
     assert max(len(part) for part in port.batches(parameters)) < 20, "a stop waits for no more"
 
 
-async def test_wrong_length_from_newer_firmware_is_told(drive: Drive, link: MemoryLink) -> None:
+async def test_wrong_length_from_newer_firmware_is_reported(drive: Drive, link: MemoryLink) -> None:
     link.objects[0x2005, 3] = b"\1\2\3\4"
     readings = await drive.read_many(["2005:03"])
     assert "4 bytes came for a UINT16" in readings["2005:03"].error
@@ -209,9 +209,9 @@ async def test_a_drive_that_answers_nothing_is_not_asked_for_a_whole_list() -> N
 
 async def test_what_was_left_out_while_a_drive_was_slow_is_read_in_the_end() -> None:
     drive, _, keys = slow(silent=2)
-    told: list[float] = []
-    readings = await drive.read_many(keys, lambda share, _: told.append(share))
+    reported: list[float] = []
+    readings = await drive.read_many(keys, lambda share, _: reported.append(share))
     late = [key for key, reading in readings.items() if reading.error]
     assert late == [keys[0], keys[16]], "only those that the drive was asked for and did not answer"
-    assert told == sorted(told)
-    assert told[-1] == 1.0
+    assert reported == sorted(reported)
+    assert reported[-1] == 1.0

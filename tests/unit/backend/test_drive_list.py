@@ -40,7 +40,7 @@ def test_a_bad_entry_spoils_only_itself(tmp_path: Path) -> None:
     assert "drive 2: ports.0.station" in problems[1]
 
 
-def test_a_damaged_file_is_told_and_not_fatal(tmp_path: Path) -> None:
+def test_a_damaged_file_is_reported_and_not_fatal(tmp_path: Path) -> None:
     path = tmp_path / "bench.json"
     for text in ("", "[1]", '{"version": 1}', "\x00"):
         path.write_text(text, "utf-8")

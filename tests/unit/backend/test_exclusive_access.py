@@ -105,7 +105,7 @@ async def test_a_question_under_way_ends_before_the_write_and_none_follows_it(
 
 
 async def test_a_long_reading_lets_the_storing_in_between(quiet: Drive, slow: SlowLink) -> None:
-    """Its next part is refused, entry by entry, and told."""
+    """Its next part is refused, entry by entry, and reported."""
     slow.answers.clear()
     reading = asyncio.create_task(quiet.read_many(["2005:03", "2005:10"] * 20))
     await turns()

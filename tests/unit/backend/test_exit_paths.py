@@ -97,10 +97,10 @@ async def test_the_end_of_a_measurement_leaves_the_exchange_to_an_axis_that_borr
 ) -> None:
     """X's measurement started the exchange and ends; Y moves through it and must not be braked."""
     _y, loop = await two_axes(bench, x)
-    lent = Exchange(loop, bench, "x", URL, own=True)
+    borrowed = Exchange(loop, bench, "x", URL, own=True)
     mine = bench.jobs.start("sweep", "Sweep X", forever, drive="x", motion=True)
     moving = bench.jobs.start("move", "Move Y", forever, drive="y", motion=True)
-    await lent.end()
+    await borrowed.end()
     await turns()
     assert loop.stopped == 0
     assert bench.sessions[URL] == loop
@@ -198,7 +198,7 @@ async def test_a_disabling_that_fails_enables_nothing(x: ConnectedDrive, servo: 
 
 
 def stop_pending(connected: ConnectedDrive) -> bool:
-    """Whether it is told to stop as soon as it answers."""
+    """Whether it is commanded to stop as soon as it answers."""
     return connected.axis.stop_pending
 
 
@@ -208,7 +208,7 @@ def stop_pending(connected: ConnectedDrive) -> bool:
 async def test_a_motion_whose_loop_does_not_take_its_halt_owes_a_stop(
     x: ConnectedDrive, servo: Servo
 ) -> None:
-    """Nobody knows what still moves: the drive is told by itself as soon as it can be."""
+    """Nobody knows what still moves: the drive is shown by itself as soon as it can be."""
     loop, hold = Loop(x), Hold()
     loop.broken = True
     servo.enable()
@@ -291,7 +291,7 @@ async def test_a_gear_whose_writing_is_cancelled_is_as_it_was(
     assert not x.drive.pending_restores
 
 
-async def test_a_gear_that_cannot_be_taken_back_is_owed(x: ConnectedDrive, servo: Servo) -> None:
+async def test_a_gear_that_cannot_be_taken_back_is_pending(x: ConnectedDrive, servo: Servo) -> None:
     writing, before = await half_a_gear(x, servo)
     servo.mute = True
     servo.gate.set()

@@ -10,8 +10,8 @@ from backend.axis.axis import Axis
 from backend.axis.fault_history import named_fault, read_history
 from backend.drive.drive import Drive
 from backend.drive.ports import Port
-from backend.recording.facts import past_faults
 from backend.station.connected_drive import ConnectedDrive
+from backend.station.recording.facts import past_faults
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address
 from profiles import load_profile

@@ -31,7 +31,7 @@ def test_full_disk_leaves_the_old_file(tmp_path: Path, full_disk: None) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["a.sdset"], "no leftovers"
 
 
-def test_unwritable_folder_is_told(tmp_path: Path) -> None:
+def test_unwritable_folder_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(StorageFailed):
         write_atomically(tmp_path / "file" / "a", b"x")

@@ -231,7 +231,7 @@ async def test_a_cancelled_job_puts_back_too(
     assert outputs(io_link) == (0x1, 0)
 
 
-async def test_real_terminals_that_do_not_count_again_are_owed(
+async def test_real_terminals_that_do_not_count_again_are_pending(
     axis: Axis, sessions: ForcingSessions, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The values are back, and the drive goes on with simulated inputs: limits among them."""
@@ -315,7 +315,7 @@ async def test_simulation_is_not_begun_under_power(
     await sessions.end("x", "simulation")
 
 
-async def test_terminals_with_the_same_function_are_told_by_name(axis: Axis) -> None:
+async def test_terminals_with_the_same_function_are_reported_by_name(axis: Axis) -> None:
     found = {state.terminal.name: state for state in await read_terminals(axis.drive)}
     # Code 4 is probe 1 at DI1 and DI3, and probe 2 at DI2.
     assert found["DI1"].same_function == ("DI3",)

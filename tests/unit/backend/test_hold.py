@@ -51,11 +51,11 @@ class Held:
         self.gaps: list[bool] = []
         self.hold = Hold(1, self.clock, lambda braking, _s: self.gaps.append(braking))
         self.began = self.clock.s
-        self.told: list[tuple[float, str]] = []
+        self.reported: list[tuple[float, str]] = []
 
     def look(self) -> str:
         state = "ended" if self.hold.ended() else "brakes" if self.hold.braking() else "moves"
-        self.told.append((self.clock.s - self.began, state))
+        self.reported.append((self.clock.s - self.began, state))
         return state
 
     def sign(self, sign: Sign) -> None:
@@ -79,10 +79,10 @@ class Held:
 
     def states(self) -> list[str]:
         """One after the other, each once."""
-        return [state for state, _ in itertools.groupby(state for _, state in self.told)]
+        return [state for state, _ in itertools.groupby(state for _, state in self.reported)]
 
     def first(self, state: str, after_s: float = 0.0) -> float:
-        return next(at for at, each in self.told if each == state and at >= after_s)
+        return next(at for at, each in self.reported if each == state and at >= after_s)
 
 
 def steady(begin_s: float, end_s: float, first: int = 1) -> list[Sign]:
@@ -130,7 +130,7 @@ def test_a_release_in_a_gap_never_resumes(released_s: float) -> None:
     """Signs that come afterwards, sent before or after it, change nothing."""
     held = Held()
     held.play(steady(0.0, 1.0) + steady(1.40, 4.0, first=100), 3.5, release_at_s=released_s)
-    assert "moves" not in [state for at, state in held.told if at > 1.2]
+    assert "moves" not in [state for at, state in held.reported if at > 1.2]
     assert held.hold.ended() == "released"
 
 
@@ -142,7 +142,7 @@ def test_a_burst_that_waited_in_the_network_is_as_old_as_it_was_sent() -> None:
     ]
     let_go = Sign(200, 1.43, late_s=0.01, pressed=False)
     held.play([*steady(0.0, 1.0), *waiting, let_go], 3.0)
-    assert "moves" not in [state for at, state in held.told if at > 1.2]
+    assert "moves" not in [state for at, state in held.reported if at > 1.2]
     assert held.hold.ended() == "released"
 
 
@@ -170,7 +170,7 @@ def test_signs_and_a_release_in_whatever_order_they_arrive(order: tuple[int, ...
         held.sign(signs[index])
         held.look()
     held.play(steady(1.44, 4.0, first=200), 3.0)
-    assert "moves" not in [state for at, state in held.told if at > 1.2]
+    assert "moves" not in [state for at, state in held.reported if at > 1.2]
 
 
 def test_a_sign_that_was_overtaken_counts_for_nothing() -> None:

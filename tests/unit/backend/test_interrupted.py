@@ -186,11 +186,11 @@ def test_only_what_was_asked_of_the_axis_may_be_asked_in_another_way(
     power = SimpleNamespace(axis_state=lambda _station: LoopState("", "idle", halt))
     session: Any = SimpleNamespace(power=lambda: power, running=True, station=lambda _drive: 1)
     axis: Any = Axis()
-    with pytest.raises(NotAllowed) as told:
+    with pytest.raises(NotAllowed) as reported:
         raise_if_ended(axis, session)
-    assert isinstance(told.value, Interrupted) is by_others
-    assert isinstance(told.value, Interrupted | MotionHalted)
-    assert told.value.halt is halt
+    assert isinstance(reported.value, Interrupted) is by_others
+    assert isinstance(reported.value, Interrupted | MotionHalted)
+    assert reported.value.halt is halt
 
 
 def test_every_cause_is_judged() -> None:

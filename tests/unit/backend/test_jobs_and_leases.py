@@ -100,8 +100,8 @@ async def test_a_cleanup_that_fails_does_not_hide_why_it_was_due() -> None:
 
 
 def test_leases() -> None:
-    told: list[str] = []
-    leases = Leases(told.append)
+    reported: list[str] = []
+    leases = Leases(reported.append)
     leases.require("x", None)
     leases.take("x", "c1", "Anna")
     leases.take("x", "c1", "Anna")
@@ -113,4 +113,4 @@ def test_leases() -> None:
     leases.require("x", "c1")
     assert leases.drop("c1") == ["x"]
     leases.require("x", "c2")
-    assert told == ["x", "x"]
+    assert reported == ["x", "x"]

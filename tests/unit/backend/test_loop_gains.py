@@ -43,14 +43,14 @@ def test_a_filter_that_is_off_or_unknown_stays_so() -> None:
 
 
 def test_gains_without_a_meaning_are_refused_with_what_can_be_done() -> None:
-    with pytest.raises(NotAllowed, match=r"does not print what the gains .* mean") as told:
+    with pytest.raises(NotAllowed, match=r"does not print what the gains .* mean") as reported:
         plan_gains(drive("ds_c"), Gains(1.0, 1.0, 1.0, 1.0), 1e-4, 1e-4)
     # DS_C has no stiffness levels to be sent to.
-    assert "small steps" in (told.value.remedy or "")
-    assert "stiffness" not in (told.value.remedy or "")
+    assert "small steps" in (reported.value.remedy or "")
+    assert "stiffness" not in (reported.value.remedy or "")
 
 
 def test_a_load_ratio_needs_the_motor() -> None:
-    with pytest.raises(NotAllowed, match="ratio to the motor's") as told:
+    with pytest.raises(NotAllowed, match="ratio to the motor's") as reported:
         plan_gains(drive("m6l"), Gains(1.0, 1.0, 1.0, 1.0), 1e-4)
-    assert "motor's inertia" in (told.value.remedy or "")
+    assert "motor's inertia" in (reported.value.remedy or "")

@@ -1,4 +1,4 @@
-"""Stored measurements: anyone can reopen them and comes to the same answer, or is told why not."""
+"""Stored measurements: anyone can reopen them with the same answer, or gets the reason why not."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ def test_ep3e_indexing_table_of_the_manual() -> None:
     table = Mechanics(kind="rotary", motor_turns=3, load_turns=1, resolution=0.1)
     plan = plan_gear(load_profile("ep3e"), table, _23_BIT)
     assert raws(plan) == {"6091:01": 3, "6091:02": 1, "6092:01": 3600, "6092:02": 1}
-    # Its ratio of 6990 breaks the manual's own bound of 1000: told, not refused.
+    # Its ratio of 6990 breaks the manual's own bound of 1000: reported, not refused.
     assert "Err80" in plan.warnings[0]
 
 
@@ -72,7 +72,7 @@ def test_r6l_ratio_is_encoder_increments_over_user_increments() -> None:
     assert raws(plan_gear(profile, screw, _23_BIT)) == {"6091:01": 131072, "6091:02": 125}
 
 
-def test_a_gear_of_sixteen_bits_is_rounded_and_told() -> None:
+def test_a_gear_of_sixteen_bits_is_rounded_and_reported() -> None:
     belt = Mechanics(kind="belt", diameter_mm=200, motor_turns=10, resolution=0.01)
     plan = plan_gear(load_profile("ds_c"), belt, None)
     found = raws(plan)
@@ -107,7 +107,7 @@ def test_what_follows_from_a_plan() -> None:
     assert plan.warnings == ()
 
 
-def test_an_increment_finer_than_the_encoder_is_told() -> None:
+def test_an_increment_finer_than_the_encoder_is_reported() -> None:
     plan = plan_gear(load_profile("ds_c"), Mechanics(kind="screw", lead_mm=20), None)
     assert any("finer than the encoder" in text for text in plan.warnings)
 

@@ -47,17 +47,17 @@ async def test_a_mode_that_the_drive_does_not_tell_is_not_offered(
         await connected.axis.set_mode(Mode.CST)
 
 
-@pytest.mark.parametrize("told", [0, None])
+@pytest.mark.parametrize("reported", [0, None])
 async def test_a_drive_that_tells_nothing_keeps_what_the_profile_says(
-    stranger: tuple[Servo, Bench], told: int | None
+    stranger: tuple[Servo, Bench], reported: int | None
 ) -> None:
     servo, bench = stranger
     (connected,) = bench.connected_drives.values()
     connected.drive.forget()
-    if told is None:
+    if reported is None:
         del servo.objects[MODES]
     else:
-        servo.set(MODES, told)
+        servo.set(MODES, reported)
     asked: list[object] = []
     await connected.monitor.refresh()
     servo.on_read = asked.append

@@ -1,4 +1,4 @@
-"""What is told of an axis beside a cyclic exchange: process data, and the drive itself in time."""
+"""What an axis reports beside a cyclic exchange: process data, and the drive itself."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ async def test_what_every_cycle_brings_is_not_asked_for(
     assert x.drive.readings[POSITION_KEY].raw == 12_345, "the parameter table shows it, too"
 
 
-async def test_a_dead_mailbox_is_told_although_process_data_go_on(
+async def test_a_dead_mailbox_is_reported_although_process_data_go_on(
     x: ConnectedDrive, servo: Servo, exchange: Exchange, clock: Clock
 ) -> None:
     servo.mute = True

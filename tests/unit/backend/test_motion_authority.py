@@ -227,9 +227,9 @@ async def test_a_setting_that_turns_the_shaft_is_noticed(monkeypatch: pytest.Mon
     monkeypatch.setattr("backend.functions.assign._require_inputs_off", not_seen)
     axis, link = an_m6l()
     link.device.inject("di2", 1.0)
-    with pytest.raises(NotAllowed, match="began to turn") as told:
+    with pytest.raises(NotAllowed, match="began to turn") as reported:
         await assign(axis, "2003:02", 17)
-    assert "emergency stop" in (told.value.remedy or "")
+    assert "emergency stop" in (reported.value.remedy or "")
 
 
 async def test_a_terminal_is_assigned_while_its_input_is_off() -> None:

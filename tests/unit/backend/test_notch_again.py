@@ -55,11 +55,13 @@ async def test_whole_periods_of_two_tries_are_enough(monkeypatch: pytest.MonkeyP
     assert left == [9]
 
 
-async def test_a_line_that_loses_samples_each_time_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_line_that_loses_samples_each_time_is_reported(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     trial, left = beside(monkeypatch, [0, 1, 0, 9])
-    with pytest.raises(NotAllowed, match="X: samples were lost in 3 tries") as told:
+    with pytest.raises(NotAllowed, match="X: samples were lost in 3 tries") as reported:
         await trial._played(None, lambda _: None)
-    assert told.value.remedy
+    assert reported.value.remedy
     assert left == [9]
 
 

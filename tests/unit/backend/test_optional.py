@@ -1,4 +1,4 @@
-"""Drives that lack what CiA 402-2 leaves to the maker: moved by what they have, or told why not."""
+"""Drives that lack what CiA 402-2 leaves to the maker: moved by what they have, or refused."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ class Plain(Servo):
         super().__init__("generic402")
         self.kind = "canopen"
         self.url = URL
-        told = {
+        reported = {
             (0x6091, 1): 1, (0x6091, 2): 1, (0x6092, 1): 10000, (0x6092, 2): 1, RATED_TORQUE: 1270,
             MAX_TORQUE: 3000, POSITIVE: 2000, NEGATIVE: 2000, (0x6081, 0): 10000,
             ACCELERATION: 50000, DECELERATION: 50000, QUICK_STOP: 50000,
             # Increments, increments per second and per square second (CiA 303-2).
             (0x60A8, 0): 0x00B50000, (0x60A9, 0): 0x00B50300, (0x60AA, 0): 0x00B55700,
         }  # fmt: skip
-        for place, value in told.items():
+        for place, value in reported.items():
             self.set(place, value)
 
     def without(self, *places: tuple[int, int]) -> None:
@@ -113,10 +113,10 @@ async def test_a_drive_without_a_deceleration_is_jogged_by_its_acceleration(
     plain.without(DECELERATION, QUICK_STOP)
     hold = Hold()
     asyncio.get_running_loop().call_later(0.1, hold.release, "let go")
-    told = await jog(
+    reported = await jog(
         connected.axis, JogSettings(1, 60.0, 600.0, 1.0, 50.0), hold, Progress(lambda: None)
     )
-    assert told["reason"] == "let go"
+    assert reported["reason"] == "let go"
     # 600 rpm/s are 10 rev/s², 100000 inc/s².
     assert (ACCELERATION, (100000).to_bytes(4, "little")) in plain.written
     assert plain.number(ACCELERATION) == 50000, "put back"
@@ -145,7 +145,7 @@ async def test_two_ramps_are_not_given_to_a_drive_that_has_one(
     assert plain.written == []
 
 
-async def test_what_is_known_without_a_rated_torque_is_told(
+async def test_what_is_known_without_a_rated_torque_is_reported(
     plain: Plain, connected: ConnectedDrive
 ) -> None:
     plain.without(RATED_TORQUE, POSITIVE)
@@ -154,7 +154,7 @@ async def test_what_is_known_without_a_rated_torque_is_told(
     assert await drive_limit_percent(connected.axis) == 200.0
 
 
-async def test_faults_of_a_drive_that_does_not_answer_are_not_told_as_none(
+async def test_faults_of_a_drive_that_does_not_answer_are_not_reported_as_none(
     plain: Plain, connected: ConnectedDrive
 ) -> None:
     plain.without((0x603F, 0))

@@ -62,12 +62,12 @@ async def test_a_load_that_the_link_ends_says_how_far_it_came_and_how_to_take_it
 
     monkeypatch.setattr(link, "write", pulled)
     library = SetLibrary(tmp_path)
-    with pytest.raises(LinkLost, match="1 of 2 rows were written before 2005:10") as told:
+    with pytest.raises(LinkLost, match="1 of 2 rows were written before 2005:10") as reported:
         await parameters.load_set(
             drive, content, ["2005:03", "2005:10"], silent, library=library,
             accept_other_identity=False,
         )  # fmt: skip
-    name = told.value.message.split("“")[1].removesuffix("”")
+    name = reported.value.message.split("“")[1].removesuffix("”")
     undo = library.load(name)
     assert {row.key: row.raw for row in undo.rows} == {"2005:03": 400, "2005:10": 0}
 

@@ -53,10 +53,10 @@ async def lost_in_the_middle(x: ConnectedDrive, servo: Servo) -> RestoreFailed:
             await x.drive.write(TORQUE, 800)
             servo.mute = True
 
-    with pytest.raises(RestoreFailed) as told:
+    with pytest.raises(RestoreFailed) as reported:
         await motion()
     assert held(servo) == {TORQUE: 800, SPEED: 200}
-    return told.value
+    return reported.value
 
 
 async def test_a_line_too_slow_for_putting_back_names_what_is_left(
@@ -70,9 +70,11 @@ async def test_a_line_too_slow_for_putting_back_names_what_is_left(
             servo.gate.clear()
             raise LinkLost("samples did not come")
 
-    with pytest.raises(RestoreFailed, match=f"^samples did not come; .*{SPEED} .was 400") as told:
+    with pytest.raises(
+        RestoreFailed, match=f"^samples did not come; .*{SPEED} .was 400"
+    ) as reported:
         await motion()
-    assert "running server puts them back" in (told.value.remedy or "")
+    assert "running server puts them back" in (reported.value.remedy or "")
     assert [entry.key for entry in x.drive.pending_restores.entries] == [SPEED]
 
 
@@ -89,21 +91,21 @@ async def motion_in_a_motion(x: ConnectedDrive, servo: Servo, *, again: bool) ->
             finally:
                 servo.mute = not again
 
-    with pytest.raises(RestoreFailed) as told:
+    with pytest.raises(RestoreFailed) as reported:
         await motion()
-    return told.value
+    return reported.value
 
 
-async def test_a_value_that_two_motions_lent_is_named_as_it_was_before_both(
+async def test_a_value_that_two_motions_borrowed_is_named_as_it_was_before_both(
     x: ConnectedDrive, servo: Servo
 ) -> None:
-    told = await motion_in_a_motion(x, servo, again=False)
-    assert f"{TORQUE} (was {WAS[TORQUE]})" in told.message
-    assert f"{TORQUE} (was 2000)" not in told.message, "nobody should write that by hand"
+    reported = await motion_in_a_motion(x, servo, again=False)
+    assert f"{TORQUE} (was {WAS[TORQUE]})" in reported.message
+    assert f"{TORQUE} (was 2000)" not in reported.message, "nobody should write that by hand"
     assert [entry.raw for entry in x.drive.pending_restores.entries] == [WAS[TORQUE]]
 
 
-async def test_what_the_outer_of_two_motions_put_back_is_owed_no_more(
+async def test_what_the_outer_of_two_motions_put_back_is_pending_no_more(
     x: ConnectedDrive, servo: Servo
 ) -> None:
     await motion_in_a_motion(x, servo, again=True)
@@ -122,9 +124,9 @@ async def back(bench: Bench, servo: Servo) -> None:
 async def test_it_is_named_and_put_back_by_itself(
     bench: Bench, x: ConnectedDrive, servo: Servo
 ) -> None:
-    told = await lost_in_the_middle(x, servo)
+    reported = await lost_in_the_middle(x, servo)
     for key, raw in WAS.items():
-        assert f"{key} (was {raw})" in told.message
+        assert f"{key} (was {raw})" in reported.message
     assert {entry.key: entry.raw for entry in x.drive.pending_restores.entries} == WAS
     await back(bench, servo)
     assert held(servo) == WAS
@@ -224,7 +226,7 @@ async def test_an_axis_that_does_not_stand_free_is_left_alone(
 async def test_it_is_put_back_as_soon_as_the_axis_stands_free(
     bench: Bench, x: ConnectedDrive, servo: Servo
 ) -> None:
-    """A drive that answered while it was still enabled kept what it was lent until it was lost."""
+    """A drive that answered while still enabled kept its borrowed value until it was lost."""
     await lost_in_the_middle(x, servo)
     servo.enable()
     await back(bench, servo)
@@ -251,7 +253,7 @@ async def test_another_drive_at_its_place_gets_nothing(
     assert not x.drive.pending_restores
 
 
-async def test_what_is_back_but_does_not_act_is_owed_too(
+async def test_what_is_back_but_does_not_act_is_pending_too(
     bench: Bench, x: ConnectedDrive, servo: Servo
 ) -> None:
     def lose_the_next(at: tuple[int, int], _value: int) -> None:
@@ -352,7 +354,7 @@ async def test_the_next_server_stops_what_a_killed_one_left_moving(
     await again.close()
 
 
-async def test_a_stop_that_is_owed_outlives_the_server(
+async def test_a_stop_that_is_pending_outlives_the_server(
     x: ConnectedDrive, servo: Servo, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     """The line was dead when the motion ended, and the server ended before it came back."""

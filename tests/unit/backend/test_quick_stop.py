@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from backend.axis.axis import Envelope
+from backend.axis.stop.quick_stop import STOP_S
 from backend.station.connected_drive import ConnectedDrive
-from backend.stopping.quick_stop import STOP_S
 from backend.tools.measuring.recording import Play, bus_limits, enabled, play
 from backend.tools.measuring.temporary import stopping_hard
 from drivers.cia402 import Mode

@@ -51,7 +51,7 @@ def test_blocks_are_taken_apart() -> None:
 
 
 @pytest.mark.parametrize("frame", [b"", b"x" * 60, b"SCKB" + bytes(10)])
-def test_what_is_no_block_is_told(frame: bytes) -> None:
+def test_what_is_no_block_is_reported(frame: bytes) -> None:
     with pytest.raises(ProtocolError, match="no scope block"):
         decode(frame)
 

@@ -112,11 +112,11 @@ class Player:
     def __init__(self, clock: Clock, lost: set[int]) -> None:
         self.clock, self.count, self.lost = clock, 0, lost
 
-    async def plain(self, _told: Any) -> float:
+    async def plain(self, _reported: Any) -> float:
         self.clock.work(2.5)
         return 0.0
 
-    async def notched(self, _told: Any) -> NotchEffect:
+    async def notched(self, _reported: Any) -> NotchEffect:
         self.count += 1
         self.clock.work(2.5)
         if self.count in self.lost:
@@ -131,7 +131,7 @@ async def tried(
     monkeypatch: pytest.MonkeyPatch, clock: Clock, family: str, left_s: float,
     lost: set[int] | None = None,
 ) -> tuple[int, int]:  # fmt: skip
-    """How many values of a family's notch are tried in this time, and are told to be left out."""
+    """How many values of a family's notch are tried in this time; the others are named."""
 
     @asynccontextmanager
     async def inside(*_: Any) -> AsyncIterator[None]:
@@ -255,7 +255,7 @@ async def test_an_axis_comes_home_before_anything_is_said_of_what_was_measured()
     assert done == ["home", "home"]
 
 
-async def test_what_stops_an_axis_on_its_way_home_is_told_first() -> None:
+async def test_what_stops_an_axis_on_its_way_home_is_reported_first() -> None:
     async def stopped() -> None:
         raise NotAllowed("the drive left Operation enabled")
 

@@ -202,7 +202,7 @@ def test_a_measurement_from_before_the_change_proves_nothing(facts: Facts) -> No
     assert "no loop was measured afterwards" in warned(replace(back, measured=(old,)))
 
 
-def test_what_is_not_in_order_is_told(facts: Facts) -> None:
+def test_what_is_not_in_order_is_reported(facts: Facts) -> None:
     change = replace(facts.changes[0], now="77 Hz")
     changed = replace(
         facts, changes=(change,), unsaved=("2005:03 Speed bandwidth",),

@@ -162,10 +162,10 @@ async def test_a_command_says_what_is_pending_and_stores_nothing_of_it(
     x: ConnectedDrive, left: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     restoring.recall(x.drive, "ethercat://eth0", 1)
-    told = capsys.readouterr().err
-    assert "`servodeck sweep` was cut off" in told
-    assert f"{TORQUE} (was 3000)" in told
-    assert "servodeck params restore ethercat://eth0 --station 1" in told
+    reported = capsys.readouterr().err
+    assert "`servodeck sweep` was cut off" in reported
+    assert f"{TORQUE} (was 3000)" in reported
+    assert "servodeck params restore ethercat://eth0 --station 1" in reported
     with pytest.raises(NotAllowed, match=f"would be stored: {TORQUE} .was 3000"):
         restoring.require_own_values(x.drive)
     assert list((left / "restore").iterdir())

@@ -11,7 +11,7 @@ from backend.axis.axis import Axis
 from backend.axis.remembered import AxisRecord, AxisStore
 from backend.drive.drive import Drive
 from backend.drive.ports import Port
-from backend.scales.resolve import Told, scales_of
+from backend.scales.resolve import Reported, scales_of
 from backend.scales.scale import Origin, ScaleUnknown, Uncertainty
 from backend.scales.taught import Taught
 from backend.scales.units import AxisUnits, read_units
@@ -30,10 +30,10 @@ TENTH_DEGREE = 0xFF410000
 
 
 def velocity(code: int | None, **raws: int) -> tuple[float | None, Uncertainty | None]:
-    told = {"608F:01": 65_536, "608F:02": 1} | raws
+    reported = {"608F:01": 65_536, "608F:02": 1} | raws
     if code is not None:
-        told["60A9:00"] = code
-    scale = scales_of(GENERIC, Told(told), None).velocity
+        reported["60A9:00"] = code
+    scale = scales_of(GENERIC, Reported(reported), None).velocity
     return scale.raw_per_unit, scale.uncertainty
 
 
@@ -95,8 +95,8 @@ def test_factors_that_change_nothing_are_none() -> None:
 
 
 def test_a_factor_of_the_acceleration_leaves_the_speed_certain() -> None:
-    told = {"608F:01": 65_536, "60A9:00": INC_S, "60AA:00": INC_S2, "6097:01": 1, "6097:02": 10}
-    scales = scales_of(GENERIC, Told(told), None)
+    reported = {"608F:01": 65_536, "60A9:00": INC_S, "60AA:00": INC_S2, "6097:01": 1, "6097:02": 10}
+    scales = scales_of(GENERIC, Reported(reported), None)
     assert scales.velocity.certain
     assert scales.acceleration.uncertainty is Uncertainty.FACTOR
 
@@ -114,7 +114,7 @@ def test_a_factor_of_the_acceleration_leaves_the_speed_certain() -> None:
     ],
 )
 def test_increments_of_a_revolution(raws: dict[str, int], per_rev: float) -> None:
-    scale = scales_of(GENERIC, Told(raws), None).position
+    scale = scales_of(GENERIC, Reported(raws), None).position
     assert (scale.raw_per_unit, scale.origin) == (per_rev, Origin.DRIVE)
 
 
@@ -132,17 +132,17 @@ def test_increments_of_a_revolution(raws: dict[str, int], per_rev: float) -> Non
 def test_a_resolution_that_nobody_states_is_none(
     raws: dict[str, int], uncertainty: Uncertainty
 ) -> None:
-    scale = scales_of(GENERIC, Told(raws), None).position
+    scale = scales_of(GENERIC, Reported(raws), None).position
     assert (scale.raw_per_unit, scale.uncertainty) == (None, uncertainty)
 
 
 def test_what_a_person_said_counts_while_the_drive_is_as_it_was() -> None:
     raws = {"608F:01": 1_000, "60A9:00": RPM}
     taught = Taught(counts_per_rev=10_000, raw_per_rpm=10.0, bound_to=raws)
-    scales = scales_of(GENERIC, Told(raws), taught)
+    scales = scales_of(GENERIC, Reported(raws), taught)
     assert (scales.position.raw_per_unit, scales.position.origin) == (10_000, Origin.USER)
     assert (scales.velocity.raw_per_unit, scales.velocity.origin) == (10.0, Origin.USER)
-    other = scales_of(GENERIC, Told(raws | {"608F:01": 2_000}), taught)
+    other = scales_of(GENERIC, Reported(raws | {"608F:01": 2_000}), taught)
     assert (other.position.raw_per_unit, other.position.origin) == (2_000, Origin.DRIVE)
 
 
@@ -150,14 +150,14 @@ def test_the_makers_file_counts_where_the_drive_is_silent() -> None:
     spec = GENERIC.model_copy(
         update={"velocity": "0.1 rpm", "origins": {"velocity": "makers_file"}}
     )
-    scale = scales_of(spec, Told({"608F:01": 1_000}), None).velocity
+    scale = scales_of(spec, Reported({"608F:01": 1_000}), None).velocity
     assert (scale.raw_per_unit, scale.origin) == (10.0, Origin.MAKERS_FILE)
 
 
 def test_a_profile_imported_before_origins_were_kept_is_not_taken_for_a_manual() -> None:
     old = GENERIC.model_copy(update={"origins": {}})
     assert (
-        scales_of(old, Told({"608F:01": 1_000}), None).velocity.uncertainty
+        scales_of(old, Reported({"608F:01": 1_000}), None).velocity.uncertainty
         is Uncertainty.NOT_STATED
     )
 
@@ -170,7 +170,7 @@ def test_units_of_listed_families_are_those_of_their_manual(name: str) -> None:
 
 
 def test_nothing_is_converted_by_a_scale_that_is_not_certain() -> None:
-    units = AxisUnits(GENERIC, None, scales_of(GENERIC, Told({}), None), "N axis")
+    units = AxisUnits(GENERIC, None, scales_of(GENERIC, Reported({}), None), "N axis")
     for convert in (units.position_raw, units.velocity_raw, units.acceleration_raw):
         with pytest.raises(ScaleUnknown, match="N axis: the scale of its"):
             convert(3.0)

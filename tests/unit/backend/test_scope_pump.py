@@ -28,17 +28,17 @@ class Line:
 
     def __init__(self) -> None:
         self.writes = 0
-        self.told = False
+        self.reported = False
 
     async def send(self, _frame: bytes) -> None:
-        if self.told:
+        if self.reported:
             raise WebSocketDisconnect
         self.writes += 1
         if self.writes == 3:
             asyncio.get_running_loop().call_soon(self._lost)
 
     def _lost(self) -> None:
-        self.told = True
+        self.reported = True
 
 
 async def test_nothing_more_goes_to_a_line_that_broke_while_much_was_queued(

@@ -1,4 +1,4 @@
-"""Motions typed in mm or degrees: converted once, and told about in the same unit.
+"""Motions typed in mm or degrees: converted once, and reported about in the same unit.
 
 A screw of 10 mm behind a gearbox 3:1 moves 10/3 mm per motor revolution; a table behind 2:1 turns
 180°.
@@ -124,7 +124,7 @@ async def test_refusals_name_the_unit_of_the_request(x: ConnectedDrive) -> None:
     assert "rev" not in str(refused.value)
 
 
-async def test_a_speed_above_the_envelope_is_told_in_its_unit(x: ConnectedDrive) -> None:
+async def test_a_speed_above_the_envelope_is_reported_in_its_unit(x: ConnectedDrive) -> None:
     envelope = Envelope(6.0, 180.0, 50.0, 10.0, "mm", 10 / 3)
     settings = moving.MoveSettings("PP", 1.0, envelope, speed_rpm=360.0)
     with pytest.raises(OutOfRange) as refused:
@@ -132,13 +132,13 @@ async def test_a_speed_above_the_envelope_is_told_in_its_unit(x: ConnectedDrive)
     assert "20 mm/s is above the envelope's 10 mm/s" in str(refused.value)
 
 
-async def test_a_jog_too_slow_to_count_is_told_in_its_unit(x: ConnectedDrive) -> None:
+async def test_a_jog_too_slow_to_count_is_reported_in_its_unit(x: ConnectedDrive) -> None:
     settings = jogging.JogSettings(1, 1e-4, 600.0, 5.0, 50.0, shown=DEGREES)
     with pytest.raises(OutOfRange, match=r"0\.0003 °/s is below"):
         await jogging.jog(x.axis, settings, jogging.Hold(), quiet())
 
 
-def test_an_amplitude_beyond_the_envelope_is_told_in_its_unit(x: ConnectedDrive) -> None:
+def test_an_amplitude_beyond_the_envelope_is_reported_in_its_unit(x: ConnectedDrive) -> None:
     request = GenerateRequest(
         mode="CSP", shape="step", amplitude=40, duration_s=1, speed_limit=100, unit="mm", **LIMITS
     )

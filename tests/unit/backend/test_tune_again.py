@@ -49,13 +49,13 @@ def test_what_is_off_by_more_than_the_aims_is_named() -> None:
 
 def test_words_say_what_was_predicted_first_and_what_was_verified_then() -> None:
     verified: Any = SimpleNamespace(predicted_bandwidth_hz=119.0, measured_bandwidth_hz=117.0)
-    text = Again(FIRST, SECOND, "same", gain_ratio=1.0).told(verified).words()
+    text = Again(FIRST, SECOND, "same", gain_ratio=1.0).reported(verified).words()
     assert "118 Hz where 137 Hz was predicted" in text
     assert "other realisations at 117 Hz, predicted from the loop at 119 Hz" in text
-    text = Again(FIRST, SECOND, "other", gain_ratio=0.87).told(verified).words()
+    text = Again(FIRST, SECOND, "other", gain_ratio=0.87).reported(verified).words()
     assert "with 87% of the speed gain" in text
     for outcome in ("time", "unclear", "none", "not kept"):
-        text = Again(FIRST, SECOND, outcome).told(verified).words()
+        text = Again(FIRST, SECOND, outcome).reported(verified).words()
         assert "118 Hz where 137 Hz was predicted" in text
         assert "realisations" not in text
 
@@ -64,7 +64,7 @@ async def outcome(
     monkeypatch: pytest.MonkeyPatch, *, gain: float, keeps: bool, time_left: TimeLeft,
     read: Figures = SECOND, held: dict[str, int] | None = None, ended_at: str = "",
 ) -> tuple[Applied | None, Again | None, dict[str, int], list[int]]:  # fmt: skip
-    """What stays, what is told, what the drive holds then, and which pairs were passed over."""
+    """What stays, what is reported, what the drive holds then, and which pairs were passed over."""
     held = dict(NEW) if held is None else held
     pairs = list[int]()
     first = design(10.0)
@@ -115,8 +115,8 @@ async def outcome(
         time_left=time_left,
     )  # fmt: skip
     how = Designing(PLANT, "medium", "balanced", False, 2000.0)
-    applied, told = await tune_again.again(trials, Applied(first, verified, dict(WAS)), how)
-    return applied, told, held, pairs
+    applied, reported = await tune_again.again(trials, Applied(first, verified, dict(WAS)), how)
+    return applied, reported, held, pairs
 
 
 def check_like() -> Check:
@@ -131,11 +131,11 @@ def soon(seconds: float) -> TimeLeft:
 
 
 async def test_a_prediction_that_stands_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    applied, told, held, pairs = await outcome(
+    applied, reported, held, pairs = await outcome(
         monkeypatch, gain=10.0, keeps=True, time_left=TimeLeft(), read=FIRST
     )
     assert applied is not None
-    assert told is None
+    assert reported is None
     assert held == NEW
     assert pairs == []
 
@@ -144,17 +144,17 @@ async def test_a_prediction_that_stands_is_left_alone(monkeypatch: pytest.Monkey
 async def test_the_second_verification_takes_other_realisations(
     monkeypatch: pytest.MonkeyPatch, gain: float, name: str
 ) -> None:
-    applied, told, held, pairs = await outcome(
+    applied, reported, held, pairs = await outcome(
         monkeypatch, gain=gain, keeps=True, time_left=TimeLeft()
     )
     assert applied is not None
     assert applied.candidate.gains.speed_nms == gain
     assert applied.before == WAS
-    assert told is not None
-    assert told.outcome == name
-    assert told.gain_ratio == pytest.approx(gain / 10.0)
-    assert (told.predicted, told.measured) == (FIRST, SECOND)
-    assert told.closed_db is not None
+    assert reported is not None
+    assert reported.outcome == name
+    assert reported.gain_ratio == pytest.approx(gain / 10.0)
+    assert (reported.predicted, reported.measured) == (FIRST, SECOND)
+    assert reported.closed_db is not None
     assert held == NEW
     assert pairs == [MOST_PAIRS]
 
@@ -162,14 +162,14 @@ async def test_the_second_verification_takes_other_realisations(
 async def test_another_design_that_fails_makes_way_for_the_first(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    applied, told, held, _pairs = await outcome(
+    applied, reported, held, _pairs = await outcome(
         monkeypatch, gain=8.0, keeps=False, time_left=TimeLeft()
     )
     assert applied is not None
     assert applied.candidate.gains.speed_nms == 10.0
     assert applied.before == WAS
-    assert told is not None
-    assert told.outcome == "not kept"
+    assert reported is not None
+    assert reported.outcome == "not kept"
     assert held == NEW
 
 
@@ -177,7 +177,7 @@ async def test_the_same_design_that_fails_the_second_time_does_not_stay(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Kept once and failed once is not kept: the luckier of two measurements is no proof."""
-    applied, _told, held, _pairs = await outcome(
+    applied, _reported, held, _pairs = await outcome(
         monkeypatch, gain=10.0, keeps=False, time_left=TimeLeft()
     )
     assert applied is None
@@ -200,12 +200,12 @@ async def test_ended_between_two_verifications_nothing_stays(
 async def test_it_is_seen_again_where_time_allows_a_more_careful_design_as_well(
     monkeypatch: pytest.MonkeyPatch, seconds: float, looks: int
 ) -> None:
-    applied, told, held, pairs = await outcome(
+    applied, reported, held, pairs = await outcome(
         monkeypatch, gain=10.0, keeps=True, time_left=soon(seconds)
     )
     assert applied is not None
-    assert told is not None
-    assert told.outcome == ("same" if looks else "time")
+    assert reported is not None
+    assert reported.outcome == ("same" if looks else "time")
     assert len(pairs) == looks
     assert held == NEW
 

@@ -1,4 +1,4 @@
-"""What a design without notches is told to be for, and beside which loop notches are tried."""
+"""What a design without notches is commanded to be for, and beside which loop notches are tried."""
 
 from __future__ import annotations
 
@@ -130,6 +130,6 @@ async def test_notches_are_learned_only_where_a_design_can_be_verified_after_it(
     assert [meaning.centre_hz for meaning in known][-1:] == (
         [130.0] if fits else [120.0] if before else []
     )
-    told = " ".join(str(each) for each in [said, *left.given_up])
-    assert ("designed without notches" in told) is (not fits and before is None)
-    assert ("fewer of their values" in told) is (fits or before is not None)
+    reported = " ".join(str(each) for each in [said, *left.given_up])
+    assert ("designed without notches" in reported) is (not fits and before is None)
+    assert ("fewer of their values" in reported) is (fits or before is not None)

@@ -1,4 +1,4 @@
-"""A tuning ends in its time: what cannot be verified any more is not applied, and that is told."""
+"""A tuning ends in its time: what cannot be verified any more is not applied, which is reported."""
 
 from __future__ import annotations
 
@@ -58,7 +58,9 @@ async def test_the_last_one_that_time_allows_is_the_most_careful(
     seen, left = await seen_of(monkeypatch, clock, 43.0, 9.0)
     assert seen == [10.0]
     assert clock.now_s == 1052.0
-    assert str(left.told()).startswith("3 designs were not verified, so none of them was applied")
+    assert str(left.reported()).startswith(
+        "3 designs were not verified, so none of them was applied"
+    )
     # After 44 s one more fits, and it is not the next one.
     seen, left = await seen_of(monkeypatch, clock, 35.0, 9.0)
     assert seen == [10.0, 7.0]
@@ -66,7 +68,7 @@ async def test_the_last_one_that_time_allows_is_the_most_careful(
     # After 37 s two more do.
     seen, left = await seen_of(monkeypatch, clock, 28.0, 9.0)
     assert seen == [10.0, 9.0, 7.0]
-    assert str(left.told()).startswith("one design was not verified")
+    assert str(left.reported()).startswith("one design was not verified")
 
 
 async def test_without_a_limit_all_are_verified(
@@ -77,7 +79,7 @@ async def test_without_a_limit_all_are_verified(
         monkeypatch, LOUD, soft=False, time_left=left, meanwhile=lambda: clock.work(1e4)
     )
     assert seen == [10.0, 9.0, 8.0, 7.0]
-    assert left.told() is None
+    assert left.reported() is None
 
 
 async def test_the_first_is_verified_however_late_it_is(

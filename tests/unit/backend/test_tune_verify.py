@@ -100,30 +100,30 @@ def test_a_loop_that_is_seen_above_its_crossover_only_tells_no_margins(from_hz: 
 
 
 @pytest.mark.parametrize(
-    ("predicted_hz", "measured_hz", "told"),
+    ("predicted_hz", "measured_hz", "reported"),
     [(152.0, 135.0, True), (100.0, 112.0, True), (152.0, 140.0, False), (None, 140.0, False),
      (152.0, None, False)],
 )  # fmt: skip
-def test_a_bandwidth_that_is_not_as_predicted_is_told(
-    predicted_hz: float | None, measured_hz: float | None, told: bool
+def test_a_bandwidth_that_is_not_as_predicted_is_reported(
+    predicted_hz: float | None, measured_hz: float | None, reported: bool
 ) -> None:
     """The aim is 10 % (tuning.md, section 5)."""
     verified = Verified(loop_swept(1.0), None, PROMISED, predicted_hz, measured_hz, True, None)
-    assert (otherwise(verified) is not None) is told
+    assert (otherwise(verified) is not None) is reported
 
 
 @pytest.mark.parametrize(
-    ("last_hz", "read", "told"),
+    ("last_hz", "read", "reported"),
     [(300.0, True, False), (650.0, True, True), (None, True, False), (650.0, False, False)],
 )
-def test_a_crossover_above_the_verified_lines_is_told(
-    last_hz: float | None, read: bool, told: bool
+def test_a_crossover_above_the_verified_lines_is_reported(
+    last_hz: float | None, read: bool, reported: bool
 ) -> None:
     """The lines end at 400 Hz; where no margins were read at all that is said instead."""
     margins = sharp_margins(loop_swept(1.0)) if read else {}
     swept = replace(loop_swept(1.0), margins=margins)
     words = unseen(last_hz, Verified(swept, None, PROMISED, 60.0, 60.0, True, None))
-    assert (words is not None) is told
+    assert (words is not None) is reported
     if words is not None:
         assert "650 Hz" in words.words()
         assert "400 Hz" in words.words()
@@ -169,8 +169,8 @@ async def verified_of(
         Envelope(4.0, 1500.0, 100.0, 60.0), facts, 1e-4, None, None, None,
         pairs_before=pairs_before,
     )  # fmt: skip
-    told = (Progress(lambda: None), Progress(lambda: None), Progress(lambda: None))
-    found = await verify(None, None, check, candidate, PROMISED, told, None, time_left)
+    reported = (Progress(lambda: None), Progress(lambda: None), Progress(lambda: None))
+    found = await verify(None, None, check, candidate, PROMISED, reported, None, time_left)
     return found, pairs
 
 

@@ -47,11 +47,11 @@ COMMAND = (
     ],
 )
 def test_each_is_refused_with_one_error(data: bytes) -> None:
-    with pytest.raises(BadSet) as told:
+    with pytest.raises(BadSet) as reported:
         read_list(data, load_profile("mms7"), "list.xml")
-    assert "list.xml" in told.value.message
-    assert told.value.remedy
-    assert "\n" not in told.value.message
+    assert "list.xml" in reported.value.message
+    assert reported.value.remedy
+    assert "\n" not in reported.value.message
 
 
 @pytest.mark.parametrize("cut", [0.2, 0.5, 0.9, 0.99])

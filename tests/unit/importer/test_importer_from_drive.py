@@ -14,7 +14,7 @@ from drivers.link import Address, Found
 from drivers.urls import bus_kind
 from profiles.importer import ImportFailed
 
-TOLD: list[EntryDescription | ObjectInfo] = [
+REPORTED: list[EntryDescription | ObjectInfo] = [
     ObjectInfo(0x6040, "Controlword", 6, 7, 0),
     EntryDescription(0x6040, 0, 6, 16, 0x7F, "Controlword"),
     ObjectInfo(0x6041, "Statusword", 6, 7, 0),
@@ -30,19 +30,19 @@ class FakeEthercat:
     kind = "ethercat"
     traits = bus_kind("ethercat").traits
 
-    def __init__(self, told: list[EntryDescription | ObjectInfo]) -> None:
-        self.told = told
+    def __init__(self, reported: list[EntryDescription | ObjectInfo]) -> None:
+        self.reported = reported
 
     async def enumerate(self, station: int, progress: Any) -> list[EntryDescription | ObjectInfo]:
         assert station == 4
-        return self.told
+        return self.reported
 
 
 FOUND = Found(station=4, vendor_id=0xA2B, product_code=0x190, revision=2, name="ES4")
 
 
 async def test_the_drives_list_becomes_a_profile() -> None:
-    link: Any = FakeEthercat(TOLD)
+    link: Any = FakeEthercat(REPORTED)
     imported = await profile_of_drive(link, FOUND, "my_es4", lambda *_: None)
     profile = imported.profile
     assert profile.drive == "my_es4"
@@ -53,7 +53,7 @@ async def test_the_drives_list_becomes_a_profile() -> None:
     assert profile.by_role["control_word"].pdo == "rx"
 
 
-async def test_a_drive_that_lists_nothing_is_told() -> None:
+async def test_a_drive_that_lists_nothing_is_reported() -> None:
     link: Any = FakeEthercat([])
     with pytest.raises(ImportFailed, match="lists no objects"):
         await profile_of_drive(link, FOUND, "x", lambda *_: None)
@@ -84,7 +84,7 @@ async def test_a_canopen_drive_may_carry_its_own_eds() -> None:
     assert imported.profile.by_key["2010:00"].unit == "1/s"
 
 
-async def test_plain_text_is_taken_where_no_format_is_told() -> None:
+async def test_plain_text_is_taken_where_no_format_is_reported() -> None:
     link: Any = FakeCanopen({0x1021: GOOD_EDS.encode()})
     assert (await profile_of_drive(link, FOUND, "carried", lambda *_: None)).profile.parameters
 

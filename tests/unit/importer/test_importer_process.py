@@ -41,8 +41,8 @@ def test_no_import_hides_a_family_that_servodeck_brings(folder: Path) -> None:
 
 
 def test_devices_of_a_series(folder: Path) -> None:
-    told = run(DevicesTask(GOOD_ESI.encode(), "good.xml"))
-    assert 0x191 in {device["product_code"] for device in told["devices"]}
+    reported = run(DevicesTask(GOOD_ESI.encode(), "good.xml"))
+    assert 0x191 in {device["product_code"] for device in reported["devices"]}
     assert run(DevicesTask(GOOD_EDS.encode(), "a.eds")) == {"devices": []}
 
 

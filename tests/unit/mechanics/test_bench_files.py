@@ -58,7 +58,7 @@ def test_two_axes_of_one_name_would_be_one_machine(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ['axis = "X"', "axis = [1]", "", "[[axis]]", "\x00", '{"axis"'])
-def test_what_is_no_bench_is_told_in_words(tmp_path: Path, text: str) -> None:
+def test_what_is_no_bench_is_reported_in_words(tmp_path: Path, text: str) -> None:
     assert str(tmp_path / "bench.toml") in refused(tmp_path, text)
 
 

@@ -9,8 +9,8 @@ import numpy.typing as npt
 import pytest
 
 from backend.scales.compare import disagreement_of, measured_scale
+from drivers.feedback import Disagreement, FeedbackScale
 from drivers.halt import HaltCause
-from drivers.motion.feedback import Disagreement, FeedbackScale
 
 COUNTS, CYCLE_S = 65_536, 1e-3
 RPM = COUNTS / 60.0
@@ -27,7 +27,7 @@ def places(rpm: float, hz: float, rest_s: float = 0.2) -> FloatArray:
 
 
 def speeds(position: FloatArray, late: int = 0, mean: int = 1) -> FloatArray:
-    """Mean speed over the cycles before each sample, told ``late`` cycles later."""
+    """Mean speed over the cycles before each sample, reported ``late`` cycles later."""
     padded = np.concatenate([np.full(late + mean, position[0]), position])
     before = padded[: len(position)]
     return np.asarray((padded[mean : mean + len(position)] - before) / (mean * CYCLE_S))

@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 import pytest
 
+from drivers.feedback import Disagreement, FeedbackScale
 from drivers.halt import HaltCause, Halted
-from drivers.motion.feedback import Disagreement, FeedbackScale
 from drivers.motion.guard import SpeedGuard
 
 COUNTS, CYCLE_S = 10_000, 1e-3

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.recording import capture
 from backend.recording.bundle import build_apart
 from backend.recording.bundle_page import PLOT_HEIGHT, curve
 from backend.recording.evidence import Evidence, Value
 from backend.recording.reader import RecordingReader
-from backend.recording.recorder import Trigger, fires
+from backend.station.recording import capture
+from backend.station.recording.recorder import Trigger, fires
 from backend.work.journal import Entry, Journal
 from tests.unit.recording.support import block, header
 
@@ -172,5 +172,5 @@ def test_what_a_full_disk_does_not_take_is_held_until_it_does(
         assert armed.names() == ["2023-11-14 22-13-20 X 0x3210.zip"], "the first cause"
 
     asyncio.run(play())
-    told = [entry.text for entry in journal.entries()]
-    assert sum("no support bundle" in text for text in told) == 2
+    reported = [entry.text for entry in journal.entries()]
+    assert sum("no support bundle" in text for text in reported) == 2

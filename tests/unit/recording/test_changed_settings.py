@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-from backend.recording.changed_settings import ChangedSettings
+from backend.station.recording.changed_settings import ChangedSettings
 
 GAIN, SPEED, TARGET, MODE = "2002:01", "606C:00", "607A:00", "6060:00"
 _PARAMETERS = {

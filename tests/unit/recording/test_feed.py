@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from backend.recording.rerun_feed import MAGIC, MAX_CLIENT_BYTES, FeedClient
+from backend.station.recording.rerun_feed import MAGIC, MAX_CLIENT_BYTES, FeedClient
 
 
 def parse(frame: bytes) -> tuple[int, int, list[bytes]]:
@@ -36,7 +36,7 @@ async def test_nothing_new_is_an_empty_frame() -> None:
     assert parse(await client.pull(timeout_s=0.01)) == (1, 0, [])
 
 
-async def test_a_sleeping_page_costs_bounded_memory_and_the_loss_is_told() -> None:
+async def test_a_sleeping_page_costs_bounded_memory_and_the_loss_is_reported() -> None:
     client = FeedClient()
     client.begin(1, b"names")
     for n in range(100):
@@ -47,7 +47,7 @@ async def test_a_sleeping_page_costs_bounded_memory_and_the_loss_is_told() -> No
     assert [blob[0] for blob in blobs[1:]] == list(range(84, 100)), "the newest are kept"
     assert dropped == 84
     client.put(b"z")
-    assert parse(await client.pull()) == (1, 0, [b"z"]), "told once"
+    assert parse(await client.pull()) == (1, 0, [b"z"]), "reported once"
 
 
 async def test_a_new_session_leaves_the_old_behind() -> None:

@@ -156,7 +156,7 @@ def test_a_watch_that_is_ended_says_that_nobody_saw_the_axis_stand() -> None:
     run_simulated(main)
 
 
-def test_a_standing_axis_is_told_at_once() -> None:
+def test_a_standing_axis_is_reported_at_once() -> None:
     async def main() -> None:
         async with rig("mms7") as bench:
             await asyncio.sleep(0.3)

@@ -22,11 +22,13 @@ def watch(units: AxisUnits | None = UNITS) -> SpeedWatch:
     return SpeedWatch(axis, units)
 
 
-def feed(found: SpeedWatch, rpm: float, told: int | None, seconds: float = 0.4) -> None:
+def feed(found: SpeedWatch, rpm: float, reported: int | None, seconds: float = 0.4) -> None:
     for n in range(round(seconds / 0.02) + 1):
         at = 100.0 + n * 0.02
         position = round(rpm / 60.0 * n * 0.02 * COUNTS) + 2**31 - 500
-        found.take(Sample(at, State.QUICK_STOP_ACTIVE, position - 2**32 * (position > 2**31), told))
+        found.take(
+            Sample(at, State.QUICK_STOP_ACTIVE, position - 2**32 * (position > 2**31), reported)
+        )
 
 
 def test_it_stands_where_both_say_so() -> None:
@@ -66,7 +68,7 @@ def test_the_position_may_begin_anew() -> None:
 
 
 def turned(monkeypatch: pytest.MonkeyPatch, allowed: bool, state: State, rpm: float) -> Any:
-    """What is told within one second of polls 50 ms apart."""
+    """What is reported within one second of polls 50 ms apart."""
     now = [10.0]
     monkeypatch.setattr("time.monotonic", lambda: now[0])
     found = TurnWatch(lambda: allowed)
@@ -78,7 +80,7 @@ def turned(monkeypatch: pytest.MonkeyPatch, allowed: bool, state: State, rpm: fl
     return last
 
 
-def test_an_enabled_axis_that_turns_without_a_grant_is_told(
+def test_an_enabled_axis_that_turns_without_a_grant_is_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     found = turned(monkeypatch, False, State.OPERATION_ENABLED, 120.0)
@@ -87,7 +89,7 @@ def test_an_enabled_axis_that_turns_without_a_grant_is_told(
     assert found.speed == pytest.approx(120.0, rel=0.1)
 
 
-def test_a_shaft_that_is_turned_without_power_is_told_apart(
+def test_a_shaft_that_is_turned_without_power_is_distinguished(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     found = turned(monkeypatch, False, State.SWITCH_ON_DISABLED, 60.0)
@@ -95,9 +97,9 @@ def test_a_shaft_that_is_turned_without_power_is_told_apart(
     assert found.kind is TurnKind.DISABLED
 
 
-def test_a_permitted_motion_is_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_permitted_motion_is_not_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     assert turned(monkeypatch, True, State.OPERATION_ENABLED, 600.0) is None
 
 
-def test_a_shaft_that_trembles_is_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_shaft_that_trembles_is_not_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     assert turned(monkeypatch, False, State.OPERATION_ENABLED, 3.0) is None

@@ -56,8 +56,8 @@ def test_a_filter_of_a_millisecond_reaches_63_percent_in_it(option: str) -> None
     axis = axis_of(holds_torque=True, **{option: 1e-3})
     axis.set_cyclic(0.0, 0.0, 0.1, 20)
     # 1 ms beside a current loop of 1 kHz (0.16 ms) and the step that computes it.
-    told = reported(axis, 60)
-    reached = np.flatnonzero(told >= 0.0632)[0] * 50e-6
+    shown = reported(axis, 60)
+    reached = np.flatnonzero(shown >= 0.0632)[0] * 50e-6
     assert reached == pytest.approx(1.16e-3, abs=0.1e-3)
     slow = float(axis.s[k.S_TORQUE]) < 0.098
     assert slow is (option == "torque_filter_s")
@@ -91,14 +91,14 @@ def test_friction_that_begins_as_a_spring_holds_and_yields() -> None:
 def test_a_dip_takes_its_share_of_the_torque() -> None:
     axis = axis_of(holds_torque=True, dip_share=0.5, dip_s=0.01, dip_every_s=0.02)
     axis.set_cyclic(0.0, 0.0, 0.1, 20)
-    told = reported(axis, 800)
-    assert np.min(told[400:]) == pytest.approx(0.05, rel=0.02)
-    assert np.max(told[400:]) == pytest.approx(0.1, rel=0.02)
+    shown = reported(axis, 800)
+    assert np.min(shown[400:]) == pytest.approx(0.05, rel=0.02)
+    assert np.max(shown[400:]) == pytest.approx(0.1, rel=0.02)
 
 
 def test_a_longer_loop_period_changes_the_torque_once_in_it() -> None:
     axis = axis_of(loop_period_s=250e-6, reported="demand")
     axis.set_cyclic(0.0, 0.0, 0.1, 20)
-    told = reported(axis, 30)
-    changes = np.flatnonzero(np.diff(told)) + 1
+    shown = reported(axis, 30)
+    changes = np.flatnonzero(np.diff(shown)) + 1
     assert np.all(np.diff(changes) == 5)

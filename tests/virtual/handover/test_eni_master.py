@@ -142,10 +142,10 @@ def test_the_segment_comes_up_over_a_real_wire(tmp_path: Path) -> None:
         assert {tuple(each) for each in seen["wkc"]} == {(6, 6), (2, 2)}
         for slave, axis in enumerate(axes):
             for write in axis.writes[::7]:
-                told = segment.command(
+                reported = segment.command(
                     "read", slave=slave, index=write.index, subindex=write.subindex
                 )
-                assert bytes.fromhex(str(told)) == write.data, write.key
+                assert bytes.fromhex(str(reported)) == write.data, write.key
     finally:
         if segment is not None:
             segment.close()

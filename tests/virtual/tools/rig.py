@@ -92,9 +92,9 @@ class At:
     progress: Progress = field(init=False)
 
     def __post_init__(self) -> None:
-        self.progress = Progress(self._told)
+        self.progress = Progress(self._reported)
 
-    def _told(self) -> None:
+    def _reported(self) -> None:
         here = self.step in self.progress.step and self.progress.fraction >= self.fraction
         if here and not self.done:
             self.done = True

@@ -142,7 +142,7 @@ WORDS = {"inertia": "2 of 6", "sweep": "3 of 6", "notches": "trying", "verify": 
 async def struck(
     drive: str, spec: MechanicsSpec, part: str, number: int, kind: str, known: Known | None = None
 ) -> str:
-    """Strike, and hold what comes of it against what must be; the reason that was told.
+    """Strike, and hold what comes of it against what must be; the reason that was reported.
 
     Empty where the part has fewer motions than ``number``.
     """
@@ -162,32 +162,32 @@ async def struck(
         }
         strike = Strike(b, WORDS[part], number, acts[kind])
         task = asyncio.create_task(_object(work(b, part, known, strike.progress)))
-        told = ""
+        reported = ""
         try:
             await task
         except DriveError as error:
-            told = error.message
-            assert f"{b.axis.drive.name}:" in told, told
+            reported = error.message
+            assert f"{b.axis.drive.name}:" in reported, reported
         except asyncio.CancelledError:
-            told = "cancelled"
+            reported = "cancelled"
         if strike.done_at is None:
-            assert not told, f"ended before the trouble came: {told}"
+            assert not reported, f"ended before the trouble came: {reported}"
             return ""
-        assert told, f"went on after {kind} in {strike.step}"
-        assert (told == "cancelled") == (kind == "cancelled"), told
+        assert reported, f"went on after {kind} in {strike.step}"
+        assert (reported == "cancelled") == (kind == "cancelled"), reported
         took_s = time.monotonic() - strike.done_at
-        assert took_s < BOUND_S, f"{took_s:.0f} s until: {told}"
-        await _calm(b, before, told, gone=kind in ("cable", "control power"))
-        return f"{strike.step}: {told}"
+        assert took_s < BOUND_S, f"{took_s:.0f} s until: {reported}"
+        await _calm(b, before, reported, gone=kind in ("cable", "control power"))
+        return f"{strike.step}: {reported}"
 
 
 async def _object(doing: Awaitable[object]) -> object:
     return await doing
 
 
-async def _calm(b: DirectBench, before: dict[str, object], told: str, *, gone: bool) -> None:
-    """Nothing moves, nothing is enabled, and every setting is as before or owed, told, and back."""
-    axis, owed = b.axis, {entry.key for entry in b.axis.drive.pending_restores.entries}
+async def _calm(b: DirectBench, before: dict[str, object], reported: str, *, gone: bool) -> None:
+    """Nothing moves or is enabled; every setting is as before, or pending and restored."""
+    axis, pending = b.axis, {entry.key for entry in b.axis.drive.pending_restores.entries}
     b.link.cut = False
     b.link.pass_s(OFF_S + 3.0)
     if axis.stop_pending:
@@ -197,11 +197,11 @@ async def _calm(b: DirectBench, before: dict[str, object], told: str, *, gone: b
     units, stood = await axis.units(), await axis.position_raw()
     after = await settings_of(axis.drive)
     changed = {key for key in before if before[key] != after[key]}
-    assert changed <= owed, {key: (before[key], after[key]) for key in changed - owed}
+    assert changed <= pending, {key: (before[key], after[key]) for key in changed - pending}
     if not gone:
         assert not changed, changed
     for key in changed:
-        assert f"{key} (was {before[key]})" in told, (key, told)
+        assert f"{key} (was {before[key]})" in reported, (key, reported)
     if gone:
         found = await settle(axis, asked=False)
         assert found["left"] == {}, found
@@ -221,12 +221,12 @@ async def _campaign(options: argparse.Namespace) -> None:
             for kind in options.kind:
                 for number in range(1, options.most + 1):
                     try:
-                        told = await struck(drive, spec, part, number, kind, known)
+                        reported = await struck(drive, spec, part, number, kind, known)
                     except AssertionError as wrong:
-                        told = f"WRONG: {wrong}"
-                    if not told:
+                        reported = f"WRONG: {wrong}"
+                    if not reported:
                         break
-                    print(f"{drive:5} {part:8} {number:2} {kind:13} {told}", flush=True)
+                    print(f"{drive:5} {part:8} {number:2} {kind:13} {reported}", flush=True)
 
 
 if __name__ == "__main__":

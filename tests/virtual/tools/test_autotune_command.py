@@ -68,17 +68,17 @@ def test_a_kept_design_is_verified_and_in_force(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     alone, file = Alone(monkeypatch), tmp_path / "tuned.json"
-    code, told = run(URL, "--keep", "--mark", "robust", "--out", str(file))
-    assert code == 0, told
+    code, reported = run(URL, "--keep", "--mark", "robust", "--out", str(file))
+    assert code == 0, reported
     answer = json.loads(file.read_text())
     for mark in ("robust", "balanced", "fast"):
-        assert re.search(rf"^\S*{mark}\S* .* Hz .* Hz", told, re.MULTILINE), told
-    shown = re.search(r"^bandwidth +([\d.]+) +([\d.]+) Hz$", told, re.MULTILINE)
-    assert shown, told
+        assert re.search(rf"^\S*{mark}\S* .* Hz .* Hz", reported, re.MULTILINE), reported
+    shown = re.search(r"^bandwidth +([\d.]+) +([\d.]+) Hz$", reported, re.MULTILINE)
+    assert shown, reported
     verified = answer["verified"]
     assert float(shown[1]) == pytest.approx(verified["predicted_bandwidth_hz"], abs=0.01)
     assert float(shown[2]) == pytest.approx(verified["measured_bandwidth_hz"], abs=0.01)
-    assert "they are not stored in the drive yet" in told
+    assert "they are not stored in the drive yet" in reported
     assert alone.after != alone.before
     assert {key: answer["before"][key] for key in GAINS} == alone.before
     assert alone.state is not State.OPERATION_ENABLED
@@ -103,9 +103,9 @@ def test_ctrl_c_and_a_termination_leave_everything_as_it_was(
         return shown
 
     monkeypatch.setattr(tune, "progress", ending)
-    code, told = run(URL, "--apply")
+    code, reported = run(URL, "--apply")
     assert code == 130
-    assert "as before" in told
+    assert "as before" in reported
     assert alone.after == alone.before
     assert alone.state is not State.OPERATION_ENABLED
     assert signal.getsignal(signal.SIGTERM) == before
@@ -160,21 +160,23 @@ def test_by_a_server_a_design_is_taken_back_or_kept(
     monkeypatch.setattr(tool, "as_json", as_json)
     monkeypatch.setattr(tune, "remote", remote)
     how = "--keep" if keep else "--apply"
-    code, told = run(
+    code, reported = run(
         "--server", "http://test", "--axis", "Spindle", how, "--mark", "fast", "--load", "stiff",
         "--travel-rev", "2", "--torque-percent", "50",
     )  # fmt: skip
-    assert code == 0, told
+    assert code == 0, reported
     (settings,) = asked
     assert (settings.mark, settings.load, settings.apply) == ("fast", "stiff", True)
     assert (settings.envelope.travel_rev, settings.envelope.torque_percent) == (2.0, 50.0)
-    assert re.search(r"^balanced +220\.0 Hz +92\.0 Hz .*156 Hz$", told, re.MULTILINE), told
-    assert re.search(r"^phase margin, at least +48\.00 +56\.60 °$", told, re.MULTILINE), told
-    assert re.search(r"^gain margin, at least +9\.00 +– dB$", told, re.MULTILINE), told
-    assert "not kept: 300 Hz: too fast" in told
+    assert re.search(r"^balanced +220\.0 Hz +92\.0 Hz .*156 Hz$", reported, re.MULTILINE), reported
+    assert re.search(r"^phase margin, at least +48\.00 +56\.60 °$", reported, re.MULTILINE), (
+        reported
+    )
+    assert re.search(r"^gain margin, at least +9\.00 +– dB$", reported, re.MULTILINE), reported
+    assert "not kept: 300 Hz: too fast" in reported
     assert seen["meanwhile"] != seen["before"]
     assert seen["after"] == seen["meanwhile" if keep else "before"]
-    assert ("taken back: all parameters are as before" in told) is not keep
+    assert ("taken back: all parameters are as before" in reported) is not keep
 
 
 def test_a_drive_that_the_server_does_not_have(
@@ -188,9 +190,9 @@ def test_a_drive_that_the_server_does_not_have(
             yield Remote(address, http)
 
     monkeypatch.setattr(tune, "remote", remote)
-    code, told = run("--server", "http://test", "--axis", "Table")
+    code, reported = run("--server", "http://test", "--axis", "Table")
     assert code == 1
-    assert "http://test has no drive 'Table'" in told
+    assert "http://test has no drive 'Table'" in reported
 
 
 @pytest.mark.parametrize(

@@ -90,10 +90,10 @@ async def test_after_a_design_that_was_stopped(monkeypatch: pytest.MonkeyPatch) 
         monkeypatch.setattr(tune_verify.sweep_tool, "sweep", away.part)
         facts, home = await read_facts(b.axis), await b.axis.position_raw()
         check = tune_verify.Check(WIDE, facts, 1.5e-4, None, None, None, 0.03, home)
-        told, none = (silent(), silent(), silent()), cast(Any, None)
+        reported, none = (silent(), silent(), silent()), cast(Any, None)
         for ended in (NotAllowed, Ended):
             with pytest.raises(ended):
-                await tune_verify.verify(b.axis, b.session, check, none, none, told, None)
+                await tune_verify.verify(b.axis, b.session, check, none, none, reported, None)
         assert away.begun_rev[1] == pytest.approx(away.begun_rev[0], abs=0.05)
 
 

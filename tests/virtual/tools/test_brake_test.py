@@ -141,7 +141,7 @@ async def test_the_shaft_itself_after_the_limit_was_passed() -> None:
 
 
 async def test_an_open_brake_moves_by_the_preload_alone() -> None:
-    """Its output is another one than the drive was told: it follows the power stage."""
+    """Its output is another one than the drive was reported: it follows the power stage."""
     spec = braked(2.0 * RATED_NM)
     spec = spec.model_copy(
         update={"motor": spec.motor.model_copy(update={"brake_output": False})}

@@ -212,7 +212,7 @@ async def test_any_drive_with_cyclic_modes_is_measured_over_sync() -> None:
         assert part.phase_deg < 2.0
 
 
-async def test_a_cycle_is_told_to_a_drive_that_interpolates_and_put_back() -> None:
+async def test_a_cycle_is_commanded_to_a_drive_that_interpolates_and_put_back() -> None:
     async with can_bench(ONE_RESONANCE, 0.002, drive="generic402", pace=20.0) as bench:
         period = [await bench.axis.drive.raw(f"60C2:0{n}") for n in (1, 2)]
         assert period == [2, -3]

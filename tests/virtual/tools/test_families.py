@@ -146,6 +146,6 @@ async def test_a_load_that_pulls_by_its_place_is_no_inertia(drive: str, place: P
     assert found.beside.place_nm > 0.02
     assert answer.place_nm == found.beside.place_nm
     assert answer.fan_nm is None
-    told = lines_of(INERTIA, answer)
-    assert any("Position-dependent torque" in line for line in told)
-    assert not any("fan, pump" in line for line in told)
+    reported = lines_of(INERTIA, answer)
+    assert any("Position-dependent torque" in line for line in reported)
+    assert not any("fan, pump" in line for line in reported)

@@ -48,7 +48,7 @@ async def measured(b: DirectBench, how: str) -> None:
 
 
 #: How each way out ends for who measures; a fault must not pass for a measurement that went well.
-TOLD = {
+REPORTED = {
     "ended": contextlib.nullcontext(),
     "cancelled": pytest.raises(asyncio.CancelledError),
     "faulted": pytest.raises(NotAllowed, match=r"has a fault at the end of its motion \("),
@@ -56,11 +56,11 @@ TOLD = {
 
 
 @drives
-@pytest.mark.parametrize("how", TOLD)
+@pytest.mark.parametrize("how", REPORTED)
 async def test_the_mode_is_as_before(drive: str, how: str) -> None:
     async with direct(ONE, drive=drive) as b:
         await set_mode(b.axis, Mode.HM)
-        with TOLD[how]:
+        with REPORTED[how]:
             await measured(b, how)
         assert await b.axis.state() is (
             State.FAULT if how == "faulted" else State.SWITCH_ON_DISABLED
@@ -70,7 +70,7 @@ async def test_the_mode_is_as_before(drive: str, how: str) -> None:
 
 
 @drives
-async def test_the_mode_of_a_lost_drive_is_owed_to_it(drive: str) -> None:
+async def test_the_mode_of_a_lost_drive_is_pending_to_it(drive: str) -> None:
     async with direct(ONE, drive=drive) as b:
         await set_mode(b.axis, Mode.HM)
         with pytest.raises(RestoreFailed, match=r"6060:00 \(was 6\)"):

@@ -120,8 +120,8 @@ def test_from_a_measurement_to_a_change(axis: Axis, tmp_path: Path) -> None:
         (late,) = json.loads(run("trend", *place, "--json", "--since", "2100-01-01"))
         assert not late["runs"]
     with speaking("zh"):
-        told = run("compare", "--config", str(tmp_path), code=3)
-    assert "联轴器" in told
+        reported = run("compare", "--config", str(tmp_path), code=3)
+    assert "联轴器" in reported
 
 
 def test_what_is_not_there_says_so(axis: Axis, tmp_path: Path) -> None:

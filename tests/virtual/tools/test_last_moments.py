@@ -37,7 +37,9 @@ TOOLS: dict[str, tuple[str, Callable[[DirectBench, Progress], Awaitable[object]]
     ("drive", "tool", "trouble"),
     [("mms7", "inertia", "tripped"), ("r6l", "step", "tripped"), ("ep3e", "step", "stopped")],
 )
-async def test_trouble_after_the_last_sample_is_told(drive: str, tool: str, trouble: str) -> None:
+async def test_trouble_after_the_last_sample_is_reported(
+    drive: str, tool: str, trouble: str
+) -> None:
     """It was measured to its end, and the drive was out before it was disabled."""
     async with direct(ONE, drive=drive) as b:
         before = await settings_of(b.axis.drive)
@@ -107,7 +109,7 @@ async def test_a_load_that_the_drive_cannot_hold_is_not_measured() -> None:
             return await read_many(station, addresses)
 
         b.link.read_many = pulled  # type: ignore[method-assign]
-        with pytest.raises(Interrupted, match=r"turns with .* to hold it") as told:
+        with pytest.raises(Interrupted, match=r"turns with .* to hold it") as reported:
             await sweep(b.axis, b.session, SweepSettings(WIDE), Progress(lambda: None))
-        assert "torque limits" in (told.value.remedy or "")
+        assert "torque limits" in (reported.value.remedy or "")
         assert await b.axis.state() is not State.OPERATION_ENABLED

@@ -97,9 +97,9 @@ async def test_the_response_changes_as_predicted(drive: str, still: bool) -> Non
     assert np.count_nonzero(use) > 25
     assert np.max(f[use]) > 100
     db, deg = 20 * np.log10(np.abs(error[use])), np.degrees(np.angle(error[use]))
-    told = f"{np.median(np.abs(db)):.2f} dB {np.median(np.abs(deg)):.2f} deg"
-    assert np.percentile(np.abs(db), 90) < 1.0, told
-    assert np.percentile(np.abs(deg), 90) < 5.0, told
+    reported = f"{np.median(np.abs(db)):.2f} dB {np.median(np.abs(deg)):.2f} deg"
+    assert np.percentile(np.abs(db), 90) < 1.0, reported
+    assert np.percentile(np.abs(deg), 90) < 5.0, reported
     # What is read back is what was asked, as near as the encoding allows.
     assert [s.enabled for s in shown] == [True, True] + [False] * (len(shown) - 2)
     for slot, asked in zip(shown, wanted, strict=False):

@@ -59,11 +59,11 @@ async def test_a_held_axis_learns_its_notches_and_stays_held(
         monkeypatch.setattr(b.link, "drive_to", noted)
 
         # Cancelled while the first notch is in force and the axis moves.
-        def told() -> None:
+        def reported() -> None:
             if "trying notch 1" in progress.step and progress.fraction > 0.15:
                 task.cancel()
 
-        progress = Progress(told)
+        progress = Progress(reported)
         task = asyncio.create_task(learned(b, found, progress))
         with pytest.raises(asyncio.CancelledError):
             await task

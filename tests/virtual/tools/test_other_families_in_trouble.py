@@ -110,16 +110,16 @@ async def test_everything_is_as_before(drive: str, tool: str, step: str, trouble
 
 
 @midways
-async def test_what_a_lost_drive_is_owed_comes_back_by_itself(
+async def test_what_a_lost_drive_is_pending_comes_back_by_itself(
     drive: str, tool: str, step: str
 ) -> None:
     async with under(drive) as b:
         before = await settings_of(b.axis.drive, MODE)
         at = At(step, b.pull)
-        with pytest.raises(DriveError) as told:
+        with pytest.raises(DriveError) as reported:
             await b.measure(tool, at.progress)
         assert at.done
-        owed = {entry.key for entry in b.axis.drive.pending_restores.entries}
+        pending = {entry.key for entry in b.axis.drive.pending_restores.entries}
         b.line.cut = False
         # A free axis coasts for a while.
         b.line.pass_s(3.0)
@@ -130,9 +130,9 @@ async def test_what_a_lost_drive_is_owed_comes_back_by_itself(
         assert await b.axis.state() is not State.OPERATION_ENABLED
         after = await settings_of(b.axis.drive, MODE)
         changed = {key for key in before if before[key] != after[key]}
-        assert changed <= owed
+        assert changed <= pending
         for key in changed:
-            assert f"{key} (was {before[key]})" in told.value.message
+            assert f"{key} (was {before[key]})" in reported.value.message
         found = await settle(b.axis, asked=False)
         assert found["left"] == {}
         assert await settings_of(b.axis.drive, MODE) == before

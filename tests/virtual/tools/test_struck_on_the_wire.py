@@ -101,13 +101,13 @@ async def test_over_ethercat(
     known = await measured(drive, SPEC, tune=part == "verify") if late else None
     async with bench(namespace, SPEC, drive=drive) as b:
         acts = {"power": ("power_off", "power_on"), "cable": ("cut", "heal")}[kind]
-        told = {"cable": 0} if kind == "cable" else {"slave": 0}
+        reported = {"cable": 0} if kind == "cable" else {"slave": 0}
 
         def strike() -> None:
-            b.segment.command(acts[0], **told)
+            b.segment.command(acts[0], **reported)
 
         def mend() -> None:
-            b.segment.command(acts[1], **({} if kind == "cable" else told))
+            b.segment.command(acts[1], **({} if kind == "cable" else reported))
 
         await struck(b, lambda p: work(b, part, known, p), step, fraction, strike, mend)
 

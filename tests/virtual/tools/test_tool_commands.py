@@ -22,7 +22,7 @@ from typer.testing import CliRunner
 from backend import cli
 from backend.analysis.mechanics.inertia import InertiaResult, Interval
 from backend.api.app import make_app
-from backend.api.audit.audited import TOLD_THERE
+from backend.api.audit.audited import REPORTED_THERE
 from backend.api.security.rights import ROUTES
 from backend.axis.axis import Axis
 from backend.commands import measure, report
@@ -119,7 +119,7 @@ def test_ctrl_c_ends_with_130(monkeypatch: pytest.MonkeyPatch, number: signal.Si
 
     async def interrupted(*_: object) -> object:
         try:
-            # The command is told first that its job has begun.
+            # The command is reported first that its job has begun.
             await asyncio.sleep(1.0)
             signal.raise_signal(number)
             await asyncio.sleep(3600.0)
@@ -157,7 +157,7 @@ def test_wrong_words(words: list[str], code: int, said: str) -> None:
 @pytest.mark.parametrize("tool", TOOLS, ids=lambda tool: tool.kind)
 def test_everything_around_a_tool_is_there(tool: AnyTool) -> None:
     path = f"POST /api/v1/drives/{{drive_id}}/jobs/{tool.kind}"
-    assert path in TOLD_THERE
+    assert path in REPORTED_THERE
     assert ROUTES[path].right is tool.right
     assert tool.kind in cli.COMMANDS
     own = set(tool.settings.model_fields) - set(inspect.getmro(tool.settings)[1].model_fields)  # type: ignore[attr-defined]

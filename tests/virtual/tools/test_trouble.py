@@ -68,7 +68,7 @@ async def test_a_fault_in_the_middle(namespace: Namespace) -> None:
 
 
 async def test_the_cable_is_pulled_and_put_back(namespace: Namespace) -> None:
-    """What the drive is owed, its mode above all, comes back over the healed segment."""
+    """What the drive is pending, its mode above all, comes back over the healed segment."""
     async with bench(namespace, ONE) as b:
         before = await settings_of(b.axis.drive, MODE)
         progress, there = spy(lambda p: "measuring" in p.step and p.fraction > 0.15)

@@ -81,12 +81,12 @@ async def test_what_the_loop_shows_is_predicted_and_verified_by_other_data() -> 
     assert isinstance(margin, float)
     assert expected.phase_margin_deg is not None
     assert abs(margin - expected.phase_margin_deg) < 6.0
-    # It is told, with the result and with the measurement.
+    # It is reported, with the result and with the measurement.
     (note,) = (note for note in result.notes if note.code == "autotune.answers-otherwise")
     assert note in verified.sweep.warnings
-    told: Any = tuned_json(result)
-    assert told["again"]["predicted"]["bandwidth_hz"] == again.predicted.bandwidth_hz
-    assert len(told["again"]["closed_db"]) == len(told["again"]["frequency_hz"])
+    reported: Any = tuned_json(result)
+    assert reported["again"]["predicted"]["bandwidth_hz"] == again.predicted.bandwidth_hz
+    assert len(reported["again"]["closed_db"]) == len(reported["again"]["frequency_hz"])
 
 
 @pytest.mark.parametrize("step", ["4 of 6: designing for", "6 of 6: measuring"])

@@ -95,7 +95,7 @@ async def unharmed(
 
 
 @families
-async def test_a_wrong_sign_is_told(family: Family) -> None:
+async def test_a_wrong_sign_is_reported(family: Family) -> None:
     async with unharmed(ONE, family, settings={"607E:00": family.polarity}) as b:
         with pytest.raises(NotAllowed, match=r"against its torque|sign"):
             await sweep(b.axis, b.session, SweepSettings(WIDE), silent())
@@ -114,7 +114,7 @@ async def test_a_torque_limit_of_the_drive_is_kept(family: Family) -> None:
 
 
 @families
-async def test_a_torque_that_the_drive_cuts_is_told(
+async def test_a_torque_that_the_drive_cuts_is_reported(
     family: Family, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # A tenth, by a limit that the profile does not name.
@@ -182,12 +182,12 @@ async def test_a_first_move_grows_within_the_envelope(family: Family) -> None:
     async with unharmed(mechanics(coulomb=0.9), family) as b:
         units = await b.axis.units()
         begun = await b.axis.position_raw()
-        with pytest.raises(NotAllowed) as told:
+        with pytest.raises(NotAllowed) as reported:
             await inertia(b.axis, b.session, InertiaSettings(tight), silent())
-        said = f"{told.value.message} {told.value.remedy}"
+        said = f"{reported.value.message} {reported.value.remedy}"
         assert re.search(
             r"moves only [\d.e-]+ of 0\.12 rev|takes more torque than is permitted",
-            told.value.message,
+            reported.value.message,
         )
         assert "brake" in said
         assert "blocked" in said
@@ -198,7 +198,7 @@ async def test_a_first_move_grows_within_the_envelope(family: Family) -> None:
 
 
 @families
-async def test_a_closed_brake_is_told_from_an_axis(family: Family) -> None:
+async def test_a_closed_brake_is_distinguished_from_an_axis(family: Family) -> None:
     async with unharmed(ONE, family) as b:
         b.link.device.inject("coulomb_nm", 5.0)
         for work in (
@@ -206,9 +206,9 @@ async def test_a_closed_brake_is_told_from_an_axis(family: Family) -> None:
             inertia(b.axis, b.session, InertiaSettings(WIDE), silent()),
             autotune(b.axis, b.session, family.autotune(), silent()),
         ):
-            with pytest.raises(DriveError) as told:
+            with pytest.raises(DriveError) as reported:
                 await work
-            assert "brake" in (told.value.remedy or "")
+            assert "brake" in (reported.value.remedy or "")
 
 
 @families
@@ -301,10 +301,10 @@ async def test_a_link_that_is_lost_while_it_is_measured(
             "autotune": lambda: autotune(b.axis, b.session, family.autotune(), at.progress),
             "verification": lambda: apply(b, family, at.progress),
         }
-        with pytest.raises(DriveError) as told:
+        with pytest.raises(DriveError) as reported:
             await works[tool]()
         assert at.done
-        owed = {entry.key for entry in b.axis.drive.pending_restores.entries}
+        pending = {entry.key for entry in b.axis.drive.pending_restores.entries}
         b.link.cut = False
         # Disabled in the middle of a motion it coasts for a while.
         b.link.pass_s(3.0)
@@ -312,11 +312,11 @@ async def test_a_link_that_is_lost_while_it_is_measured(
         # Nothing but what the list holds is other than before; reading it takes the rest off it.
         after = await dump(b)
         changed = {key for key in before if before[key] != after[key]}
-        assert changed <= owed
+        assert changed <= pending
         for key in changed:
-            assert f"{key} (was {before[key]})" in told.value.message
+            assert f"{key} (was {before[key]})" in reported.value.message
         if not changed:
-            assert isinstance(told.value, LinkLost)
+            assert isinstance(reported.value, LinkLost)
         found = await settle(b.axis, asked=False)
         assert found["left"] == {}
         assert await dump(b) == before
@@ -376,7 +376,7 @@ async def test_single_tools_are_cancelled(family: Family, tool: str, fraction: f
         works: dict[str, Callable[[], Awaitable[object]]] = {
             "sweep": lambda: sweep(b.axis, b.session, SweepSettings(WIDE), at.progress),
             "inertia": lambda: inertia(b.axis, b.session, InertiaSettings(WIDE), at.progress),
-            # Long enough to be told of progress more than once while it moves.
+            # Long enough to be notified of progress more than once while it moves.
             "step": lambda: step_response(
                 b.axis, b.session, StepSettings(WIDE, hold_s=2.0), at.progress
             ),

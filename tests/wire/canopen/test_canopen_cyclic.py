@@ -268,7 +268,7 @@ async def test_a_drive_that_falls_silent_is_given_up(bench: Bench, link: Canopen
     await _cyclic(link).play([Trajectory(5, SPEED_TARGET.address, values, Envelope(), renew_s=99)])
     await until(lambda: bench.device.value(0x60FF) == 800)
     newest = _cyclic(link).newest(["speed", "position", "speed target"], 1.0)
-    assert list(newest) == ["speed", "position"], "what it is told is nothing that it tells"
+    assert list(newest) == ["speed", "position"], "what it is reported is nothing that it tells"
     bench.node.mute = True
     await until(lambda: bench.device.value(0x6040) == 6)
     assert _cyclic(link).newest(["speed"], 1.0) == {}

@@ -216,7 +216,9 @@ async def test_emergencies_come_in_words(bench: Bench, link: CanopenLink) -> Non
     assert "voltage inside the drive" in events[0].text
 
 
-async def test_a_lost_heartbeat_and_its_return_are_told(bench: Bench, link: CanopenLink) -> None:
+async def test_a_lost_heartbeat_and_its_return_are_reported(
+    bench: Bench, link: CanopenLink
+) -> None:
     events: list[LinkEvent] = []
     link.listen(events.append)
     await link.write(5, Address(0x1017, 0, "UINT16"), b"\x14\x00")
@@ -262,7 +264,7 @@ async def test_a_device_type_that_comes_in_segments_is_no_other_device(
     assert asked[1][:4] == b"\x80\x00\x10\x00", "what the probe began is ended"
 
 
-async def test_bus_off_is_told_and_recovered(slcan_bench: Bench) -> None:
+async def test_bus_off_is_reported_and_recovered(slcan_bench: Bench) -> None:
     link = CanopenLink(slcan_bench.url)
     events: list[LinkEvent] = []
     link.listen(events.append)
@@ -289,7 +291,7 @@ async def test_bus_off_on_the_virtual_bus(bench: Bench, link: CanopenLink) -> No
     assert await link.read(5, SMALL) == b"\x07"
 
 
-async def test_an_unplugged_adapter_is_told_and_comes_back(slcan_bench: Bench) -> None:
+async def test_an_unplugged_adapter_is_reported_and_comes_back(slcan_bench: Bench) -> None:
     from drivers.virtual.wires.slcan import SlcanSide
 
     side = slcan_bench.wire.side

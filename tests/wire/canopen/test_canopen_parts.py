@@ -95,7 +95,7 @@ def test_the_adapters_errors_are_translated(code: int, says: str) -> None:
         (serial.SerialException("device disconnected"), "adapter is gone", "USB cable"),
     ],
 )
-def test_an_adapter_that_is_full_is_told_from_one_that_is_unplugged(
+def test_an_adapter_that_is_full_is_distinguished_from_one_that_is_unplugged(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, failure: OSError, says: str, remedy: str
 ) -> None:
     """An slcan adapter on a bus where nobody acknowledges keeps its frames until it is full."""
@@ -119,7 +119,7 @@ def test_an_adapter_that_is_full_is_told_from_one_that_is_unplugged(
     assert remedy in (error.remedy or "")
 
 
-def test_a_silent_node_is_told_once_and_its_return_too() -> None:
+def test_a_silent_node_is_reported_once_and_its_return_too() -> None:
     watch = NodeWatch()
     beat = Frame(0x705, b"\x05")
     for tick in range(5):
@@ -132,29 +132,29 @@ def test_a_silent_node_is_told_once_and_its_return_too() -> None:
     assert [e.kind for e in watch.observe(beat, 3.0)] == ["back"]
 
 
-def told_by(watch: NodeWatch, beats: list[tuple[float, int]], until_s: float) -> list[str]:
-    """Losses that are told while node 5 sends these states at these times."""
-    told: list[str] = []
+def reported_by(watch: NodeWatch, beats: list[tuple[float, int]], until_s: float) -> list[str]:
+    """Losses that are reported while node 5 sends these states at these times."""
+    reported: list[str] = []
     waiting = list(beats)
     for now_ms in range(round(until_s * 1000)):
         while waiting and waiting[0][0] <= now_ms / 1000:
             watch.observe(Frame(0x705, bytes([waiting.pop(0)[1]])), now_ms / 1000)
-        told += [event.text for event in watch.overdue(now_ms / 1000) if event.kind == "lost"]
-    return told
+        reported += [event.text for event in watch.overdue(now_ms / 1000) if event.kind == "lost"]
+    return reported
 
 
 def test_a_heartbeat_at_once_after_boot_or_a_change_of_state_tells_no_period() -> None:
     """As CANopenNode does it; the period here is 1 s, and the exchange begins with NMT start."""
     beats = [(0.0, 0), (0.001, 127), (0.4, 5), (1.4, 5), (2.4, 5), (2.41, 127), (3.41, 127)]
     watch = NodeWatch()
-    assert told_by(watch, beats, 4.4) == []
+    assert reported_by(watch, beats, 4.4) == []
     assert watch.record(5).period_s == pytest.approx(1.0)
 
 
 def test_a_heartbeat_that_came_late_makes_the_next_one_no_period() -> None:
     watch = NodeWatch()
-    assert told_by(watch, [(0, 5), (1, 5), (2.9, 5), (3, 5), (4, 5), (5, 5)], 5.9) == []
-    assert len(told_by(NodeWatch(), [(0, 5), (1, 5), (2, 5)], 5)) == 1
+    assert reported_by(watch, [(0, 5), (1, 5), (2.9, 5), (3, 5), (4, 5), (5, 5)], 5.9) == []
+    assert len(reported_by(NodeWatch(), [(0, 5), (1, 5), (2, 5)], 5)) == 1
 
 
 def test_a_node_with_a_slow_heartbeat_is_not_taken_for_one_that_answers_guarding() -> None:
@@ -169,7 +169,7 @@ def test_a_node_with_a_slow_heartbeat_is_not_taken_for_one_that_answers_guarding
     assert watch.record(5).period_s == pytest.approx(2.0)
 
 
-def test_state_changes_and_restarts_are_told() -> None:
+def test_state_changes_and_restarts_are_reported() -> None:
     watch = NodeWatch()
     watch.record(5).in_use = True
     watch.observe(Frame(0x705, b"\x05"), 0.0)
@@ -196,16 +196,16 @@ def test_answers_that_nobody_asked_for_are_two_nodes_only_while_they_come() -> N
     watch = NodeWatch()
     record = watch.record(5)
     assert watch.stray_answer(5, 0.0) is None
-    told = watch.stray_answer(5, 3.0)
-    assert told is not None
-    assert "two nodes answer as number 5" in told.text
-    assert watch.stray_answer(5, 50.0) is None, "told once"
+    reported = watch.stray_answer(5, 3.0)
+    assert reported is not None
+    assert "two nodes answer as number 5" in reported.text
+    assert watch.stray_answer(5, 50.0) is None, "reported once"
     watch.overdue(100.0)
     assert record.conflict == "two nodes have this number"
     watch.overdue(110.1)
     assert record.conflict == "", "none for a minute"
     assert watch.stray_answer(5, 111.0) is None
-    assert watch.stray_answer(5, 112.0) is not None, "told again"
+    assert watch.stray_answer(5, 112.0) is not None, "reported again"
 
 
 @pytest.mark.parametrize(
@@ -223,12 +223,12 @@ def test_emergency_codes(code: int, text: str) -> None:
 
 
 def test_a_storm_of_emergencies_does_not_fill_the_log() -> None:
-    """1000 in half a second, as from a flickering contact: ten are told, then how many were not."""
+    """1000 in half a second, as from a flickering contact: ten are reported, then a count."""
     watch = NodeWatch()
     storm = [Frame(0x85, bytes([0x10, 0x50, 1]) + bytes(5))] * 999
     storm.append(Frame(0x85, bytes([0x00, 0x00, 0]) + bytes(5)))
-    told = [e for n, frame in enumerate(storm) for e in watch.observe(frame, n * 0.0005)]
-    assert len(told) == 10
+    reported = [e for n, frame in enumerate(storm) for e in watch.observe(frame, n * 0.0005)]
+    assert len(reported) == 10
     assert watch.record(5).emergencies == 1000
     assert watch.overdue(0.9) == []
     (summary,) = watch.overdue(1.0)
@@ -337,7 +337,7 @@ class LoopOnADeadBus:
 
 
 async def test_a_halt_that_nobody_receives_does_not_say_that_it_was_received() -> None:
-    """STOP told that it had reached the axis while the adapter was gone."""
+    """STOP reported that it had reached the axis while the adapter was gone."""
     nothing: Any = None
     url = parse_canopen_url("canopen://virtual/can0")
     cyclic = CanopenCyclic(nothing, url, nothing, nothing, nothing)
@@ -349,7 +349,7 @@ async def test_a_halt_that_nobody_receives_does_not_say_that_it_was_received() -
     await cyclic.halt(3)
 
 
-def test_a_fixed_mapping_is_told_as_such_and_leaves_nothing_behind() -> None:
+def test_a_fixed_mapping_is_reported_as_such_and_leaves_nothing_behind() -> None:
     """The put-back of what never changed was refused as well, and hid the reason."""
     objects = {
         (0x1800, 1): (0x40000185).to_bytes(4, "little"), (0x1800, 2): b"\xff",

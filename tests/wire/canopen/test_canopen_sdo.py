@@ -105,7 +105,7 @@ def test_wrong_answers_end_the_transfer(answer: str, error: type[Exception]) -> 
     channel = SdoChannel(1, send)
     with pytest.raises(error):
         channel.run(sdo.upload(0x1008, 0), 0.5)
-    if error is ProtocolError:  # the server is told before we raise
+    if error is ProtocolError:  # the server is reported before we raise
         assert sent[-1][:4] == b"\x80" + MUX
 
 
@@ -114,8 +114,8 @@ def test_a_repeated_segment_is_not_taken_twice() -> None:
     next(transfer)
     transfer.send(bytes.fromhex("41 08 10 00 1a 00 00 00"))
     transfer.send(bytes.fromhex("00 54 69 6e 79 20 4e 6f"))
-    told = transfer.send(bytes.fromhex("00 54 69 6e 79 20 4e 6f"))
-    assert told.send[0] == sdo.abort_frame(MUX, 0x05030000)
+    reported = transfer.send(bytes.fromhex("00 54 69 6e 79 20 4e 6f"))
+    assert reported.send[0] == sdo.abort_frame(MUX, 0x05030000)
     with pytest.raises(ProtocolError, match="twice or was lost"):
         transfer.send(b"")
 

@@ -62,7 +62,7 @@ def test_a_write_that_leaves_its_length_open_has_that_of_the_object(
     assert master.device.read(*place) == kept
 
 
-def test_a_length_that_is_told_must_be_the_objects(master: RawMaster) -> None:
+def test_a_length_that_is_reported_must_be_the_objects(master: RawMaster) -> None:
     assert master.sdo("2340600006000000")[8:] == "10000706"  # 0607 0010h, little endian
     assert master.sdo("2f40600006000000")[8:] == "10000706"
 
@@ -146,8 +146,8 @@ def test_each_nmt_command_leads_where_it_should(master: RawMaster) -> None:
         return f"{int(answer[4:], 16) & 0x7F:02x}"
 
     for command, expected in (("01", "05"), ("02", "04"), ("80", "7f"), ("01", "05")):
-        told = master.send(0, f"{command}05")
-        assert set(told) <= {"185#5002"}  # TPDO 1 is event-driven
+        reported = master.send(0, f"{command}05")
+        assert set(reported) <= {"185#5002"}  # TPDO 1 is event-driven
         assert state() == expected
     for ignored in ("0106", "5505", "02", "020500"):
         master.send(0, ignored)
@@ -159,7 +159,9 @@ def test_each_nmt_command_leads_where_it_should(master: RawMaster) -> None:
     assert state() == "7f"
 
 
-def test_an_error_of_the_network_is_told_once_and_again_when_it_is_over(master: RawMaster) -> None:
+def test_an_error_of_the_network_is_reported_once_and_again_when_it_is_over(
+    master: RawMaster,
+) -> None:
     """CiA 301 clause 7.2.7.1: one emergency per error, code 0 after it; 7.5.2.2: bits 0 and 4."""
     for value in (0x80000205, 0x205):
         if value == 0x205:

@@ -281,7 +281,7 @@ def test_udp_multicast_inside_a_namespace_of_its_own() -> None:
 
 
 async def test_two_links_share_one_wire(bench: Bench) -> None:
-    """A second master is told apart from a second node of the same number."""
+    """A second master is distinguished from a second node of the same number."""
     first, second = CanopenLink(bench.url), CanopenLink(bench.url)
     events: list[str] = []
     first.listen(lambda e: events.append(e.text))

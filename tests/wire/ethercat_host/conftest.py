@@ -83,7 +83,7 @@ class Rig:
 
 
 class Bus:
-    """A link and what it told."""
+    """A link and what it showed."""
 
     def __init__(self, link: EthercatLink) -> None:
         self.link = link
@@ -94,7 +94,7 @@ class Bus:
     def texts(self) -> list[str]:
         return [event.text for _, event in self.events]
 
-    async def told(self, *words: str, within_s: float = 30.0) -> str:
+    async def reported(self, *words: str, within_s: float = 30.0) -> str:
         """Wait for an event with all these words."""
         found: list[str] = []
 

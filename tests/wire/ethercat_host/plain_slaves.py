@@ -10,7 +10,7 @@ imports nothing of servodeck, and its slaves have the oddities that real ones ha
              access, no SDO information, emergencies that come before answers, slow states and an
              error left over from before, which must be acknowledged
 ``bare``     a drive whose EEPROM has a wrong checksum and no category: no strings, no general part,
-             no FMMUs, sync managers or PDOs. Its dictionary is told in fragments that end in the
+             no FMMUs, sync managers or PDOs. Its dictionary comes in fragments that end in the
              middle of a number, and with names longer than its mailbox
 ``fixed``    a servo whose PDOs can be assigned, and whose mapping can only be read
 ``hasty``    a servo whose sync managers the first search does not get to read, as when frames of
@@ -283,7 +283,7 @@ class Servo(Slave):
         struct.pack_into("<Hi", self.memory, self.inputs_at, self.state, self.position)
 
 
-LONG = "Thing of the maker, told at length and of little use, " * 9
+LONG = "Thing of the maker, reported at length and of little use, " * 9
 """Longer than three mailboxes."""
 
 FRAGMENT = 103
@@ -319,12 +319,12 @@ class Bare(Servo):
         if not subs or (opcode == 5 and data[2] not in subs):
             self.post(struct.pack("<HBBHI", 0x8000, 7, 0, 0, 0x06020000))
         elif opcode == 3:
-            told = struct.pack("<HHBB", index, 6, max(subs), 9 if len(subs) > 1 else 7)
-            self.tell(4, told + f"{index:04X} {LONG}".encode())
+            reported = struct.pack("<HHBB", index, 6, max(subs), 9 if len(subs) > 1 else 7)
+            self.tell(4, reported + f"{index:04X} {LONG}".encode())
         else:
             value = self.objects[index, data[2]]
-            told = struct.pack("<HBBHHH", index, data[2], 0, 6, 8 * len(value), 0x3F)
-            self.tell(6, told + f"entry {data[2]} {LONG}".encode())
+            reported = struct.pack("<HBBHHH", index, data[2], 0, 6, 8 * len(value), 0x3F)
+            self.tell(6, reported + f"entry {data[2]} {LONG}".encode())
 
     def tell(self, opcode: int, data: bytes) -> None:
         """Fragments, each with the number of those that follow (ETG.1000.6 clause 5.6.3.2)."""
@@ -372,9 +372,11 @@ def station(slave: Slave) -> int:
 def physical(slave: Slave, kind: int, at: int, data: bytes, broadcast: bool) -> tuple[bytes, int]:
     counted, answer = 0, data
     if kind != 1:
-        told = slave.read(at, len(data))
-        if told is not None:
-            answer = bytes(a | b for a, b in zip(data, told, strict=True)) if broadcast else told
+        reported = slave.read(at, len(data))
+        if reported is not None:
+            answer = (
+                bytes(a | b for a, b in zip(data, reported, strict=True)) if broadcast else reported
+            )
             counted += 1
     if kind != 0 and slave.write(at, data):
         counted += 2 if kind == 2 else 1
@@ -398,10 +400,10 @@ def handle(slaves: list[Slave], frame: bytearray) -> None:
             elif 1 <= command <= 9:
                 mine = position == 0 if command <= 3 else command >= 7 or position == station(slave)
                 if mine:
-                    told, counted = physical(
+                    reported, counted = physical(
                         slave, (command - 1) % 3, offset, bytes(data), command >= 7
                     )
-                    data[:] = told
+                    data[:] = reported
                     counter += counted
                 if command <= 3 or command >= 7:
                     position = (position + 1) & 0xFFFF

@@ -75,7 +75,7 @@ def test_more_segments_than_announced_end_the_transfer() -> None:
     slave = ScriptedSlave(react)
     with pytest.raises(ProtocolError, match="more than the 10 bytes"):
         slave.run(sdo.upload(slave.box(), 0x2000, 1))
-    assert slave.requests[-1][2] == 0x80, "the slave is told"
+    assert slave.requests[-1][2] == 0x80, "the slave is reported"
 
 
 @pytest.mark.parametrize("service", [2, 3])
@@ -138,8 +138,8 @@ def test_mailboxes_may_have_any_two_sizes(out: int, back: int) -> None:
             part = text[place : place + back - 9]
             place += len(part)
             unused = max(7 - len(part), 0)
-            told = command & 0x10 | unused << 1 | (place == len(text))
-            return [coe(3, bytes([told]) + part.ljust(7, b"\0"))]
+            reported = command & 0x10 | unused << 1 | (place == len(text))
+            return [coe(3, bytes([reported]) + part.ljust(7, b"\0"))]
         unused = command >> 1 & 7 if len(request) == 10 else 0
         taken.extend(request[3 : len(request) - unused])
         return [coe(3, bytes([0x20 | command & 0x10]) + bytes(7))]
@@ -378,9 +378,9 @@ def test_entries_beyond_the_count_of_a_list_are_not_asked_for(complete: bool) ->
     asked = []
     for _ in range(2):
         before = len(slave.requests)
-        told = slave.run(read_items(station, items, lambda _n: None))
-        assert told[2:] == [entries[2], entries[1], entries[0]]
-        for answer, sub in zip(told, (4, 3), strict=False):
+        reported = slave.run(read_items(station, items, lambda _n: None))
+        assert reported[2:] == [entries[2], entries[1], entries[0]]
+        for answer, sub in zip(reported, (4, 3), strict=False):
             assert isinstance(answer, NotInUse)
             assert answer.message == "not in use: 1600:00 counts 2 entries"
             assert answer.parameter == f"1600:0{sub}"
@@ -401,5 +401,5 @@ def test_a_count_that_is_printed_wider_comes_as_wide() -> None:
     slave = ScriptedSlave(react)
     station = Station(1, mailbox=slave.box())
     items = [(0x1C12, 0, 2), (0x1C12, 1, 2)]
-    told = slave.run(read_items(station, items, lambda _n: None))
-    assert told == [b"\x01\x00", b"\x00\x16"]
+    reported = slave.run(read_items(station, items, lambda _n: None))
+    assert reported == [b"\x01\x00", b"\x00\x16"]

@@ -125,9 +125,11 @@ async def test_a_trajectory_is_played_exactly_one_value_per_cycle(rig: Rig) -> N
         for channel, values in (("1.target", first), ("2.target", second)):
 
             def came_whole(channel: str = channel, values: npt.NDArray[np.int64] = values) -> bool:
-                told = track[channel]
-                begin = int(np.argmax(told != told[0])) - int(np.argmax(values != values[0]))
-                return np.array_equal(told[begin : begin + 300], values)
+                reported = track[channel]
+                begin = int(np.argmax(reported != reported[0])) - int(
+                    np.argmax(values != values[0])
+                )
+                return np.array_equal(reported[begin : begin + 300], values)
 
             await until(came_whole, HANG_S, "every value, once")
         follows = track["1.position"]
@@ -202,7 +204,7 @@ async def test_the_envelope_stops_one_axis_and_not_the_other(
         moving = asyncio.create_task(play)
         await asyncio.sleep(0.1)
         rig.do("inject", slave=0, what=what, value=halt.value)
-        await bus.told(words)
+        await bus.reported(words)
         await until(lambda: in_state(bus, 1) != "Operation enabled", HANG_S)
         with pytest.raises(EnvelopeExceeded, match=words) as ended:
             await moving
@@ -249,7 +251,7 @@ async def test_data_that_stay_invalid_stop_the_axis(rig: Rig) -> None:
         await enable(bus, 1)
         await bus.link.process_data.play([move(1, ramp(rig, 0), renew_s=5)])
         rig.do("counter", by=-1)
-        await bus.told("no valid process data for", "the axis is braked")
+        await bus.reported("no valid process data for", "the axis is braked")
         await until(lambda: rig.truth(0, 0x606C) == 0, HANG_S)
         rig.do("peace")
         await until(lambda: in_state(bus, 1) == "Ready to switch on", HANG_S)
@@ -262,8 +264,8 @@ async def test_a_power_cycle_in_motion_ends_it_and_the_drive_comes_back_disabled
         await enable(bus, 1)
         await bus.link.process_data.play([move(1, ramp(rig, 0), renew_s=5)])
         rig.do("power_cycle", slave=0, off_s=0.3)
-        await bus.told("station 1", "was switched on again")
-        await bus.told("station 1 is in OP again", within_s=HANG_S)
+        await bus.reported("station 1", "was switched on again")
+        await bus.reported("station 1 is in OP again", within_s=HANG_S)
         await until(lambda: in_state(bus, 1) == "Switch on disabled", HANG_S)
         assert rig.do("state")["slaves"][0]["state"] == "OP"  # type: ignore[index]
         await enable(bus, 1)
@@ -275,7 +277,9 @@ async def test_another_drive_after_a_break_is_refused_in_words(rig: Rig) -> None
         cyclic = bus.link.process_data
         cyclic._setup["identities"][2][2] = 4711
         os.kill(bus.link._host.pid or 0, signal.SIGKILL)
-        await bus.told("could not be set up again: another drive than before answers at station 2")
+        await bus.reported(
+            "could not be set up again: another drive than before answers at station 2"
+        )
         assert not cyclic.running
         assert "another drive" in cyclic.trouble
         with pytest.raises(NotAllowed, match="no axis can be enabled before that"):

@@ -132,7 +132,7 @@ def test_a_computer_that_stands_still_takes_no_eeprom_for_busy() -> None:
     assert eeprom.run(steps) == struct.pack("<4H", 0x1008, 0x1009, 0x100A, 0x100B)
 
 
-def test_a_station_that_is_not_there_is_told_soon() -> None:
+def test_a_station_that_is_not_there_is_reported_soon() -> None:
     eeprom = Eeprom()
     eeprom.there = False
     with pytest.raises(LinkLost, match="does not answer"):

@@ -21,12 +21,12 @@ class Slave(ByHand):
         self.now = 0.0
         self.asked = 0
         self._code, self._times = code, times
-        self._state, self._told = int(AlState.SAFEOP), 0
+        self._state, self._reported = int(AlState.SAFEOP), 0
 
     def frame(self, step: Read | Write) -> bytes:
         if isinstance(step, Read):
             assert step.register == AL_STATUS
-            return bytes([self._state, 0, 0, 0]) + self._told.to_bytes(2, "little")
+            return bytes([self._state, 0, 0, 0]) + self._reported.to_bytes(2, "little")
         assert step.register == AL_CONTROL
         self._go(step.data[0])
         return b""
@@ -34,11 +34,11 @@ class Slave(ByHand):
     def _go(self, wanted: int) -> None:
         if self._state & ERROR_BIT:
             assert wanted & ERROR_BIT, "the error is acknowledged first"
-        self._state, self._told = wanted & 0x0F, 0
+        self._state, self._reported = wanted & 0x0F, 0
         if self._state == AlState.OP:
             self.asked += 1
             if self.asked <= self._times:
-                self._state, self._told = AlState.SAFEOP | ERROR_BIT, self._code
+                self._state, self._reported = AlState.SAFEOP | ERROR_BIT, self._code
 
 
 def enter(slave: Slave) -> None:
@@ -54,7 +54,7 @@ def test_op_is_asked_for_again_where_a_computer_stood_still(code: int) -> None:
 
 
 @pytest.mark.parametrize("code", [WATCHDOG, NO_SYNC0])
-def test_what_stays_away_is_told(code: int) -> None:
+def test_what_stays_away_is_reported(code: int) -> None:
     slave = Slave(code, 100)
     with pytest.raises(NotAllowed, match="station 2 refuses OP"):
         enter(slave)

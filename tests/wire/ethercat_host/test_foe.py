@@ -68,15 +68,15 @@ def test_a_drive_that_is_busy_for_ever_does_not_hang_us() -> None:
 
 
 class Loading:
-    """Loads `FILE` into the first drive and keeps what was told meanwhile."""
+    """Loads `FILE` into the first drive and keeps what was reported meanwhile."""
 
     def __init__(self, bus: Bus) -> None:
         self.bus = bus
-        self.told: list[tuple[float, str]] = []
+        self.reported: list[tuple[float, str]] = []
 
     async def load(self, **options: str) -> str:
         return await self.bus.link.load_firmware(
-            1, "app.efw", FILE, lambda share, text: self.told.append((share, str(text))),
+            1, "app.efw", FILE, lambda share, text: self.reported.append((share, str(text))),
             **options,  # type: ignore[arg-type]
         )  # fmt: skip
 
@@ -97,10 +97,10 @@ async def test_the_file_is_loaded_in_boot_and_the_drive_comes_back(calm: Rig) ->
         loading = Loading(bus)
         assert await loading.load() == "BOOT"
         assert calm.do("files", slave=0) == {"app.efw": hashlib.sha256(FILE).hexdigest()}
-        assert loading.told[0] == (0.0, "going to BOOT")
-        shares = [share for share, _ in loading.told]
+        assert loading.reported[0] == (0.0, "going to BOOT")
+        shares = [share for share, _ in loading.reported]
         assert shares == sorted(shares)
-        assert any("of 4000 bytes: do not switch off" in text for _, text in loading.told)
+        assert any("of 4000 bytes: do not switch off" in text for _, text in loading.reported)
         await loading.works()
 
 
@@ -109,7 +109,7 @@ async def test_nothing_else_is_asked_of_a_drive_that_is_being_loaded(calm: Rig) 
     async with calm.link() as bus:
         loading = Loading(bus)
         task = asyncio.create_task(loading.load())
-        await until(lambda: any("bytes" in text for _, text in loading.told), 30.0)
+        await until(lambda: any("bytes" in text for _, text in loading.reported), 30.0)
         with pytest.raises(Busy, match="being loaded with firmware"):
             await bus.link.read(1, STATUS)
         with pytest.raises(Busy, match="cannot move"):

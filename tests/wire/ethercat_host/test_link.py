@@ -182,16 +182,16 @@ async def test_dying_in_the_middle_of_a_segmented_upload_does_not_hang(rig: Rig)
         assert bus.link.quality().details["host_restarts"] == 0
 
 
-async def test_a_cut_cable_is_told_and_heals_by_itself(rig: Rig) -> None:
+async def test_a_cut_cable_is_reported_and_heals_by_itself(rig: Rig) -> None:
     async with rig.link() as bus:
         rig.do("cut", cable=1)
-        await bus.told("station 2", "no longer answers")
+        await bus.reported("station 2", "no longer answers")
         with pytest.raises(LinkLost, match="does not answer"):
             await bus.link.read(2, STATUS)
         assert await bus.link.read(1, STATUS) == b"\x50\x02"
         assert not bus.link.quality(2).connected
         rig.do("heal")
-        await bus.told("station 2", "answers again")
+        await bus.reported("station 2", "answers again")
         assert await bus.link.read(2, STATUS) == b"\x50\x02"
         survey = await bus.link.survey()
         assert len(survey.stations) == 2
@@ -201,11 +201,11 @@ async def test_a_cut_cable_is_told_and_heals_by_itself(rig: Rig) -> None:
         )
 
 
-async def test_a_power_cycle_is_told_and_the_drive_is_taken_up_again(rig: Rig) -> None:
+async def test_a_power_cycle_is_reported_and_the_drive_is_taken_up_again(rig: Rig) -> None:
     async with rig.link() as bus:
         rig.do("power_cycle", slave=1, off_s=0.4)
-        await bus.told("station 2", "no longer answers")
-        await bus.told("station 2", "was switched on again")
+        await bus.reported("station 2", "no longer answers")
+        await bus.reported("station 2", "was switched on again")
         assert await bus.link.read(2, STATUS) == b"\x50\x02"
 
 
@@ -254,10 +254,10 @@ async def test_a_busy_eeprom_ends_in_words(rig: Rig) -> None:
         assert found[0].product_code == 0x1234
 
 
-async def test_an_emergency_is_told_once(rig: Rig) -> None:
+async def test_an_emergency_is_reported_once(rig: Rig) -> None:
     async with rig.link() as bus:
         rig.do("inject", slave=0, what="emergency", value=0x8611)
-        text = await bus.told("emergency 0x8611")
+        text = await bus.reported("emergency 0x8611")
         assert text == "station 1: emergency 0x8611, error register 0x01, data 01 02 03 04 05"
         assert await bus.link.read(1, STATUS) == b"\x50\x02"
         assert sum("0x8611" in t for t in bus.texts) == 1
@@ -268,13 +268,13 @@ async def test_the_alias_is_written_with_its_checksum(rig: Rig) -> None:
     async with rig.link() as bus:
         await bus.link.set_alias(2, 1234)
         rig.do("power_cycle", slave=1, off_s=0.1)
-        await bus.told("station 2", "was switched on again")
+        await bus.reported("station 2", "was switched on again")
         found = await bus.link.scan(quiet)
         assert [f.alias for f in found] == [0, 1234]
         await bus.link.set_alias(2, 0)
         bus.events.clear()
         rig.do("power_cycle", slave=1, off_s=0.1)
-        await bus.told("station 2", "was switched on again")
+        await bus.reported("station 2", "was switched on again")
 
 
 async def test_a_second_master_on_the_same_interface_is_refused(rig: Rig) -> None:
@@ -303,10 +303,10 @@ async def test_a_hung_host_is_killed_and_replaced(rig: Rig) -> None:
         assert first is not None
         os.kill(first, signal.SIGSTOP)
         waiting = asyncio.create_task(bus.link.read(1, STATUS))
-        await bus.told("hung while", "killed")
+        await bus.reported("hung while", "killed")
         with pytest.raises(LinkLost):
             await waiting
-        await bus.told("runs again")
+        await bus.reported("runs again")
         assert await bus.link.read(1, STATUS) == b"\x50\x02"
         assert bus.link._host.pid != first
         assert bus.link.quality().details["host_restarts"] == 1
@@ -315,11 +315,11 @@ async def test_a_hung_host_is_killed_and_replaced(rig: Rig) -> None:
 async def test_a_killed_and_restarted_segment_is_found_again(rig: Rig) -> None:
     async with rig.link() as bus:
         rig.segment.kill()
-        await bus.told("station 1", "no longer answers")
+        await bus.reported("station 1", "no longer answers")
         rig.segment.close()
         rig.start()
-        await bus.told("station 1", "was switched on again")
-        await bus.told("station 2", "was switched on again")
+        await bus.reported("station 1", "was switched on again")
+        await bus.reported("station 2", "was switched on again")
         assert await bus.link.read(2, STATUS) == b"\x50\x02"
 
 

@@ -138,9 +138,9 @@ def test_after_a_mapping_that_a_stray_answer_spoilt_the_segment_is_searched_agai
 ) -> None:
     """SOEM looks at the index of an answer at most: any error may be another question's."""
     made, master = operations(stray, stray)
-    told: list[object] = []
-    made._configure({}, lambda answer, error: told.append((answer, error)))
-    assert told == [({"configured": True}, None)]
+    reported: list[object] = []
+    made._configure({}, lambda answer, error: reported.append((answer, error)))
+    assert reported == [({"configured": True}, None)]
     assert master.done == ["searched", "mapped"] * 3
 
 

@@ -258,10 +258,10 @@ def test_short_turns_need_no_permission() -> None:
 import ctypes, os, platform, struct
 from drivers.computer import scheduling
 asked = scheduling.short_slice()
-told = ctypes.create_string_buffer(56)
+reported = ctypes.create_string_buffer(56)
 number = {"x86_64": 315}.get(platform.machine(), 275)
-assert ctypes.CDLL(None).syscall(number, 0, told, 56, 0) == 0
-_, policy, _, nice, _, slice_ns = struct.unpack_from("<IIQiIQ", told)
+assert ctypes.CDLL(None).syscall(number, 0, reported, 56, 0) == 0
+_, policy, _, nice, _, slice_ns = struct.unpack_from("<IIQiIQ", reported)
 print(int(asked), policy, nice - os.nice(0), slice_ns)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -293,7 +293,7 @@ def test_what_a_slave_sends_never_ends_the_process() -> None:
     assert isinstance(ended[0], errors.ProtocolError)
 
 
-def test_a_refused_state_is_told_and_acknowledged_before_the_next_request() -> None:
+def test_a_refused_state_is_reported_and_acknowledged_before_the_next_request() -> None:
     """By the registers alone (ETG.1000.4 clause 6.4): 0x130 with error bit 4, its code at 0x134."""
     state, code = 2, 0
     asked: list[int] = []

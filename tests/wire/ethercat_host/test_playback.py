@@ -9,8 +9,8 @@ import pytest
 
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
+from drivers.feedback import FeedbackScale
 from drivers.halt import HaltCause, Halted
-from drivers.motion.feedback import FeedbackScale
 from drivers.motion.playback import LET_GO_S, STOP_S, AxisLoop
 from drivers.motion.setpoint_plan import Limits, Motion, Phase
 
@@ -25,10 +25,10 @@ class Bench:
     """An axis whose drive does at once what its control word says."""
 
     def __init__(self, position: int = 500) -> None:
-        self.told: list[str] = []
+        self.reported: list[str] = []
         self.axis = AxisLoop(
             1, inputs=IN, outputs=OUT, output_count=6, cycle_s=CYCLE_S,
-            report=lambda _station, text: self.told.append(text),
+            report=lambda _station, text: self.reported.append(text),
         )  # fmt: skip
         self.status, self.position, self.speed, self.torque, self.mode = DISABLED, position, 0, 0, 8
 
@@ -136,7 +136,7 @@ def test_renewal_keeps_it_going() -> None:
         bench.axis.renew()
         bench.step()
     assert bench.axis.phase is Phase.PLAYING
-    assert bench.told == []
+    assert bench.reported == []
 
 
 @pytest.mark.parametrize(
@@ -170,8 +170,8 @@ def test_the_envelope_stops_in_the_very_cycle(limits: Limits, halt: Halted, word
     bench.step()
     assert bench.axis.phase is Phase.BRAKING
     assert bench.axis.halted == halt
-    assert bench.told
-    assert bench.told[0].startswith(word)
+    assert bench.reported
+    assert bench.reported[0].startswith(word)
 
 
 def test_following_error_is_computed_where_the_drive_does_not_tell_it() -> None:
@@ -221,16 +221,16 @@ def test_velocity_ramps_down_to_zero() -> None:
 
 
 @pytest.mark.parametrize(
-    ("turns", "told"),
+    ("turns", "reported"),
     [
         # Blocked: nothing is left to push with; turned back by its load: as well.
         (0, 0), (-300, 0),
-        # It lags: braked from where it is. It overtakes: braked from what it was told.
+        # It lags: braked from where it is. It overtakes: braked from what it was reported.
         (400, 400), (2500, 1000),
     ],
 )  # fmt: skip
 def test_an_axis_that_takes_too_much_torque_is_braked_from_its_own_speed(
-    turns: int, told: int
+    turns: int, reported: int
 ) -> None:
     bench = Bench().enabled(mode=9)
     bench.play([1000] * 500, target=0x60FF, limits=Limits(torque_max=300))
@@ -243,7 +243,7 @@ def test_an_axis_that_takes_too_much_torque_is_braked_from_its_own_speed(
     assert bench.axis.phase is Phase.BRAKING
     cycles = round(STOP_S / CYCLE_S)
     # The first step of the ramp that ends at standstill.
-    assert bench.axis.outputs[2] == round(told - told / cycles)
+    assert bench.axis.outputs[2] == round(reported - reported / cycles)
     bench.step(cycles)
     assert bench.axis.outputs[2] == 0
 
@@ -342,7 +342,7 @@ def test_a_drive_that_leaves_operation_enabled_is_not_enabled_again_by_itself() 
     bench.status = DISABLED
     bench.obey(10)
     assert bench.status == DISABLED
-    assert "left Operation enabled" in bench.told[0]
+    assert "left Operation enabled" in bench.reported[0]
 
 
 def test_cycles_without_trusted_inputs_go_on_but_conclude_nothing() -> None:
@@ -375,7 +375,7 @@ def test_cycles_that_were_skipped_are_no_speed_beyond_its_limit(last: int) -> No
     assert bench.axis.phase is Phase.PLAYING
 
 
-def test_an_axis_that_braked_without_trusted_inputs_is_told_to_quick_stop() -> None:
+def test_an_axis_that_braked_without_trusted_inputs_is_commanded_to_quick_stop() -> None:
     """CiA 402-2 table 29: quick stop is 0002h. It was left enabled for as long as nobody heard."""
     bench = Bench().enabled()
     bench.play(list(range(500, 5000, 10)))
@@ -497,4 +497,4 @@ def test_a_pause_of_what_does_not_move_changes_nothing() -> None:
     bench.axis.pause()
     bench.obey()
     assert bench.axis.state is State.OPERATION_ENABLED
-    assert bench.told == []
+    assert bench.reported == []

@@ -26,9 +26,9 @@ fcntl.ioctl(line, 0x8914, struct.pack("16sH14x", sys.argv[1].encode(), flags))
 
 def inside(rig: Rig, *argv: str) -> str:
     with rig.namespace.popen([sys.executable, "-c", *argv], stdout=subprocess.PIPE) as process:
-        told, _ = process.communicate(timeout=60)
+        reported, _ = process.communicate(timeout=60)
     assert process.returncode == 0
-    return told.strip()
+    return reported.strip()
 
 
 def set_for_good(rig: Rig) -> bool:

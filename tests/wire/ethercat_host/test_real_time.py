@@ -25,7 +25,7 @@ async def test_setpoints_that_are_not_renewed_end_the_motion(rig: Rig) -> None:
         await enable(bus, 1)
         await bus.link.process_data.play([move(1, ramp(rig, 0), renew_s=0.2)])
         started = time.monotonic()
-        await bus.told("not renewed in time")
+        await bus.reported("not renewed in time")
         assert 0.15 < time.monotonic() - started < 0.4
         await until(lambda: in_state(bus, 1) == "Ready to switch on", 1.0)
         assert rig.truth(0, 0x606C) == 0
@@ -55,7 +55,7 @@ async def test_a_cable_cut_in_motion_stops_the_axis_and_heals(rig: Rig) -> None:
         rig.do("cut", cable=1)
         took = await until(lambda: rig.truth(1, 0x606C) == 0, 1.0, "the watchdog stops it")
         assert took < 0.2
-        await bus.told("station 2", "no longer answers")
+        await bus.reported("station 2", "no longer answers")
         with pytest.raises((NotAllowed, LinkLost), match="does not answer"):
             await bus.link.process_data.play([move(2, [0])])
         await enable(bus, 1)
@@ -66,7 +66,7 @@ async def test_a_cable_cut_in_motion_stops_the_axis_and_heals(rig: Rig) -> None:
         newest = bus.link.process_data.newest(["1.position", "2.position"], 1.0)
         assert list(newest) == ["1.position"]
         rig.do("heal")
-        await bus.told("station 2 is in OP again")
+        await bus.reported("station 2 is in OP again")
         newest = bus.link.process_data.newest(["1.position", "2.position"], 1.0)
         assert newest["2.position"] == rig.truth(1, 0x6064)
         await bus.link.process_data.reset_fault(2)
@@ -87,9 +87,9 @@ async def test_killing_the_host_in_motion_stops_the_axis_and_recovers_disabled(r
         os.kill(host, signal.SIGKILL)
         took = await until(lambda: rig.truth(0, 0x606C) == 0, 1.0)
         assert took < 0.2
-        await bus.told("died", "started again")
-        await bus.told("the cyclic exchange broke off")
-        await bus.told("the cyclic exchange runs again; every axis is disabled", within_s=15)
+        await bus.reported("died", "started again")
+        await bus.reported("the cyclic exchange broke off")
+        await bus.reported("the cyclic exchange runs again; every axis is disabled", within_s=15)
         assert bus.link.process_data.running
         assert not bus.link.process_data.trouble
         with pytest.raises(LinkLost, match="broke off, the motion has ended"):
@@ -154,11 +154,11 @@ async def test_killing_the_segment_in_motion_ends_it_and_a_new_one_is_taken_up(r
         await enable(bus, 1)
         await bus.link.process_data.play([move(1, ramp(rig, 0), renew_s=5)])
         rig.segment.kill()
-        await bus.told("no valid process data for")
-        await bus.told("station 1", "no longer answers")
+        await bus.reported("no valid process data for")
+        await bus.reported("station 1", "no longer answers")
         rig.segment.close()
         rig.start()
-        await bus.told("station 1 is in OP again", within_s=10)
-        await bus.told("station 2 is in OP again", within_s=10)
+        await bus.reported("station 1 is in OP again", within_s=10)
+        await bus.reported("station 2 is in OP again", within_s=10)
         assert in_state(bus, 1) != "Operation enabled"
         await enable(bus, 1)

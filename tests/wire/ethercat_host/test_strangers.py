@@ -164,7 +164,7 @@ async def test_a_drive_with_a_bare_eeprom_is_read_whole_and_moved_by_nobody(bus:
         await bus.link.close()
 
 
-async def test_a_mapping_that_can_only_be_read_is_told_and_left_assigned(bus: Bus) -> None:
+async def test_a_mapping_that_can_only_be_read_is_reported_and_left_assigned(bus: Bus) -> None:
     await bus.link.open()
     try:
         await bus.link.scan(lambda _s, _t: None)
@@ -197,7 +197,9 @@ def answered(steps: Steps[None], slave: Slave) -> None:
 
 
 @pytest.mark.parametrize(("slave", "badly"), [(Servo(), True), (Coupler(), False)])
-def test_a_mailbox_that_a_search_missed_is_told_from_none_at_all(slave: Slave, badly: bool) -> None:
+def test_a_mailbox_that_a_search_missed_is_distinguished_from_none_at_all(
+    slave: Slave, badly: bool
+) -> None:
     """Frames with its EEPROM were lost, so its sync managers were never set up."""
     station = Station(1)
     answered(identify(station, time.monotonic), slave)
@@ -207,7 +209,9 @@ def test_a_mailbox_that_a_search_missed_is_told_from_none_at_all(slave: Slave, b
 
 
 @pytest.mark.parametrize(("filling", "says"), [(0, "in part"), (4200, "behind 4096 bytes")])
-def test_sync_managers_too_far_back_in_the_eeprom_are_told_as_such(filling: int, says: str) -> None:
+def test_sync_managers_too_far_back_in_the_eeprom_are_reported_as_such(
+    filling: int, says: str
+) -> None:
     """SOEM reads 4096 bytes of an EEPROM: to search again would not help."""
 
     class Wordy(Servo):
@@ -219,6 +223,6 @@ def test_sync_managers_too_far_back_in_the_eeprom_are_told_as_such(filling: int,
         cycle_ns=1_000_000, dc=False, watchdog_ms=50.0,
     )  # fmt: skip
     steps = check_places(Station(1), setup, time.monotonic)
-    with pytest.raises(DriveError, match=says) as told:
+    with pytest.raises(DriveError, match=says) as reported:
         answered(steps, Wordy())
-    assert isinstance(told.value, FoundInPart) is (filling == 0)
+    assert isinstance(reported.value, FoundInPart) is (filling == 0)

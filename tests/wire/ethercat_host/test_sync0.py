@@ -103,7 +103,7 @@ def test_a_computer_that_stands_still_does_not_set_a_start_in_the_past(number: i
     assert chip.pulses()
 
 
-def test_a_dead_line_is_told_with_its_remedy() -> None:
+def test_a_dead_line_is_reported_with_its_remedy() -> None:
     with pytest.raises(LinkLost, match="station 2: its SYNC0 could not be started") as raised:
         Chip(lose=set(range(10**6))).start()
     assert raised.value.remedy

@@ -116,5 +116,5 @@ def test_entry_description_gives_the_printed_default_on_request(wire: Wire) -> N
         (9, b"\x00\x00", 0x06010000),
     ],
 )
-def test_errors_are_told_by_opcode_7(wire: Wire, opcode: int, data: bytes, code: int) -> None:
+def test_errors_are_reported_by_opcode_7(wire: Wire, opcode: int, data: bytes, code: int) -> None:
     assert information(wire, opcode, data) == b"\x07" + struct.pack("<I", code)

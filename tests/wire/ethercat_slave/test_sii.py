@@ -158,7 +158,7 @@ def test_writing_needs_write_enable_in_the_same_frame(wire: Wire) -> None:
     assert read_words(wire, 4)[:2] == b"\0\0"
 
 
-def test_the_other_side_owns_the_eeprom_when_told(wire: Wire) -> None:
+def test_the_other_side_owns_the_eeprom_when_reported(wire: Wire) -> None:
     wire.write(0x0500, b"\x01")
     wire.write(0x0502, struct.pack("<HI", READ, 8))
     assert wire.value(0x0508, 4) == 0

@@ -223,7 +223,7 @@ def test_one_segment_per_interface(namespace: Namespace, shared: VirtualSegment)
     assert len(shared.command("state")["slaves"]) == 2
 
 
-def test_a_wrong_interface_and_a_wrong_drive_are_told_in_words(namespace: Namespace) -> None:
+def test_a_wrong_interface_and_a_wrong_drive_are_reported_in_words(namespace: Namespace) -> None:
     with pytest.raises(LinkLost, match="cannot use interface nosuch0"):
         VirtualSegment.start("nosuch0", ["--drive", "dictionary", "--factory", FACTORY], namespace)
     with pytest.raises(LinkLost, match="no drives"):

@@ -129,7 +129,7 @@ def test_a_power_cycle_takes_a_drive_and_all_behind_it_away_for_a_while() -> Non
     assert wire.slaves[2].controller.station == 0x1003
 
 
-def test_off_until_told_otherwise() -> None:
+def test_off_until_reported_otherwise() -> None:
     wire = Wire(1)
     channel = Channel(wire)
     channel("power_off", slave=0)

@@ -257,7 +257,7 @@ def test_refused_check_proves_nothing_if_the_late_answer_may_be_a_refusal() -> N
     assert [frame[1] for frame in port.sent] == [3, 3, 4, 3]
 
 
-def test_drive_that_cannot_be_told_apart_is_left_alone_for_a_while() -> None:
+def test_drive_that_cannot_be_distinguished_is_left_alone_for_a_while() -> None:
     refused = exception_response(1, 3, 2)
     port = ScriptedPort([(0.12, refused)], [(0.06, refused)], MUTE, [(0.001, answer(5))])
     line = line_on(port)
@@ -382,7 +382,7 @@ def test_no_echo_write_is_confirmed_by_one_copy() -> None:
 # --- loss ---
 
 
-def test_lost_adapter_is_told_once_and_opened_again() -> None:
+def test_lost_adapter_is_reported_once_and_opened_again() -> None:
     port = ScriptedPort([(0.001, answer(1))])
     changes: list[bool] = []
     line = Line(

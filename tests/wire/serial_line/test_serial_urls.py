@@ -75,12 +75,12 @@ def test_bad_urls(text: str, complaint: str) -> None:
 def test_the_remedy_is_an_example_of_that_bus(text: str, kinds: list[str]) -> None:
     with pytest.raises(OutOfRange) as refused:
         link_for(text)
-    told = refused.value.remedy
-    assert [kind for kind in ("ethercat", "canopen", "modbus", "mlink") if f"{kind}:" in told] == (
-        kinds
-    )
+    reported = refused.value.remedy
+    assert [
+        kind for kind in ("ethercat", "canopen", "modbus", "mlink") if f"{kind}:" in reported
+    ] == (kinds)
     # An example that would be refused itself were no help.
-    for example in told.removeprefix("write it like ").split(" or "):
+    for example in reported.removeprefix("write it like ").split(" or "):
         parse_url(example)
 
 

@@ -1,6 +1,6 @@
 import type { BrakeResult, FrictionResult, HealthResult, InertiaAnswer, JobInfo } from './schema'
 
-/** What a tool concluded: told apart by its field `tool`. */
+/** What a tool concluded: distinguished by its field `tool`. */
 type ToolOutcome = BrakeResult | FrictionResult | HealthResult | InertiaAnswer
 
 const outcome = (result: unknown): ToolOutcome | null =>

@@ -13,9 +13,9 @@ import { themeWith } from './theme'
 
 export function App() {
   const t = useT()
-  const told = useMemo(() => themeWith(t('close')), [t])
+  const reported = useMemo(() => themeWith(t('close')), [t])
   return (
-    <MantineProvider theme={told} defaultColorScheme="auto">
+    <MantineProvider theme={reported} defaultColorScheme="auto">
       <SessionGate>
         <Guard stop>
           <Frame>

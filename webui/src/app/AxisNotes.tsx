@@ -11,7 +11,7 @@ export function AxisNotes({ drive, page }: { drive: string; page: Page }) {
   const t = useT()
   const say = useSay()
   const state = useAxisState(drive)
-  const told = useFaultAtOpening(state)
+  const reported = useFaultAtOpening(state)
   if (!state) return null
   if (!state.fresh) {
     return (
@@ -21,7 +21,7 @@ export function AxisNotes({ drive, page }: { drive: string; page: Page }) {
     )
   }
   const faults = state.faults.filter((each) => each.kind === 'fault')
-  if (listsFaults(page, told) || faults.length === 0) return null
+  if (listsFaults(page, reported) || faults.length === 0) return null
   return (
     <p className="note fault" role="alert">
       <Icon name="alarms" />
@@ -41,7 +41,7 @@ export function AxisNotes({ drive, page }: { drive: string; page: Page }) {
 
 /**
  * Whether the axis had a fault or a warning when this page was opened: then it stands first on the
- * page, and stays there. What comes later is told above the page, which it must not move.
+ * page, and stays there. What comes later is reported above the page, which it must not move.
  */
 export function useFaultAtOpening(state: AxisState | null): boolean {
   const had = useRef<boolean | null>(null)

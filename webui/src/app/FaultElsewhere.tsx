@@ -32,14 +32,14 @@ export function FaultElsewhere({ chosen }: { chosen: string | null }) {
 
 /** Those of the axes that have an active fault, in their order. */
 function useFaulty(ids: string[]): string[] {
-  const told = useSyncExternalStore(
+  const reported = useSyncExternalStore(
     (listener) => {
       const ends = ids.map((id) => subscribe(`state ${id}`, listener))
       return () => ends.forEach((end) => end())
     },
     () => ids.filter(hasFault).join('\n'),
   )
-  return told === '' ? [] : told.split('\n')
+  return reported === '' ? [] : reported.split('\n')
 }
 
 const hasFault = (id: string): boolean =>

@@ -2,31 +2,31 @@ import { type ReactNode, useEffect, useLayoutEffect, useRef } from 'react'
 import { settled } from './settle'
 
 /**
- * What somebody must be told at once, whatever page is open. It stands above the page, also of one
+ * What somebody must be informed at once, whatever page is open. It stands above the page, also of one
  * that is scrolled, and coming or going it moves nothing: the page is scrolled by its height, and
  * what it lies over is reached by scrolling up. `page` names what is open.
  */
 export function Late({ page, children }: { page: string; children: ReactNode }) {
-  const told = useRef<HTMLDivElement>(null)
+  const reported = useRef<HTMLDivElement>(null)
   const room = useRef({ height: 0, left: 0, scrolled: 0 })
   const opened = useRef('')
   useLayoutEffect(() => {
     // Each page from its top, not from where the one before it was left.
-    const main = told.current?.parentElement
-    if (!main || !told.current || opened.current === page) return
+    const main = reported.current?.parentElement
+    if (!main || !reported.current || opened.current === page) return
     opened.current = page
-    told.current.style.marginBottom = ''
+    reported.current.style.marginBottom = ''
     main.scrollTo(0, 0)
     room.current.left = 0
     room.current.scrolled = 0
   }, [page])
   useEffect(() => {
-    const box = told.current
+    const box = reported.current
     const main = box?.parentElement
     if (!box || !main) return
     const kept = room.current
     const scrolled = () => {
-      // What the browser scrolls as a notice comes or goes may be told before its new height.
+      // What the browser scrolls as a notice comes or goes may be reported before its new height.
       if (box.offsetHeight === kept.height) kept.scrolled = main.scrollTop
     }
     const resized = () => {
@@ -58,7 +58,7 @@ export function Late({ page, children }: { page: string; children: ReactNode }) 
     }
   }, [])
   return (
-    <div className="late" ref={told}>
+    <div className="late" ref={reported}>
       {children}
     </div>
   )

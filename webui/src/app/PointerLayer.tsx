@@ -4,12 +4,12 @@ import { usePeople, usePointers } from '../live/people'
 
 const SEND_MS = 80
 
-/** This page's place, as the others are told. */
+/** This page's place, as the others are informed. */
 const here = () => window.location.hash.replace(/^#/, '')
 
 /**
  * Where the content of a page lies in the window, px: what a pointer's place is counted in. What is
- * told above the content is everybody's own, so its height does not count.
+ * reported above the content is everybody's own, so its height does not count.
  */
 function content(): { left: number; top: number; width: number; height: number } | null {
   const main = document.getElementById('main')

@@ -41,14 +41,16 @@ export function TurningNote() {
 
 /** Those axes, in their order; their speeds come with the next change of state. */
 function useTurning(ids: string[]): string[] {
-  const told = useSyncExternalStore(
+  const reported = useSyncExternalStore(
     (listener) => {
       const ends = ids.map((id) => subscribe(`state ${id}`, listener))
       return () => ends.forEach((end) => end())
     },
     () => ids.map(mark).filter(Boolean).join('\n'),
   )
-  return told === '' ? [] : told.split('\n').map((each) => each.slice(0, each.indexOf('\t')))
+  return reported === ''
+    ? []
+    : reported.split('\n').map((each) => each.slice(0, each.indexOf('\t')))
 }
 
 function mark(id: string): string {

@@ -8,9 +8,9 @@ const top = ({ scrolled, left }: { scrolled: number; left: number }, notices: nu
 describe('a notice above a page', () => {
   it('comes and goes without moving what is below it', () => {
     const open = { scrolled: 0, left: 0 }
-    const told = settled(open, 0, 80)
-    expect(told).toEqual({ scrolled: 80, left: 0 })
-    expect(settled(told, 80, 0)).toEqual(open)
+    const reported = settled(open, 0, 80)
+    expect(reported).toEqual({ scrolled: 80, left: 0 })
+    expect(settled(reported, 80, 0)).toEqual(open)
     const deep = settled({ scrolled: 300, left: 0 }, 0, 80)
     expect(deep).toEqual({ scrolled: 380, left: 0 })
   })

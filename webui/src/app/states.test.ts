@@ -36,7 +36,7 @@ describe('link quality in a word', () => {
 })
 
 describe('a fault', () => {
-  it('is told above every page that does not list it itself, also when it was there before', () => {
+  it('is reported above every page that does not list it itself, also when it was there before', () => {
     for (const page of ['response', 'tune', 'motion', 'gains', 'parameters'] as const) {
       expect(listsFaults(page, true)).toBe(false)
     }

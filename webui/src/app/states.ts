@@ -47,6 +47,6 @@ export function linkLook(quality: Quality | null): {
   return { word: 'good', tone: 'live' }
 }
 
-/** Whether a page has the faults first on it itself; `told`: there were some when it was opened. */
-export const listsFaults = (page: Page, told: boolean): boolean =>
-  page === 'alarms' || (page === 'overview' && told)
+/** Whether a page has the faults first on it itself; `reported`: there were some when it was opened. */
+export const listsFaults = (page: Page, reported: boolean): boolean =>
+  page === 'alarms' || (page === 'overview' && reported)

@@ -62,7 +62,7 @@ describe('pointing', () => {
     const sent: PlotCursor[] = []
     return { sent, pointing: new Pointing((message) => sent.push(message)) }
   }
-  const told = (plot: PlotCursor['plot'], x: number | null, y: number | null = null) => ({
+  const reported = (plot: PlotCursor['plot'], x: number | null, y: number | null = null) => ({
     type: 'plot_cursor',
     plot,
     x,
@@ -78,7 +78,7 @@ describe('pointing', () => {
     pointing.tick(true)
     x = 1.6
     pointing.tick(true)
-    expect(sent).toEqual([told('scope', 1.5), told('scope', 1.6)])
+    expect(sent).toEqual([reported('scope', 1.5), reported('scope', 1.6)])
   })
   it('tells of another frequency at the same time', () => {
     const { sent, pointing } = make()
@@ -88,9 +88,9 @@ describe('pointing', () => {
     pointing.tick(true)
     y = 60
     pointing.tick(true)
-    expect(sent).toEqual([told('scope', 1.5, 50), told('scope', 1.5, 60)])
+    expect(sent).toEqual([reported('scope', 1.5, 50), reported('scope', 1.5, 60)])
   })
-  it('says nothing while nobody is told, and takes back what it said', () => {
+  it('says nothing while nobody is reported, and takes back what it said', () => {
     const { sent, pointing } = make()
     pointing.enter('scope', () => at(1))
     pointing.tick(false)
@@ -98,7 +98,7 @@ describe('pointing', () => {
     pointing.tick(true)
     pointing.tick(false)
     pointing.tick(false)
-    expect(sent).toEqual([told('scope', 1), told('scope', null)])
+    expect(sent).toEqual([reported('scope', 1), reported('scope', null)])
   })
   it('takes back the old plot before it tells of the new one', () => {
     const { sent, pointing } = make()
@@ -108,7 +108,11 @@ describe('pointing', () => {
     pointing.enter('step', () => at(0.2))
     pointing.leave(first) // the leave of the first may come after the enter of the second
     pointing.tick(true)
-    expect(sent).toEqual([told('response', 5), told('response', null), told('step', 0.2)])
+    expect(sent).toEqual([
+      reported('response', 5),
+      reported('response', null),
+      reported('step', 0.2),
+    ])
   })
   it('is over when the pointer leaves, or when the plot has no place for it', () => {
     const { sent, pointing } = make()

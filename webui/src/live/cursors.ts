@@ -43,7 +43,7 @@ export function heldInside(place: number, width: number): { left: number; beyond
  */
 export class Pointing {
   private now: { plot: PlotName; read: () => Pointed | null } | null = null
-  private told: ({ plot: PlotName } & Pointed) | null = null
+  private reported: ({ plot: PlotName } & Pointed) | null = null
 
   constructor(private readonly send: (message: PlotCursor) => void) {}
 
@@ -57,17 +57,17 @@ export class Pointing {
     if (this.now?.read === read) this.now = null
   }
 
-  /** Called at the rate at which the others are told; `shared` is whether they are told at all. */
+  /** Called at the rate at which the others are informed; `shared` is whether they are reported at all. */
   tick(shared: boolean): void {
     const at = shared ? (this.now?.read() ?? null) : null
     const plot = at === null ? null : (this.now?.plot ?? null)
-    if (this.told !== null && this.told.plot !== plot) {
-      this.send({ type: 'plot_cursor', plot: this.told.plot, x: null, y: null })
-      this.told = null
+    if (this.reported !== null && this.reported.plot !== plot) {
+      this.send({ type: 'plot_cursor', plot: this.reported.plot, x: null, y: null })
+      this.reported = null
     }
     if (plot === null || at === null) return
-    if (at.x === this.told?.x && at.y === this.told.y) return
-    this.told = { plot, ...at }
+    if (at.x === this.reported?.x && at.y === this.reported.y) return
+    this.reported = { plot, ...at }
     this.send({ type: 'plot_cursor', plot, ...at })
   }
 }

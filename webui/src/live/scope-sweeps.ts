@@ -14,7 +14,7 @@ export class ScopeSweeps {
   private found: Sweep[] = []
   private count = 0
   private armedAt = 0
-  private told: TriggerState = 'off'
+  private reported: TriggerState = 'off'
 
   /** `changed` hears what the trigger is up to, whenever that changes. */
   constructor(private readonly changed: (state: TriggerState) => void) {}
@@ -52,8 +52,8 @@ export class ScopeSweeps {
 
   private tell(): void {
     const state = !this.finder ? 'off' : this.found.length === 0 ? 'waiting' : 'triggered'
-    if (state !== this.told) this.changed(state)
-    this.told = state
+    if (state !== this.reported) this.changed(state)
+    this.reported = state
   }
 
   /** Whether the one picture that was wanted is there, of all traces that bring anything. */

@@ -443,7 +443,7 @@ describe('scope store', () => {
     scope.block(frame({ t0: 10, dt: 0.5, rows: [[0]], sequence: 21 }))
     expect(scope.answer('view', whole).newest).toBe(10)
     scope.setTrigger(null)
-    // Told to every page, once for each change.
+    // Commanded to every page, once for each change.
     expect(sent.slice(2)).toEqual(['waiting', 'triggered', 'waiting', 'off'])
   })
   it('keeps a picture that stands, and runs on when it is followed again', () => {

@@ -93,10 +93,10 @@ describe('a refusal', () => {
     contents.refused = { request: 'jog_start', problem, at: 0 }
     askedAnew('watch')
     expect(contents.refused).not.toBeNull()
-    let told = 0
-    const end = subscribe('refused', () => told++)
+    let reported = 0
+    const end = subscribe('refused', () => reported++)
     askedAnew('jog_start')
     end()
-    expect([contents.refused, told]).toEqual([null, 1])
+    expect([contents.refused, reported]).toEqual([null, 1])
   })
 })

@@ -8,7 +8,7 @@ const LEFT = 62
 const BOTTOM = 40
 const TOP = 8
 const RIGHT = 78
-/** Decibels below the loudest that are still told apart. */
+/** Decibels below the loudest that are still distinguished. */
 const RANGE_DB = 70
 /** From quiet to loud; each step is lighter than the one before, so it is read without colour. */
 const SCALE = [

@@ -8,7 +8,7 @@ import { clock, duration } from './format'
 import { ProblemNote } from './ProblemNote'
 import { useAction } from './useAction'
 
-/** How long the good end of a job is told. */
+/** How long the good end of a job is reported. */
 const DONE_MS = 6000
 
 /** Progress of a job: step, elapsed and remaining time, cancel; then how it ended. */

@@ -119,7 +119,7 @@ function Field({ drive, row }: { drive: string; row: ParameterRow }) {
   const reading = useReading(drive, row.key) ?? row.reading
   const edited = useEdits(drive).edits.has(row.key)
   const can = editable(row)
-  const told = row.help || row.notes || row.settable === 'stopped'
+  const reported = row.help || row.notes || row.settable === 'stopped'
   return (
     <>
       <div className="field">
@@ -133,7 +133,7 @@ function Field({ drive, row }: { drive: string; row: ParameterRow }) {
               {t('gear.now')} {readingText(row, reading, false)} {row.unit}
             </small>
           )}
-          {told && (
+          {reported && (
             <details>
               <summary aria-label={t('fields.about', { name: row.name })}>?</summary>
               {row.help && <p className="prose">{row.help}</p>}

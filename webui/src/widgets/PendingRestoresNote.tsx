@@ -13,8 +13,8 @@ export function PendingRestoresNote({ drive }: { drive: string }) {
   const summary = useDrive(drive)
   const act = useAction()
   const [started, setStarted] = useState<string | null>(null)
-  const told = <JobNote id={started} onClose={() => setStarted(null)} />
-  if (!summary || summary.pending_restores.length === 0) return told
+  const reported = <JobNote id={started} onClose={() => setStarted(null)} />
+  if (!summary || summary.pending_restores.length === 0) return reported
   const path = { params: { path: { drive_id: drive } } }
   const putBack = () =>
     act.run(async () => {
@@ -27,11 +27,11 @@ export function PendingRestoresNote({ drive }: { drive: string }) {
   return (
     <div className="note warn" role="alert">
       <p>
-        <strong>{t('owed.title', { count: summary.pending_restores.length })}</strong>{' '}
-        {t(summary.connected ? 'owed.offered' : 'owed.text')}
+        <strong>{t('pending.title', { count: summary.pending_restores.length })}</strong>{' '}
+        {t(summary.connected ? 'pending.offered' : 'pending.text')}
       </p>
       <details>
-        <summary>{t('owed.which')}</summary>
+        <summary>{t('pending.which')}</summary>
         <dl className="facts">
           {summary.pending_restores.map((each) => (
             <div key={each.key} className="pair">
@@ -40,7 +40,7 @@ export function PendingRestoresNote({ drive }: { drive: string }) {
               </dt>
               <dd className="mono">
                 {each.raw}
-                {each.unapplied && ` (${t('owed.unapplied')})`}
+                {each.unapplied && ` (${t('pending.unapplied')})`}
               </dd>
             </div>
           ))}
@@ -53,14 +53,14 @@ export function PendingRestoresNote({ drive }: { drive: string }) {
           loading={act.busy}
           onClick={() => void putBack()}
         >
-          {t('owed.putBack')}
+          {t('pending.putBack')}
         </Button>
         <Button disabled={act.busy} onClick={() => void leave()}>
-          {t('owed.leave')}
+          {t('pending.leave')}
         </Button>
       </div>
-      {!summary.connected && <p className="dim">{t('owed.waits')}</p>}
-      {told}
+      {!summary.connected && <p className="dim">{t('pending.waits')}</p>}
+      {reported}
       <ProblemNote problem={act.problem} onClose={act.clear} />
     </div>
   )

@@ -21,13 +21,13 @@ export function StartButton({
   children: ReactNode
 }) {
   const t = useT()
-  const [told, setTold] = useState<string | null>(null)
+  const [reported, setTold] = useState<string | null>(null)
   useEffect(() => {
-    if (told === null) return
+    if (reported === null) return
     if (busy) setTold(null)
     const timer = setTimeout(() => setTold(null), TOLD_MS)
     return () => clearTimeout(timer)
-  }, [told, busy])
+  }, [reported, busy])
   return (
     <>
       <Button
@@ -42,9 +42,9 @@ export function StartButton({
       >
         {children}
       </Button>
-      {told !== null && (
+      {reported !== null && (
         <p className="note warn not-begun" role="alert">
-          <strong>{t('start.not')}</strong> {told}
+          <strong>{t('start.not')}</strong> {reported}
         </p>
       )}
     </>

@@ -1,7 +1,7 @@
 cyclic_axis-being-disabled = the axis is being disabled
 cyclic_braking = { $where } is braking: { $why }
     .remedy = wait until it stands
-cyclic_cycle-cannot-told-drive = a cycle of { NUM($cycle_us, format: "g") } µs cannot be told to the drive
+cyclic_cycle-cannot-reported-drive = a cycle of { NUM($cycle_us, format: "g") } µs cannot be commanded to the drive
     .remedy = choose another cycle, such as 1 ms
 cyclic_limit-cannot-watched-not = { $where }: the { $name } limit cannot be watched, { NUM($index, format: "04X") }h is not mapped
     .remedy = configure the cyclic data with { NUM($index, format: "04X") }h

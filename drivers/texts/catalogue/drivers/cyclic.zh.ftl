@@ -1,7 +1,7 @@
 cyclic_axis-being-disabled = 正在断使能
 cyclic_braking = { $where } 正在制动：{ $why }
     .remedy = 请等待其静止
-cyclic_cycle-cannot-told-drive = 无法向驱动器设置 { NUM($cycle_us, format: "g") } µs 的周期
+cyclic_cycle-cannot-reported-drive = 无法向驱动器设置 { NUM($cycle_us, format: "g") } µs 的周期
     .remedy = 请选择其他周期，如 1 ms
 cyclic_limit-cannot-watched-not = { $where }：无法监视{ $name }限值，未映射 { NUM($index, format: "04X") }h
     .remedy = 请将 { NUM($index, format: "04X") }h 配置到循环数据中

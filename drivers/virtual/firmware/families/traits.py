@@ -1,4 +1,4 @@
-"""Traits of the families that are otherwise told by their profiles, with manual lines."""
+"""Traits of the families that are otherwise shown by their profiles, with manual lines."""
 
 from __future__ import annotations
 
@@ -278,7 +278,7 @@ EP3E = Traits(
 
 #: Xinlichuan DS_C: 2200h to 2203h are triggers that stay until they are written back to 0
 #: (003:411-422); own status word (003:298-308); 607Dh:01 is the positive limit. The manual prints
-#: no watchdog of any kind: with the line cut, the drive goes on with what it was told. Control
+#: no watchdog of any kind: with the line cut, the drive goes on with what it was reported. Control
 #: word 11 is an emergency stop (003:296); its ramp is not printed, 6084h is assumed.
 DS_C = Traits(
     commands={

@@ -91,7 +91,7 @@ class SegmentServer:
         self._sequence = 0
 
     def run(self) -> None:
-        """Serve. Returns when told to stop."""
+        """Serve. Returns when commanded to stop."""
         wire, descriptors = self._socket.fileno(), (self._socket.fileno(), self._commands)
         self._control.ready()
         while not self._control.stopped:

@@ -41,7 +41,7 @@ export const bench = {
   'confidence.possible': ['possible', '可能'],
   'confidence.none': ['does not match', '不匹配'],
   'connect.noMatch': [
-    'Nothing the drive told fits this profile. Writing with a wrong profile can damage the machine.',
+    'Nothing the drive reported fits this profile. Writing with a wrong profile can damage the machine.',
     '驱动器信息与此配置文件不符。使用错误的配置文件写入可能损坏机器。',
   ],
   'connect.secondPort': [

@@ -76,7 +76,7 @@ export const library = {
   'three.base': ['Common base', '共同基准'],
   'three.noBase': ['none: compare two', '无：两方比较'],
   'three.baseHelp': [
-    'With a base, what changed in the set and what changed in the drive are told apart.',
+    'With a base, what changed in the set and what changed in the drive are distinguished.',
     '选择基准后，可区分参数集中的更改和驱动器中的更改。',
   ],
   'three.close': ['Close the comparison', '关闭比较'],

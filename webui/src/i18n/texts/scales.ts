@@ -70,9 +70,12 @@ export const scales = {
     '移动 {moved} 个增量后。看不出？请移动更多。',
   ],
   'scales.confirm': ['That is what it turned', '确认转角'],
-  'scales.told': ['606Ch told {value} per increment per second.', '606Ch 每增量每秒对应 {value}。'],
+  'scales.reported': [
+    '606Ch showed {value} per increment per second.',
+    '606Ch 每增量每秒对应 {value}。',
+  ],
   'scales.toldNothing': [
-    '606Ch told nothing that goes with the position.',
+    '606Ch showed nothing that goes with the position.',
     '606Ch 的值与位置不相符。',
   ],
   'scales.state': ['State from a data sheet', '按数据手册给定'],

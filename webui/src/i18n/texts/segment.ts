@@ -56,7 +56,7 @@ export const segment = {
   'segment.forwarded': ['Forwarded RX errors', '上游损坏'],
   'segment.writeAlias': ['Write alias', '写入别名'],
   'segment.aliasWarning': [
-    'Written to the drive’s EEPROM, valid after its supply was switched off and on. Machines whose controller addresses drives by alias must be told. Nothing may move on this bus meanwhile.',
+    'Written to the drive’s EEPROM, valid after its supply was switched off and on. Machines whose controller addresses drives by alias must be reported. Nothing may move on this bus meanwhile.',
     '写入驱动器 EEPROM，断电重启后生效。若控制器按别名寻址，需同步修改。写入期间此总线上不得有运动。',
   ],
   'segment.aliasSure': ['I want to change the EEPROM', '我确认修改 EEPROM'],

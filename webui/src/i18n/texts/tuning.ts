@@ -71,7 +71,7 @@ export const tuning = {
   ],
   'excite.title': ['Preview of the excitation', '激励预览'],
   'excite.one': ['first realisation', '第一次激励'],
-  'excite.told': [
+  'excite.reported': [
     '{count} runs, {duration} in all; {lines} lines from {from} to {to}; peak {peak} {unit}, crest factor {crest}. Scaled once more to the axis as it is felt before it starts, never above the limits.',
     '{count} 次，共 {duration}；{from} 至 {to} 共 {lines} 条谱线；峰值 {peak} {unit}，峰值因数 {crest}。开始前会按实测轴特性再次缩放，绝不超过限制。',
   ],
@@ -271,23 +271,23 @@ export const tuning = {
     '将写入驱动器的全部陷波并使其生效。轴必须断使能。未保存到驱动器前，断电会丢失。',
   ],
   'notch.writeNow': ['Write', '写入'],
-  'owed.title': [
+  'pending.title': [
     'Not put back: {count} of this axis’s parameters.',
     '未恢复：该轴的 {count} 个参数。',
   ],
-  'owed.text': [
+  'pending.text': [
     'A motion set them for its own length and lost the drive before its end. They are put back by themselves when the drive answers again, as long as the axis stands and nobody has changed them. Look at them before the next motion.',
     '某次运动临时更改了它们，结束前与驱动器失去联系。驱动器恢复应答后，若轴静止且无人更改过，将自动恢复。下次运动前请检查。',
   ],
-  'owed.offered': [
+  'pending.offered': [
     'A motion set them for its own length and lost the drive before its end. They were not put back by themselves: somebody has changed them since, or the axis was in use. Decide before the next motion.',
     '某次运动临时更改了它们，结束前与驱动器失去联系。未能自动恢复：此后有人更改过，或轴正在使用。请在下次运动前决定。',
   ],
-  'owed.which': ['Which, and what they were before', '哪些参数，原来的值'],
-  'owed.unapplied': ['back, but not in effect yet', '已写回，尚未生效'],
-  'owed.putBack': ['Put them back', '恢复原值'],
-  'owed.leave': ['Leave them as they are', '保持现状'],
-  'owed.waits': ['The drive does not answer now.', '驱动器目前没有应答。'],
+  'pending.which': ['Which, and what they were before', '哪些参数，原来的值'],
+  'pending.unapplied': ['back, but not in effect yet', '已写回，尚未生效'],
+  'pending.putBack': ['Put them back', '恢复原值'],
+  'pending.leave': ['Leave them as they are', '保持现状'],
+  'pending.waits': ['The drive does not answer now.', '驱动器目前没有应答。'],
   'undo.notches': ['Notches were written.', '已写入陷波。'],
   'undo.gains': ['Gains were written.', '已写入增益。'],
   'undo.candidate': ['A set of gains and notches was written.', '已写入一组增益和陷波。'],

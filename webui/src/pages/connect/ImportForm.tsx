@@ -54,7 +54,7 @@ export function ImportForm({
       setId(null)
       setMade(null)
       start.clear()
-      const told = await ask(
+      const reported = await ask(
         api.POST('/api/v1/descriptions/devices', {
           params: { query: { file: chosen.name } },
           body: chosen as never,
@@ -62,8 +62,8 @@ export function ImportForm({
           headers: raw,
         }),
       )
-      setDevices(told)
-      setDevice(deviceFor(told, found))
+      setDevices(reported)
+      setDevice(deviceFor(reported, found))
     })
   const send = (chosen: File) =>
     begin(() =>

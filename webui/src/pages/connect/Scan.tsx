@@ -145,7 +145,7 @@ function Found({ found }: { found: FoundDrive }) {
         }),
       ),
     )
-    // Agreed to for one try, and only after the difference has been told.
+    // Agreed to for one try, and only after the difference has been reported.
     setAccept(false)
     setDoubted(!added)
   }

@@ -7,7 +7,7 @@ describe('figures of a link', () => {
     expect(load).toMatchObject({ words: 'cyclic bus load', value: '12.5', unit: '%' })
     expect(new_).toMatchObject({ words: 'new counter', value: '3', unit: '' })
   })
-  it('are told once', () => {
+  it('are reported once', () => {
     expect(figures({ cyclic_running: 0, late_below_64_us: 9, mailbox_repeats: 2 })).toEqual([])
   })
 })

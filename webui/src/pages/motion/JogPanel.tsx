@@ -12,7 +12,7 @@ import type { TravelUnit } from './travelUnit'
 import { type JogSettings, useJog } from './useJog'
 import { useMotionNumbers } from './useMotionNumbers'
 
-/** How long it is told why a press began nothing. */
+/** How long it is informed of the reason why a press began nothing. */
 const TOLD_MS = 12000
 
 /** Hold to run: by mouse, finger or arrow key; whatever ends the hold stops the axis. */
@@ -45,12 +45,12 @@ export function JogPanel({
     : taken && ending
       ? t('jog.ending')
       : (inTheWay ?? (settings ? null : t('jog.invalid')))
-  const [told, setTold] = useState<string | null>(null)
+  const [reported, setTold] = useState<string | null>(null)
   useEffect(() => {
-    if (told === null) return
+    if (reported === null) return
     const timer = setTimeout(() => setTold(null), TOLD_MS)
     return () => clearTimeout(timer)
-  }, [told])
+  }, [reported])
   /** A press that begins nothing says why: a lost answer of the drive is soon over and unseen. */
   const begin = (towards: -1 | 1): boolean => {
     if (hold.held !== null) return press(towards) // which ends it
@@ -132,9 +132,9 @@ export function JogPanel({
         </p>
       )}
       {!settings && <p className="warn-text">{t('jog.invalid')}</p>}
-      {told !== null && !running && (
+      {reported !== null && !running && (
         <p className="note warn not-begun" role="alert">
-          <strong>{t('start.not')}</strong> {told}
+          <strong>{t('start.not')}</strong> {reported}
         </p>
       )}
       {gap && (

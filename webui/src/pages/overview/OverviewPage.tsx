@@ -23,7 +23,7 @@ export function OverviewPage({ drive }: { drive: string }) {
   const state = useAxisState(drive)
   const summary = useDrive(drive)
   const change = useAction()
-  const told = useFaultAtOpening(state)
+  const reported = useFaultAtOpening(state)
   const reset = useFaultReset(drive)
   const goTo = (goal: string) =>
     change.run(async () =>
@@ -41,7 +41,7 @@ export function OverviewPage({ drive }: { drive: string }) {
       <h1>
         {summary?.name} <small className="dim">{summary?.title}</small>
       </h1>
-      {told && state && (
+      {reported && state && (
         <Panel title={t('faults.active')} className="fault-panel">
           <FaultList drive={drive} faults={state.faults} />
           {state.faults.length === 0 && <p className="good-text">{t('faults.none')}</p>}

@@ -162,7 +162,7 @@ function Teach({
           <p>
             {moves.raw_per_inc_s === null
               ? t('scales.toldNothing')
-              : t('scales.told', { value: figure(moves.raw_per_inc_s, 4) })}
+              : t('scales.reported', { value: figure(moves.raw_per_inc_s, 4) })}
           </p>
           <NumberField
             label={t('scales.turned')}

@@ -15,7 +15,7 @@ import { setRecord, useRecord } from '../../widgets/useFunctions'
 import { readingText } from '../parameters/GridRow'
 
 const PERIOD_S = 0.5
-/** Older than this, a value is told with its age. */
+/** Older than this, a value is reported with its age. */
 const FRESH_MS = 3000
 
 const label = (row: ParameterRow) => `${row.name} · ${row.number ?? row.key}`

@@ -25,7 +25,7 @@ export function Invitations() {
     <Panel title={t('support.title')}>
       <p className="prose">{t('support.text')}</p>
       <Invite onMade={setMade} />
-      {made && shown && <Told made={made} />}
+      {made && shown && <Reported made={made} />}
       {open.map((each) => (
         <Invited key={each.id} invitation={each} />
       ))}
@@ -105,7 +105,7 @@ export function Rights(props: {
 }
 
 /** Link and code, shown once; they go to the guest by two different ways. */
-function Told({ made }: { made: MadeInvitation }) {
+function Reported({ made }: { made: MadeInvitation }) {
   const t = useT()
   const [copied, setCopied] = useState(false)
   const link = `${window.location.origin}${window.location.pathname}#${made.link}`

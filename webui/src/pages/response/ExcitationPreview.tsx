@@ -64,7 +64,7 @@ export function ExcitationPreview({
         height={170}
       />
       <p className="dim">
-        {t('excite.told', {
+        {t('excite.reported', {
           count: found.realisations,
           duration: fixed(found.duration_s, 1, 's'),
           lines: found.frequency_hz.length,

@@ -130,7 +130,7 @@ describe('export', () => {
 })
 
 describe('results of jobs', () => {
-  it('are told apart', () => {
+  it('are distinguished', () => {
     expect(asSweep(sweep)).toBe(sweep)
     expect(asSweep({ verdict: 'good' })).toBeNull()
     expect(asAutotune(null)).toBeNull()

@@ -31,7 +31,7 @@ describe('the camera of the scene', () => {
     }
   })
 
-  it('never stands so far away that nothing can be told apart', () => {
+  it('never stands so far away that nothing can be distinguished', () => {
     expect(distance(-1, 0.1)).toBeCloseTo(2.5 * distance(-1, 1.25))
   })
 

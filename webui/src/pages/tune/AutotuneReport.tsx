@@ -54,8 +54,8 @@ export function AutotuneReport({
       setPressed(true)
       onChanged()
     })
-  const told = forceOf(result.before, result.after ?? {}, now ?? {})
-  const force = pressed ? 'takenBack' : told
+  const reported = forceOf(result.before, result.after ?? {}, now ?? {})
+  const force = pressed ? 'takenBack' : reported
   return (
     <>
       {applied && (

@@ -125,7 +125,7 @@ export function BrakeAnswer({ result, text }: { result: BrakeResult; text: Text 
       )}
       {result.ways.length > 0 && (
         <div className="scroll-table">
-          <table className="told-values" aria-label={text('title')}>
+          <table className="reported-values" aria-label={text('title')}>
             <thead>
               <tr>
                 <th>{t('inertia.quantity')}</th>

@@ -128,7 +128,7 @@ export function FrictionMap({ result, text }: { result: FrictionResult; text: Te
         />
       )}
       <div className="scroll-table">
-        <table className="told-values" aria-label={text('title')}>
+        <table className="reported-values" aria-label={text('title')}>
           <thead>
             <tr>
               <th>{t('inertia.quantity')}</th>

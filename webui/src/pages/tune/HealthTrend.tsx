@@ -64,7 +64,7 @@ export function HealthTrend({ runs }: { runs: HealthRunInfo[] }) {
         dates
       />
       <div className="scroll-table">
-        <table className="told-values" aria-label={t('health.over', { name: nameOf(one) })}>
+        <table className="reported-values" aria-label={t('health.over', { name: nameOf(one) })}>
           <thead>
             <tr>
               <th>{t('health.date')}</th>

@@ -160,7 +160,7 @@ export function InertiaResult({ result }: { result: Inertia }) {
         {reasons.join('\n')}
       </p>
       <div className="scroll-table">
-        <table className="told-values" aria-label={t('inertia.title')}>
+        <table className="reported-values" aria-label={t('inertia.title')}>
           <thead>
             <tr>
               <th>{t('inertia.quantity')}</th>

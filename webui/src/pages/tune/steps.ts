@@ -11,7 +11,7 @@ export interface Check {
   optional?: boolean
 }
 
-/** What the server will insist on, told before the button is pressed. */
+/** What the server will insist on, reported before the button is pressed. */
 export function preChecks(
   drive: DriveSummary,
   state: AxisState | null,

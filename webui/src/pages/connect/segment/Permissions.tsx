@@ -13,7 +13,7 @@ export function InterfacePermissions({ url }: { url: string }) {
     if (!REAL.test(url)) return
     let wanted = true
     ask(api.GET('/api/v1/ethercat/permissions', { params: { query: { url } } })).then(
-      (told) => wanted && setReport(told),
+      (reported) => wanted && setReport(reported),
       () => {},
     )
     return () => {

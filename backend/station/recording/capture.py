@@ -16,15 +16,15 @@ from pathlib import Path
 from backend import __version__
 from backend.axis.cyclic import INPUT_ROLES, OUTPUT_ROLES
 from backend.drive.readings import Reading
-from backend.recording import facts
 from backend.recording.bundle import build_apart
 from backend.recording.evidence import Evidence, Value
 from backend.recording.flight import flights
-from backend.recording.streams import describe_streams
 from backend.recording.writer import RESERVE_BYTES, free_bytes
 from backend.scope.hub import Subscription
 from backend.station.bench import Bench
 from backend.station.monitor import Snapshot
+from backend.station.recording import facts
+from backend.station.recording.streams import describe_streams
 from backend.store.files import StorageFailed, checked_name
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import ScopeBlock
@@ -73,7 +73,7 @@ class FaultCapture:
         self._values: deque[Value] = deque(maxlen=MAX_VALUES)
         self._faults: dict[str, frozenset[str]] = {}
         self._pending: list[str] = []
-        self._told: dict[tuple[str, str], float] = {}
+        self._reported: dict[tuple[str, str], float] = {}
         self._task: asyncio.Task[None] | None = None
         self._held: asyncio.Task[None] | None = None
         bench.on_snapshot.append(self._snapshot)
@@ -164,9 +164,9 @@ class FaultCapture:
         if connected is None or not self.armed:
             return
         at = time.monotonic()
-        if all(at - self._told.get((drive, f.code), -PAUSE_S) < PAUSE_S for f in new):
+        if all(at - self._reported.get((drive, f.code), -PAUSE_S) < PAUSE_S for f in new):
             return
-        self._told |= {(drive, f.code): at for f in new}
+        self._reported |= {(drive, f.code): at for f in new}
         self._pending.append(f"{connected.drive.name}: {text}")
         if self._task is None or self._task.done():
             self._task = asyncio.create_task(self._freeze(time.time()), name="fault-capture")

@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from backend import __version__
-from backend.recording import facts
-from backend.recording.streams import describe_streams
 from backend.recording.writer import RecordingWriter, Written
 from backend.scope.hub import Subscription
 from backend.station.bench import Bench
+from backend.station.recording import facts
+from backend.station.recording.streams import describe_streams
 from backend.store.files import StorageFailed
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.link import ScopeBlock
@@ -28,7 +28,7 @@ from drivers.link import ScopeBlock
 FORMAT = 1
 #: Reading the settings of a slow drive must not keep a recording from beginning.
 PARAMETERS_TIMEOUT_S = 5.0
-#: A stream that brought nothing for this long is told.
+#: A stream that brought nothing for this long is reported.
 SILENT_S = 2.0
 #: Memory for what comes before the trigger.
 MAX_PRE_BYTES = 256 * 1024 * 1024
@@ -305,7 +305,7 @@ class Recorder:
     # --- end --------------------------------------------------------------------------
 
     async def stop(self, reason: str) -> None:
-        """End it. Calling again does nothing; a failure is told in ``problem``."""
+        """End it. Calling again does nothing; a failure is reported in ``problem``."""
         if self.phase == "ended":
             return
         empty = self.phase != "recording"
@@ -332,11 +332,11 @@ class Recorder:
     def _failed_soon(self) -> Callable[[StorageFailed], None]:
         loop = asyncio.get_running_loop()
 
-        def told(error: StorageFailed) -> None:
+        def reported(error: StorageFailed) -> None:
             with contextlib.suppress(RuntimeError):  # the loop is closed: nobody left to tell
                 loop.call_soon_threadsafe(self._failed, error)
 
-        return told
+        return reported
 
     def _failed(self, error: StorageFailed) -> None:
         self.problem = error.message

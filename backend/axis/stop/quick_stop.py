@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from backend.axis.stop.settings import COAST, OPTION, braking_option
 from backend.drive.drive import Drive
 from backend.drive.optional import existing
 from backend.scales.units import AxisUnits
-from backend.stopping.settings import COAST, OPTION, braking_option
 from profiles.schema import Parameter, Raw
 
 #: From any permitted speed to standstill, as `drivers.motion.playback` ramps setpoints down.

@@ -59,19 +59,19 @@ class FeedbackScale:
 
 @dataclass(frozen=True, slots=True)
 class Contradiction:
-    """What each tells, in raw units of 606Ch: ``told`` by 606Ch, ``seen`` by the position."""
+    """What each tells, in raw units of 606Ch: ``reported`` by 606Ch, ``seen`` by the position."""
 
     kind: Disagreement
-    told: float
+    reported: float
     seen: float
 
 
 @dataclass(slots=True)
 class _Part:
     moved: int = 0
-    told: float = 0.0
+    reported: float = 0.0
     time_s: float = 0.0
-    peak_told: float = 0.0
+    peak_reported: float = 0.0
 
 
 class FeedbackWatch:
@@ -105,9 +105,9 @@ class FeedbackWatch:
         part = self._open
         elapsed = at_s - last[2]
         part.moved += _difference(position, last[0])
-        part.told += 0.5 * (velocity + last[1]) * elapsed
+        part.reported += 0.5 * (velocity + last[1]) * elapsed
         part.time_s += elapsed
-        part.peak_told = max(part.peak_told, abs(velocity))
+        part.peak_reported = max(part.peak_reported, abs(velocity))
         self._samples += 1
         if part.time_s < self._part_s or self._samples < 2:
             return None
@@ -142,38 +142,38 @@ class FeedbackWatch:
         return moved / time_s * self._scale.velocity_per_inc_s if least > limit else None
 
     def denied(self) -> Contradiction | None:
-        """Whether the position denies the speed that 606Ch has told over the newest samples."""
+        """Whether the position denies the speed that 606Ch has shown over the newest samples."""
         newest = list(self._newest)
         if len(newest) < 2:
             return None
         time_s = newest[-1][2] - newest[0][2]
         if time_s <= 0:
             return None
-        told = sum(
+        reported = sum(
             0.5 * (new[1] + old[1]) * (new[2] - old[2])
             for old, new in pairwise(newest)
         ) / time_s  # fmt: skip
         moved = _difference(newest[-1][0], newest[0][0])
         per = self._scale.velocity_per_inc_s
         most = (abs(moved) + _COUNTS) / time_s * abs(per)
-        return self._of(told, moved, time_s) if self._apart(most, abs(told)) else None
+        return self._of(reported, moved, time_s) if self._apart(most, abs(reported)) else None
 
     def unnoticed(self, seen: float) -> Contradiction | None:
-        """Whether 606Ch denies this speed of the position: it never told of one like it lately."""
+        """Whether 606Ch denies this speed of the position: it reported none like it lately."""
         recent = self._recent()
-        if not self._apart(max(part.peak_told for part in recent), abs(seen)):
+        if not self._apart(max(part.peak_reported for part in recent), abs(seen)):
             return None
         time_s = sum(part.time_s for part in recent)
         moved = sum(part.moved for part in recent)
-        return self._of(sum(part.told for part in recent) / time_s, moved, time_s)
+        return self._of(sum(part.reported for part in recent) / time_s, moved, time_s)
 
     def _apart(self, low: float, high: float) -> bool:
         return low * _APART < high and high - low > self._ignored
 
-    def _of(self, told: float, moved: int, time_s: float) -> Contradiction:
+    def _of(self, reported: float, moved: int, time_s: float) -> Contradiction:
         within = abs(moved) <= _COUNTS
         seen = 0.0 if within else moved / time_s * self._scale.velocity_per_inc_s
-        return Contradiction(disagreement(told, seen), told, seen)
+        return Contradiction(disagreement(reported, seen), reported, seen)
 
     def _recent(self) -> list[_Part]:
         return [*list(self._parts)[-2:], self._open]
@@ -186,22 +186,22 @@ class FeedbackWatch:
     def _judge(self) -> Contradiction | None:
         per = self._scale.velocity_per_inc_s
         time_s = sum(part.time_s for part in self._parts)
-        told = sum(part.told for part in self._parts) / time_s
+        reported = sum(part.reported for part in self._parts) / time_s
         seen = sum(part.moved for part in self._parts) / time_s * per
         speeds = [part.moved / part.time_s * per for part in self._parts]
         allowed = (
-            _RELATIVE * max(abs(told), abs(seen))
+            _RELATIVE * max(abs(reported), abs(seen))
             + _LAG * (max(speeds) - min(speeds))
             + _COUNTS / time_s * abs(per)
             + self._ignored
         )
-        if abs(told - seen) <= allowed:
+        if abs(reported - seen) <= allowed:
             self._votes = 0
             return None
         self._votes += 1
         if self._votes < _VOTES:
             return None
-        return self._of(told, sum(part.moved for part in self._parts), time_s)
+        return self._of(reported, sum(part.moved for part in self._parts), time_s)
 
 
 def _difference(new: int, old: int) -> int:
@@ -209,12 +209,12 @@ def _difference(new: int, old: int) -> int:
     return (new - old + _WRAP // 2) % _WRAP - _WRAP // 2
 
 
-def disagreement(told: float, seen: float) -> Disagreement:
+def disagreement(reported: float, seen: float) -> Disagreement:
     """How a speed by 606Ch and one by the position disagree, both in raw units of 606Ch."""
-    if abs(told) < 1.0:
+    if abs(reported) < 1.0:
         return Disagreement.SPEED_STANDS
     if seen == 0.0:
         return Disagreement.POSITION_STANDS
-    if told * seen < 0 and 0.5 < abs(told / seen) < 2:
+    if reported * seen < 0 and 0.5 < abs(reported / seen) < 2:
         return Disagreement.SIGN
     return Disagreement.SCALE

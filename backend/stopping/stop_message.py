@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from backend.stopping.facts import AxisStop, Verdict
+from backend.axis.stop.facts import AxisStop, Verdict
 from drivers.texts.message import Text, text
 
 
-def told(name: str, found: AxisStop) -> Text | None:
+def stop_message(name: str, found: AxisStop) -> Text | None:
     """What became of this axis and what to do; None for an axis that stands."""
     # Without a measured speed the texts leave it out.
     speed = "none" if found.speed is None else f"{found.speed:.4g}"

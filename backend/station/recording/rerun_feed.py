@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from backend.drive.readings import Reading
-from backend.recording.changed_settings import ChangedSettings
 from backend.recording.reader import Channel
-from backend.recording.streams import describe_streams
 from backend.scope.hub import Subscription
 from backend.station.bench import Bench
+from backend.station.recording.changed_settings import ChangedSettings
+from backend.station.recording.streams import describe_streams
 from backend.work.journal import Entry
 from drivers.errors import DriveError
 from drivers.link import ScopeBlock

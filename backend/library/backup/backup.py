@@ -22,7 +22,7 @@ from typing import IO, BinaryIO
 
 import backend
 from backend.audit.trail import Trail
-from backend.store.copy import copy_rows
+from backend.library.backup.copy import copy_rows
 from backend.store.database import FILE, Store
 from backend.store.files import StorageFailed
 from drivers.errors import NotAllowed

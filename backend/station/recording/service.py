@@ -10,12 +10,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from backend.drive.readings import Reading
-from backend.recording.capture import FaultCapture
-from backend.recording.changed_settings import ChangedSettings
 from backend.recording.library import RecordingLibrary
-from backend.recording.recorder import Recorder, Settings
 from backend.recording.writer import free_bytes
 from backend.station.bench import Bench
+from backend.station.recording.capture import FaultCapture
+from backend.station.recording.changed_settings import ChangedSettings
+from backend.station.recording.recorder import Recorder, Settings
 from backend.store.files import StorageFailed
 from backend.work.jobs import Job, JobResult, Progress
 from backend.work.journal import Entry

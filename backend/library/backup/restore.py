@@ -10,9 +10,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from backend.audit.trail import Trail
-from backend.store import backup, state_version
-from backend.store.backup import SHARED, BackupFailed
-from backend.store.copy import copy_rows
+from backend.library.backup import backup
+from backend.library.backup.backup import SHARED, BackupFailed
+from backend.library.backup.copy import copy_rows
+from backend.store import state_version
 from backend.store.database import FILE, Store
 from backend.store.files import StorageFailed
 from backend.store.lock import FolderLock

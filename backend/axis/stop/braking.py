@@ -9,9 +9,9 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
+from backend.axis.stop.facts import StepCode
+from backend.axis.stop.settings import OPTION, braking_option, known_settings
 from backend.drive.drive import Drive
-from backend.stopping.facts import StepCode
-from backend.stopping.settings import OPTION, braking_option, known_settings
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError
