@@ -1,8 +1,10 @@
 """Reads the translated texts of a drive family: ``profiles/<drive>/<language>/*.yaml``.
 
-The English texts of a profile are its manual's and never change. An overlay holds the same texts
-in another language, by the key of the record that they belong to. What has no translation is left
-out: a reader then sees the English text, marked as not translated.
+An overlay holds the texts of a profile in another language: by the key of the record that they
+belong to, or under ``common`` by the English text. What several families say alike, such as the
+objects of CiA 402, is translated once in ``profiles/language/<language>/*.yaml`` and holds for
+every family, the user's own among them; a family's own translation goes before it. What has no
+translation is left out: a reader then sees the English text, marked as not translated.
 """
 
 from __future__ import annotations
@@ -86,10 +88,15 @@ class Overlay(Frozen):
     quirks: dict[str, str] = Field(default_factory=dict, description="by the quirk's kind")
     watchdogs: dict[str, str] = Field(default_factory=dict, description="by the kind of link")
     wiring: dict[str, str] = Field(default_factory=dict, description="by the kind of link")
+    shared: dict[str, str] = Field(
+        default_factory=dict,
+        exclude=True,
+        description="English text to its translation for all families; no family's file gives it",
+    )
 
     def placed(self) -> dict[Place, str]:
         """Every translated text that belongs to one record, by its place."""
-        found = dict(_walk((), self.model_dump(exclude={"common"})))
+        found = dict(_walk((), self.model_dump(exclude={"common", "shared"})))
         return {place: text for place, text in found.items() if text}
 
 
@@ -110,21 +117,39 @@ class _Version(NamedTuple):
 
 
 def load_overlay(drive: str, language: Language) -> Overlay:
-    """The translated texts of a family; empty where it has none in this language.
+    """The translated texts of a family and those of all families.
 
     Raises:
         ProfileError: broken YAML, or a key that the overlay does not know.
     """
     own = not (_PROFILES / drive / "profile.yaml").exists()
     folder = (user_folder() if own else _PROFILES) / drive / language
-    files = sorted(folder.glob("*.yaml"))
-    return _load(drive, language, tuple(_Version(p, p.stat().st_mtime_ns) for p in files))
+    overlay = _load(f"{drive}/{language}", _versions(folder))
+    return overlay.model_copy(update={"shared": load_shared(language)})
+
+
+def load_shared(language: Language) -> dict[str, str]:
+    """English text to its translation, for what several families say alike.
+
+    Raises:
+        ProfileError: broken YAML, or anything but common texts.
+    """
+    folder = Path(__file__).parent / language
+    shared = _load(f"language/{language}", _versions(folder))
+    if shared.placed():
+        raise ProfileError(f"{folder} may hold common texts only: records belong to a family")
+    return shared.common
+
+
+def _versions(folder: Path) -> tuple[_Version, ...]:
+    return tuple(_Version(p, p.stat().st_mtime_ns) for p in sorted(folder.glob("*.yaml")))
 
 
 @cache
-def _load(drive: str, language: Language, versions: tuple[_Version, ...]) -> Overlay:
-    texts = {version.path.name: version.path.read_text("utf-8") for version in versions}
-    return parse_overlay(f"{drive}/{language}", texts)
+def _load(label: str, versions: tuple[_Version, ...]) -> Overlay:
+    return parse_overlay(
+        label, {version.path.name: version.path.read_text("utf-8") for version in versions}
+    )
 
 
 def parse_overlay(label: str, texts: dict[str, str]) -> Overlay:
@@ -144,6 +169,8 @@ def parse_overlay(label: str, texts: dict[str, str]) -> Overlay:
             raise ProfileError(f"{label}/{name}: the file must hold a mapping of overlay fields")
         for field, value in data.items():
             before = merged.setdefault(field, {})
+            if field == "shared":
+                raise ProfileError(f"{label}/{name}: shared is no field of a file; use common")
             if not isinstance(value, dict) or not isinstance(before, dict):
                 raise ProfileError(f"{label}/{name}: {field} must hold a mapping")
             if twice := before.keys() & value.keys():

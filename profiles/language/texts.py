@@ -13,14 +13,15 @@ from profiles.schema import ConfirmStep, Fault, Parameter, Procedure, Profile
 
 #: ``safety``: warnings and the texts that a person must agree to before anything moves.
 Kind = Literal[
-    "safety", "faults", "procedures", "homing", "terminals", "parameter names", "parameter help",
-    "values", "notes on the drive",
+    "safety", "faults", "procedures", "homing", "terminals", "groups", "parameter names",
+    "parameter help", "values", "notes on the drive",
 ]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A text of the profile in English. Terminals' texts have no place: they are shared."""
+    """A text of the profile in English. Texts of terminals and groups have no place: records
+    share them."""
 
     kind: Kind
     place: Place
@@ -48,6 +49,8 @@ def _all(profile: Profile) -> Iterator[Text]:
         for function in terminal.functions:
             yield Text("terminals", (), function.name)
             yield Text("terminals", (), function.help)
+    for group in dict.fromkeys(parameter.group for parameter in profile.parameters):
+        yield Text("groups", (), group)
     for parameter in profile.parameters:
         yield from _of_parameter(parameter)
     for quirk in profile.quirks:
@@ -103,8 +106,12 @@ def _of_parameter(parameter: Parameter) -> Iterator[Text]:
 
 
 def translation(text: Text, overlay: Overlay, placed: dict[Place, str]) -> str | None:
-    """The translation of one text: the record's own, else the common one, else None."""
-    return placed.get(text.place) or overlay.common.get(text.english)
+    """The translation of one text: the record's, the family's, that of all families, or None."""
+    return (
+        placed.get(text.place)
+        or overlay.common.get(text.english)
+        or overlay.shared.get(text.english)
+    )
 
 
 def translations(profile: Profile, overlay: Overlay) -> dict[str, str]:

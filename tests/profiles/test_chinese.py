@@ -1,18 +1,18 @@
-"""Chinese texts of the profiles: complete where safety needs them, and saying the same."""
+"""Chinese texts of the profiles: complete, and saying the same as the English ones."""
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 
 import pytest
 
 from profiles import load_profile
-from profiles.language.overlay import load_overlay, parse_overlay
-from profiles.language.texts import Kind, check_overlay, translations, untranslated
+from profiles.language.overlay import load_overlay, load_shared, parse_overlay
+from profiles.language.texts import check_overlay, texts_of, translations, untranslated
 from profiles.loader import ProfileError
 
-FAMILIES = ("mms7", "ds_c", "ep3e", "m6l", "r6l")
-COMPLETE: tuple[Kind, ...] = ("safety", "faults", "procedures")
+FAMILIES = ("mms7", "ds_c", "ep3e", "m6l", "r6l", "generic402")
 #: Wrong terms of the term base, with the right one.
 FORBIDDEN = {
     "模数": "取模", "制动器": "抱闸", "去使能": "断使能", "断开使能": "断使能", "共振": "谐振",
@@ -23,8 +23,8 @@ FORBIDDEN = {
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_safety_texts_faults_and_procedures_are_all_translated(family: str) -> None:
-    missing = untranslated(load_profile(family), load_overlay(family, "zh"), *COMPLETE)
+def test_every_text_of_every_kind_is_translated(family: str) -> None:
+    missing = untranslated(load_profile(family), load_overlay(family, "zh"))
     assert [(text.place, text.english) for text in missing] == []
 
 
@@ -82,5 +82,29 @@ def test_text_given_in_two_files_is_refused() -> None:
         parse_overlay("mms7/zh", {"a.yaml": one, "b.yaml": one})
 
 
-def test_family_without_an_overlay_has_no_translations() -> None:
-    assert translations(load_profile("generic402"), load_overlay("generic402", "zh")) == {}
+def test_texts_of_the_standard_hold_for_a_profile_that_somebody_imported() -> None:
+    texts = translations(load_profile("generic402"), load_overlay("imported_drive", "zh"))
+    assert texts["Target position"] == "目标位置"
+
+
+def test_each_shared_text_is_of_the_standard_or_of_two_families() -> None:
+    used = Counter(
+        english
+        for family in FAMILIES
+        for english in {text.english for text in texts_of(load_profile(family))}
+    )
+    standard = {text.english for text in texts_of(load_profile("generic402"))}
+    lone = [text for text in load_shared("zh") if text not in standard and used[text] < 2]
+    assert lone == []
+
+
+def test_own_translation_of_a_family_goes_before_the_shared_one() -> None:
+    own = parse_overlay("mms7/zh", {"a.yaml": 'common: {"Target position": 目标位置值}'})
+    overlay = own.model_copy(update={"shared": load_shared("zh")})
+    texts = translations(load_profile("mms7"), overlay)
+    assert (texts["Target position"], texts["Target velocity"]) == ("目标位置值", "目标速度")
+
+
+def test_file_of_a_family_cannot_give_texts_of_all_families() -> None:
+    with pytest.raises(ProfileError, match="use common"):
+        parse_overlay("mms7/zh", {"a.yaml": 'shared: {"Target position": 目标位置}'})
