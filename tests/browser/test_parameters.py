@@ -140,3 +140,23 @@ def test_value_that_somebody_else_wrote_arrives(laptop: Page, bench: Bench) -> N
     found = find(page, ACCELERATION)
     bench.write(ACCELERATION, 4242)
     expect(found.locator(".value")).to_have_text("4242")
+
+
+def test_chinese_page_finds_parameters_in_both_languages_and_shows_the_original(
+    laptop: Page, bench: Bench
+) -> None:
+    page = laptop
+    open_axis(page, bench.drive, "parameters")
+    page.evaluate("localStorage.setItem('servodeck.language', 'zh')")
+    page.reload()
+    search = page.get_by_role("searchbox")
+    for wanted in ("速度环带宽", "speed loop bandwidth"):
+        search.fill(wanted)
+        expect(row(page, "2005:03").locator(".name")).to_contain_text("速度环带宽")
+    name = row(page, "2005:03").locator(".name")
+    expect(name).not_to_contain_text("Speed loop bandwidth")
+    page.get_by_label("同时显示英文原文").check()
+    expect(name).to_contain_text("Speed loop bandwidth")
+    page.get_by_label("同时显示英文原文").uncheck()
+    # Units and numbers are the drive's in every language.
+    expect(row(page, "2005:03").locator(".unit")).to_have_text("Hz")

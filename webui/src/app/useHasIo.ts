@@ -1,9 +1,9 @@
-import { useRows } from '../live/store'
+import { useOriginalRows } from '../live/store'
 import { DIGITAL_INPUTS, DIGITAL_OUTPUTS } from '../widgets/objects'
 
 /** Whether the drive has objects that the I/O page can show. */
 export function useHasIo(drive: string | null): boolean {
-  const rows = useRows(drive ?? '')
+  const rows = useOriginalRows(drive ?? '')
   return (
     rows?.some(
       (row) => row.reachable && (row.key === DIGITAL_INPUTS || row.key === DIGITAL_OUTPUTS),

@@ -101,7 +101,7 @@ export const useJob = (id: string | null) =>
 export const useLog = () => useStore('log', () => contents.log)
 export const useReading = (drive: string, key: string) =>
   useStore(`value ${drive} ${key}`, () => contents.readings.get(drive)?.get(key) ?? null)
-export const useRows = (drive: string) =>
+export const useOriginalRows = (drive: string) =>
   useStore(`rows ${drive}`, () => contents.rows.get(drive) ?? null)
 export const useReadings = (drive: string) =>
   useStore(`values ${drive}`, () => contents.readings.get(drive) ?? null)

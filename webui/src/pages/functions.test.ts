@@ -40,6 +40,8 @@ describe('terminals', () => {
     expect(polarityName(label, 1)).toBe('normally open')
     expect(polarityName(label, 0)).toBe('normally closed')
     expect(polarityName('DI1 negative logic', 1)).toBeNull()
+    expect(polarityName('DI1 常开（0：常闭）', 1)).toBe('常开')
+    expect(polarityName('DI1 常开（0：常闭）', 0)).toBe('常闭')
   })
 })
 

@@ -2,18 +2,20 @@ import './functions.css'
 import { Button } from '@mantine/core'
 import { useEffect } from 'react'
 import { api, ask } from '../api/client'
-import type { ParameterRow } from '../api/schema'
 import { useT } from '../i18n'
-import { contents, setJob, useLink, useReading, useRows } from '../live/store'
+import { contents, setJob, useLink, useReading } from '../live/store'
 import { Editor } from '../pages/parameters/Detail'
 import { setEdit, useEdits, writeEdits } from '../pages/parameters/edits'
 import { editable } from '../pages/parameters/Grid'
 import { readingText } from '../pages/parameters/GridRow'
 import { ProblemNote } from './ProblemNote'
+import { Original } from './profile-text/ProfileText'
+import { useRows } from './profile-text/rows'
+import type { ShownRow } from './profile-text/shown-row'
 import { useAction } from './useAction'
 
 /** Rows of these keys that a connected port can carry, in the order of the keys. */
-export function useReachable(drive: string, keys: readonly string[]): ParameterRow[] {
+export function useReachable(drive: string, keys: readonly string[]): ShownRow[] {
   const rows = useRows(drive) ?? []
   return keys.flatMap((key) => rows.filter((row) => row.key === key && row.reachable))
 }
@@ -114,7 +116,7 @@ export function ParameterFields({
 }
 
 /** One parameter in a line: what it is, then its editor, or its value where it is read only. */
-function Field({ drive, row }: { drive: string; row: ParameterRow }) {
+function Field({ drive, row }: { drive: string; row: ShownRow }) {
   const t = useT()
   const reading = useReading(drive, row.key) ?? row.reading
   const edited = useEdits(drive).edits.has(row.key)
@@ -125,6 +127,7 @@ function Field({ drive, row }: { drive: string; row: ParameterRow }) {
       <div className="field">
         <div className="field-name">
           <span>{row.name}</span> <small className="dim mono">{row.number ?? row.key}</small>
+          <Original text={row.original?.name} shown={row.name} />
           {edited && <span className="mark edited">{t('mark.edited')}</span>}
           {reading.pending && <span className="mark unsaved">{t('fields.waits')}</span>}
           {reading.unsaved && <span className="mark unsaved">{t('fields.unsaved')}</span>}
@@ -136,7 +139,11 @@ function Field({ drive, row }: { drive: string; row: ParameterRow }) {
           {reported && (
             <details>
               <summary aria-label={t('fields.about', { name: row.name })}>?</summary>
-              {row.help && <p className="prose">{row.help}</p>}
+              {row.help && (
+                <p className="prose">
+                  {row.help} <Original text={row.original?.help} shown={row.help} />
+                </p>
+              )}
               {row.settable === 'stopped' && <p>{t('fields.stopped')}</p>}
               {row.notes && <p className="dim">{row.notes}</p>}
               <p className="dim">{t('source', { source: row.source })}</p>

@@ -53,6 +53,7 @@ export function ValueTable<Row extends Compared>({
     if (!next.delete(key)) next.add(key)
     onTick(next)
   }
+  const name = (row: Row) => info.get(row.key)?.name ?? row.name
   const text = (row: Row, [value, raw]: [Raw | null, Raw | null]) => {
     const parameter = info.get(row.key)
     return parameter ? shown(parameter, value, raw) : String(value ?? '—')
@@ -81,7 +82,7 @@ export function ValueTable<Row extends Compared>({
             <tr key={row.key} className={rowClass?.(row)}>
               <td>
                 <Checkbox
-                  aria-label={t('compare.tick', { name: row.name || row.key })}
+                  aria-label={t('compare.tick', { name: name(row) || row.key })}
                   disabled={!canTick(row)}
                   checked={ticked.has(row.key)}
                   onChange={() => toggle(row.key)}
@@ -89,7 +90,7 @@ export function ValueTable<Row extends Compared>({
               </td>
               <td className="mono">{row.key}</td>
               <td>
-                {row.name}
+                {name(row)}
                 {row.problem && <small className="warn-text"> {row.problem}</small>}
               </td>
               {sides.map((side) => (

@@ -4,6 +4,7 @@ import { parseStations } from '../pages/connect/stations'
 import { groups, isChanged, matches, select } from '../pages/parameters/filters'
 import { clock, dateTime, duration, figure, hexadecimal, quantity, shown, toValue } from './format'
 import { bitFields, getField, parseTyped, setField } from './parse'
+import { translatedRows } from './profile-text/shown-row'
 
 function row(part: Partial<ParameterRow>): ParameterRow {
   const reading = {
@@ -163,9 +164,22 @@ describe('filters', () => {
   })
   it('count groups', () => {
     expect(groups(rows)).toEqual([
-      ['Gains', 2],
-      ['Motion', 1],
+      { name: 'Gains', label: 'Gains', count: 2 },
+      { name: 'Motion', label: 'Motion', count: 1 },
     ])
+  })
+  it('know a group by its English name, whatever it is called on the page', () => {
+    const chinese = translatedRows(rows, new Map([['Gains', '增益']]))
+    expect(groups(chinese)[0]).toEqual({ name: 'Gains', label: '增益', count: 2 })
+    const wanted = { filter: 'all' as const, group: 'Gains', search: '' }
+    expect(select(chinese, wanted, marks).map((each) => each.key)).toHaveLength(2)
+  })
+  it('find a translated parameter in both languages', () => {
+    const said = new Map([[rows[0]!.name, '速度环比例增益']])
+    const [first] = translatedRows(rows, said)
+    expect(matches(first!, '速度环')).toBe(true)
+    expect(matches(first!, rows[0]!.name)).toBe(true)
+    expect(matches(first!, '位置环')).toBe(false)
   })
 })
 

@@ -3,13 +3,13 @@ import { Button } from '@mantine/core'
 import { api, ask } from '../../api/client'
 import type { FaultHistoryInfo, PastFaultInfo } from '../../api/schema'
 import { useT } from '../../i18n'
-import { useRows } from '../../live/store'
 import { dateTime, shown } from '../../widgets/format'
 import { Panel } from '../../widgets/Panel'
 import { ParameterText } from '../../widgets/ParameterText'
 import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { ProcedureButton } from '../../widgets/Procedures'
+import { useRows } from '../../widgets/profile-text/rows'
 import { useAction } from '../../widgets/useAction'
 import { useFetched } from '../../widgets/useFunctions'
 
@@ -70,7 +70,11 @@ export function History({ drive }: { drive: string }) {
           {data.read_at && dateTime(data.read_at)}
         </p>
       )}
-      {data.notes && <p className="prose">{data.notes}</p>}
+      {data.notes && (
+        <p className="prose">
+          <ProfileText drive={drive} text={data.notes} />
+        </p>
+      )}
       {data.read_at && data.entries.length === 0 && (
         <p className="good-text">{t('history.empty')}</p>
       )}

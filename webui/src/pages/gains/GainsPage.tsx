@@ -2,9 +2,11 @@ import { useEffect, useState } from 'react'
 import { href } from '../../app/router'
 import { useT } from '../../i18n'
 import * as live from '../../live/live'
-import { useDrive, useLink, useRows } from '../../live/store'
+import { useDrive, useLink } from '../../live/store'
 import { Panel } from '../../widgets/Panel'
 import { ParameterFields } from '../../widgets/ParameterFields'
+import { ProfileText } from '../../widgets/profile-text/ProfileText'
+import { useRows } from '../../widgets/profile-text/rows'
 import { useFunctions } from '../../widgets/useFunctions'
 import { remember } from '../response/undo'
 import { UndoNote } from '../response/UndoNote'
@@ -62,7 +64,11 @@ export function GainsPage({ drive }: { drive: string }) {
                   {part.set_number != null && (
                     <h3>{t('gains.set', { number: part.set_number })}</h3>
                   )}
-                  {part.help && <p className="dim">{part.help}</p>}
+                  {part.help && (
+                    <p className="dim">
+                      <ProfileText drive={drive} text={part.help} />
+                    </p>
+                  )}
                   <ParameterFields
                     drive={drive}
                     keys={part.keys}

@@ -8,6 +8,7 @@ import { useJob } from '../../live/store'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { ProfileText } from '../../widgets/profile-text/ProfileText'
+import { useSay } from '../../widgets/profile-text/texts'
 import { useAction } from '../../widgets/useAction'
 
 /** The server lets go five seconds after the last sign of life. */
@@ -27,6 +28,7 @@ export function ForcingPanel({
   onChanged: () => void
 }) {
   const t = useT()
+  const say = useSay(drive)
   const [agreed, setAgreed] = useState(false)
   const [mine, setMine] = useState<ForcingInfo | null>(null)
   const act = useAction()
@@ -81,14 +83,18 @@ export function ForcingPanel({
     )
   const holding = mine !== null && !over
   return (
-    <Panel title={forcing.title}>
+    <Panel title={say(forcing.title)}>
       <p className="prose">
         <ProfileText drive={drive} text={forcing.help} />
       </p>
       <p className="note warn">
         <ProfileText drive={drive} text={forcing.warning} />
       </p>
-      {forcing.notes && <p className="dim">{forcing.notes}</p>}
+      {forcing.notes && (
+        <p className="dim">
+          <ProfileText drive={drive} text={forcing.notes} />
+        </p>
+      )}
       {over && job?.problem && <ProblemNote problem={job.problem} onClose={() => setMine(null)} />}
       {over && !job?.problem && (
         <p className="note info" role="status">

@@ -3,13 +3,16 @@ import { api, ask } from '../../api/client'
 import type { IoInfo, ParameterRow } from '../../api/schema'
 import { useT } from '../../i18n'
 import * as live from '../../live/live'
-import { useAxisState, useDrive, useLink, useReading, useRows } from '../../live/store'
+import { useAxisState, useDrive, useLink, useReading } from '../../live/store'
 import { clock, hexadecimal } from '../../widgets/format'
 import { DIGITAL_INPUTS, DIGITAL_OUTPUTS } from '../../widgets/objects'
 import { Panel } from '../../widgets/Panel'
 import { ParameterFields } from '../../widgets/ParameterFields'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { bitFields, getField } from '../../widgets/parse'
+import { ProfileText } from '../../widgets/profile-text/ProfileText'
+import { useRows } from '../../widgets/profile-text/rows'
+import { useSay } from '../../widgets/profile-text/texts'
 import { useFetched, useFunctions } from '../../widgets/useFunctions'
 import { ForcingPanel } from './ForcingPanel'
 import { probeKeys } from './probe'
@@ -21,6 +24,7 @@ const PERIOD_S = 0.1
 /** Terminals: as they are, what they are for, overruling them, and touch probes. */
 export function IoPage({ drive }: { drive: string }) {
   const t = useT()
+  const say = useSay(drive)
   const rows = useRows(drive)
   const summary = useDrive(drive)
   const state = useAxisState(drive)
@@ -97,8 +101,12 @@ export function IoPage({ drive }: { drive: string }) {
         ))}
         {functions?.probe && <ProbePanel drive={drive} probe={functions.probe} />}
         {groups.map((group) => (
-          <Panel key={group.name} title={group.title}>
-            {group.help && <p className="dim">{group.help}</p>}
+          <Panel key={group.name} title={say(group.title)}>
+            {group.help && (
+              <p className="dim">
+                <ProfileText drive={drive} text={group.help} />
+              </p>
+            )}
             <ParameterFields drive={drive} keys={group.keys} />
           </Panel>
         ))}
@@ -106,7 +114,11 @@ export function IoPage({ drive }: { drive: string }) {
           <Bits key={row.key} drive={drive} row={row} />
         ))}
       </div>
-      {io.data?.notes && <p className="dim">{io.data.notes}</p>}
+      {io.data?.notes && (
+        <p className="dim">
+          <ProfileText drive={drive} text={io.data.notes} />
+        </p>
+      )}
       {nothing && <p className="empty">{t('io.none')}</p>}
     </div>
   )

@@ -3,10 +3,13 @@ import { useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { Probe, TouchProbe } from '../../api/schema'
 import { useT } from '../../i18n'
-import { setReadings, useReading, useRows } from '../../live/store'
+import { setReadings, useReading } from '../../live/store'
 import { clock } from '../../widgets/format'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { ProfileText } from '../../widgets/profile-text/ProfileText'
+import { useRows } from '../../widgets/profile-text/rows'
+import { useSay } from '../../widgets/profile-text/texts'
 import { useAction } from '../../widgets/useAction'
 import { type ProbeSettings, probeSettings } from './probe'
 
@@ -16,7 +19,11 @@ export function ProbePanel({ drive, probe }: { drive: string; probe: TouchProbe 
   if (!rows.some((row) => row.key === probe.function_key && row.reachable)) return null
   return (
     <Panel title={t('probe.title')}>
-      {probe.notes && <p className="prose">{probe.notes}</p>}
+      {probe.notes && (
+        <p className="prose">
+          <ProfileText drive={drive} text={probe.notes} />
+        </p>
+      )}
       {probe.probes.map((each, i) => (
         <OneProbe key={i} drive={drive} probe={probe} one={each} number={i + 1} />
       ))}
@@ -37,6 +44,7 @@ function OneProbe({
   number: number
 }) {
   const t = useT()
+  const say = useSay(drive)
   const written = useReading(drive, probe.function_key)?.raw
   const status = useReading(drive, probe.status_key)?.raw
   const act = useAction()
@@ -90,7 +98,7 @@ function OneProbe({
             label={t('probe.source')}
             value={String(value.source)}
             onChange={(event) => edit({ source: Number(event.currentTarget.value) })}
-            data={sources.map(([code, label]) => ({ value: code, label }))}
+            data={sources.map(([code, label]) => ({ value: code, label: say(label) }))}
           />
         ) : (
           <p>

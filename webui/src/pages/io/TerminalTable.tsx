@@ -4,8 +4,11 @@ import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { ParameterValue, TerminalBits, TerminalInfo } from '../../api/schema'
 import { useT } from '../../i18n'
-import { setReadings, useReadings, useRows } from '../../live/store'
+import { setReadings, useReadings } from '../../live/store'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { ProfileText } from '../../widgets/profile-text/ProfileText'
+import { useRows } from '../../widgets/profile-text/rows'
+import { useSay } from '../../widgets/profile-text/texts'
 import { useAction } from '../../widgets/useAction'
 import { polarityName, twins } from './terminals'
 
@@ -37,6 +40,7 @@ export function TerminalTable({
   onChanged: () => Promise<void>
 }) {
   const t = useT()
+  const say = useSay(drive)
   const stateOf = useStates(drive, states)
   const write = useAction()
   const [asked, setAsked] = useState<{ terminal: TerminalInfo; code: number } | null>(null)
@@ -103,7 +107,7 @@ export function TerminalTable({
                     disabled={write.busy}
                     value={terminal.function === null ? '' : String(terminal.function)}
                     onChange={(event) => choose(terminal, Number(event.currentTarget.value))}
-                    data={choices(terminal)}
+                    data={choices(terminal, say)}
                   />
                 )}
                 <Polarity
@@ -119,7 +123,11 @@ export function TerminalTable({
                   {t('io.twin', { names: terminal.same_function.join(', ') })}
                 </p>
               )}
-              {terminal.notes && <p className="dim">{terminal.notes}</p>}
+              {terminal.notes && (
+                <p className="dim">
+                  <ProfileText drive={drive} text={terminal.notes} />
+                </p>
+              )}
             </li>
           )
         })}
@@ -156,10 +164,13 @@ export function TerminalTable({
   )
 }
 
-function choices(terminal: TerminalInfo): { value: string; label: string }[] {
+function choices(
+  terminal: TerminalInfo,
+  say: (text: string) => string,
+): { value: string; label: string }[] {
   const known = terminal.functions.map((each) => ({
     value: String(each.code),
-    label: `${each.code} · ${each.name}`,
+    label: `${each.code} · ${say(each.name)}`,
   }))
   const now = terminal.function
   if (now === null) return [{ value: '', label: '—' }, ...known]

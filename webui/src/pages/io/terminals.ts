@@ -11,8 +11,10 @@ export function twins(terminals: TerminalInfo[], of: TerminalInfo, code: number)
 
 const UNUSED = new Set(['not used', 'none', 'no function', 'no function selection', 'OFF', 'ON'])
 
-/** "DI1 normally open (0: normally closed)" names both values of the bit. */
+/** "DI1 normally open (0: normally closed)" names both values of the bit, in either language. */
 export function polarityName(label: string | undefined, value: 0 | 1): string | null {
-  const match = /^\S+ (normally \w+) \(0: (normally \w+)\)$/.exec(label ?? '')
+  const match = /^\S+ (normally \w+|常[开闭])[ ]?[（(]0[：:] ?(normally \w+|常[开闭])[)）]$/.exec(
+    label ?? '',
+  )
   return match ? (match[value === 1 ? 1 : 2] ?? null) : null
 }

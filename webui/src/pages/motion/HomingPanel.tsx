@@ -8,6 +8,8 @@ import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { StartButton } from '../../widgets/StartButton'
+import { ProfileText } from '../../widgets/profile-text/ProfileText'
+import { useSay } from '../../widgets/profile-text/texts'
 import { useAction } from '../../widgets/useAction'
 import { useObstacle } from '../../widgets/useObstacle'
 import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
@@ -25,6 +27,7 @@ export function HomingPanel({
   onStarted: (job: string) => void
 }) {
   const t = useT()
+  const say = useSay(drive)
   const { open } = useLink()
   const { units } = unit
   const [methods, setMethods] = useState<HomingMethodInfo[]>([])
@@ -90,14 +93,20 @@ export function HomingPanel({
         onChange={(event) => setNumber(Number(event.currentTarget.value))}
         data={methods.map((each) => ({
           value: String(each.method),
-          label: `${each.method} · ${each.name}`,
+          label: `${each.method} · ${say(each.name)}`,
         }))}
       />
       {method && (
         <>
-          <HomingPicture method={method} />
-          <p className="prose">{method.help}</p>
-          {method.notes && <p className="dim">{method.notes}</p>}
+          <HomingPicture method={method} name={say(method.name)} />
+          <p className="prose">
+            <ProfileText drive={drive} text={method.help} />
+          </p>
+          {method.notes && (
+            <p className="dim">
+              <ProfileText drive={drive} text={method.notes} />
+            </p>
+          )}
           <p className="dim">{t('source', { source: method.source })}</p>
         </>
       )}

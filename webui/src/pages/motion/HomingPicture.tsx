@@ -11,7 +11,7 @@ const INDEX_STEP = 38
  * where zero comes to lie. Right is the positive direction. Drawn from the profile's facts, so
  * it says no more than they do.
  */
-export function HomingPicture({ method }: { method: HomingMethodInfo }) {
+export function HomingPicture({ method, name }: { method: HomingMethodInfo; name: string }) {
   const t = useT()
   const positive = method.direction === 'positive'
   const moves = method.direction !== 'none'
@@ -37,8 +37,8 @@ export function HomingPicture({ method }: { method: HomingMethodInfo }) {
         ? `M${startAt} 40H${signalAt}${zeroAt !== signalAt ? `V58H${zeroAt}` : ''}`
         : `M${startAt} 40H${zeroAt}`
   return (
-    <svg className="homing-picture" viewBox="0 0 440 150" role="img" aria-label={method.name}>
-      <title>{method.name}</title>
+    <svg className="homing-picture" viewBox="0 0 440 150" role="img" aria-label={name}>
+      <title>{name}</title>
       <defs>
         <marker
           id="home-tip"

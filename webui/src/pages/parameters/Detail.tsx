@@ -8,6 +8,8 @@ import { dateTime, hexadecimal, isInteger, toValue } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { type BitField, bitFields, getField, parseTyped, setField } from '../../widgets/parse'
+import { Original } from '../../widgets/profile-text/ProfileText'
+import type { ShownRow } from '../../widgets/profile-text/shown-row'
 import { useAction } from '../../widgets/useAction'
 import { setRecord, useRecord } from '../../widgets/useFunctions'
 import { setEdit, useEdits, writeEdits } from './edits'
@@ -25,7 +27,7 @@ export function Detail({
 }: {
   drive: string
   profile: string
-  row: ParameterRow
+  row: ShownRow
   onClose: () => void
 }) {
   const t = useT()
@@ -51,7 +53,9 @@ export function Detail({
   return (
     <aside className="detail" aria-label={t('parameters.detail')}>
       <header className="row middle">
-        <h2 className="grow">{row.name}</h2>
+        <h2 className="grow">
+          {row.name} <Original text={row.original?.name} shown={row.name} />
+        </h2>
         <ActionIcon aria-label={t('close')} onClick={onClose}>
           <Icon name="cross" />
         </ActionIcon>
@@ -267,12 +271,16 @@ function BitEditor({
   )
 }
 
-function Facts({ row }: { row: ParameterRow }) {
+function Facts({ row }: { row: ShownRow }) {
   const t = useT()
   const fields = bitFields(row)
   return (
     <>
-      {row.help && <p className="prose">{row.help}</p>}
+      {row.help && (
+        <p className="prose">
+          {row.help} <Original text={row.original?.help} shown={row.help} />
+        </p>
+      )}
       <dl className="facts">
         <dt>{t('column.range')}</dt>
         <dd className="num">{range(row, false) || '—'}</dd>

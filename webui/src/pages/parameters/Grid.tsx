@@ -9,6 +9,7 @@ import {
 import type { ParameterRow } from '../../api/schema'
 import { useT } from '../../i18n'
 import * as live from '../../live/live'
+import type { ShownRow } from '../../widgets/profile-text/shown-row'
 import { setEdit, useEdits, writeEdits } from './edits'
 import { GridRow } from './GridRow'
 
@@ -43,7 +44,7 @@ export function Grid({
 }: {
   drive: string
   profile: string
-  rows: ParameterRow[]
+  rows: ShownRow[]
   asRaw: boolean
   live: boolean
   chosen: string | null

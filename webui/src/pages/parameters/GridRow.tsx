@@ -5,13 +5,15 @@ import { useReading } from '../../live/store'
 import { hexadecimal, isInteger, shown, toValue } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
 import { parseTyped } from '../../widgets/parse'
+import { Original } from '../../widgets/profile-text/ProfileText'
+import type { ShownRow } from '../../widgets/profile-text/shown-row'
 import { type Edit, setEdit, toggleFavourite, useFavourites } from './edits'
 import { editable } from './Grid'
 
 interface Props {
   drive: string
   profile: string
-  row: ParameterRow
+  row: ShownRow
   index: number
   top: number
   height: number
@@ -63,9 +65,10 @@ export const GridRow = memo(function GridRow(props: Props) {
       <span role="gridcell" className="key mono">
         {row.number ?? row.key}
       </span>
-      <span role="gridcell" className="name" title={row.help || row.name}>
+      <span role="gridcell" className="name" title={hint(row)}>
         {row.name}
         {row.number && <small className="mono"> {row.key}</small>}
+        <Original text={row.original?.name} shown={row.name} />
       </span>
       <span role="gridcell" className="value num">
         {editing ? (
@@ -91,6 +94,11 @@ export const GridRow = memo(function GridRow(props: Props) {
     </div>
   )
 })
+
+/** What the name's tooltip says: the help, and the English name that the manual has. */
+function hint({ name, help, original }: ShownRow): string {
+  return original && original.name !== name ? `${original.name}\n${help}`.trim() : help || name
+}
 
 export function range(row: ParameterRow, asRaw: boolean): string {
   if (row.access === 'ro') return ''

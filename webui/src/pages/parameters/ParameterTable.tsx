@@ -1,13 +1,15 @@
 import { Button, Checkbox, NativeSelect, TextInput } from '@mantine/core'
 import { useCallback, useDeferredValue, useMemo, useRef, useState } from 'react'
 import { api, ask } from '../../api/client'
-import type { DriveSummary, JobInfo, ParameterRow } from '../../api/schema'
+import type { DriveSummary, JobInfo } from '../../api/schema'
 import { plainResult } from '../../api/results'
-import { known, useT } from '../../i18n'
+import { useT } from '../../i18n'
 import { setJob, useJobs, useReadings } from '../../live/store'
 import { JobNote } from '../../widgets/JobNote'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { ProcedureButton } from '../../widgets/Procedures'
+import { OriginalSwitch } from '../../widgets/profile-text/ProfileText'
+import type { ShownRow } from '../../widgets/profile-text/shown-row'
 import { useAction } from '../../widgets/useAction'
 import { Detail } from './Detail'
 import { discardEdits, useEdits, useFavourites, writeEdits } from './edits'
@@ -21,7 +23,7 @@ export function ParameterTable({
   asked,
 }: {
   drive: DriveSummary
-  rows: ParameterRow[]
+  rows: ShownRow[]
   /** Key of the parameter that a link led to. */
   asked: string | null
 }) {
@@ -68,9 +70,9 @@ export function ParameterTable({
           onChange={(event) => setGroup(event.currentTarget.value || null)}
           data={[
             { value: '', label: t('parameters.allGroups', { count: rows.length }) },
-            ...byGroup.map(([name, count]) => ({
+            ...byGroup.map(({ name, label, count }) => ({
               value: name,
-              label: `${known(t, 'group', name)} (${count})`,
+              label: `${label} (${count})`,
             })),
           ]}
         />
@@ -102,6 +104,7 @@ export function ParameterTable({
           checked={live}
           onChange={(event) => setLive(event.currentTarget.checked)}
         />
+        <OriginalSwitch />
       </div>
       <div className="table-and-detail">
         <Grid
@@ -130,7 +133,7 @@ export function ParameterTable({
   )
 }
 
-function Actions({ drive, shown }: { drive: DriveSummary; shown: ParameterRow[] }) {
+function Actions({ drive, shown }: { drive: DriveSummary; shown: ShownRow[] }) {
   const t = useT()
   const { edits, writing, problems } = useEdits(drive.id)
   const act = useAction()

@@ -1,4 +1,5 @@
 import type { ParameterRow, ParameterValue } from '../../api/schema'
+import type { ShownRow } from '../../widgets/profile-text/shown-row'
 
 export const FILTERS = [
   'all',
@@ -57,12 +58,12 @@ function passes(row: ParameterRow, filter: Filter, marks: Marks): boolean {
   }
 }
 
-/** Words must all be found, each in name, key, number, group or enum label. */
-export function matches(row: ParameterRow, search: string): boolean {
+/** Words must all be found, each in name, key, number, group or enum label, in either language. */
+export function matches(row: ShownRow, search: string): boolean {
   const words = search.toLowerCase().split(/\s+/).filter(Boolean)
   if (words.length === 0) return true
-  const text = [row.name, row.key, row.key.replace(':', ''), row.number ?? '', row.group]
-    .concat(Object.values(row.enum))
+  const text = [row.key, row.key.replace(':', ''), row.number ?? '']
+    .concat(texts(row), row.original ? texts(row.original) : [])
     .join('\n')
     .toLowerCase()
   return words.every(
@@ -70,24 +71,41 @@ export function matches(row: ParameterRow, search: string): boolean {
   )
 }
 
-export function select(rows: ParameterRow[], wanted: Wanted, marks: Marks): ParameterRow[] {
+const texts = (row: ParameterRow) => [row.name, row.group, ...Object.values(row.enum)]
+
+/** The name of a row's group that does not change with the language. */
+const groupOf = (row: ShownRow) => (row.original ?? row).group
+
+export function select(rows: ShownRow[], wanted: Wanted, marks: Marks): ShownRow[] {
   return rows.filter(
     (row) =>
-      (wanted.group === null || row.group === wanted.group) &&
+      (wanted.group === null || groupOf(row) === wanted.group) &&
       passes(row, wanted.filter, marks) &&
       matches(row, wanted.search),
   )
 }
 
+export interface Group {
+  name: string
+  /** The name in the page's language. */
+  label: string
+  count: number
+}
+
 /** Groups in the profile's own order, with how many rows each has. */
-export function groups(rows: ParameterRow[]): [string, number][] {
-  const counts = new Map<string, number>()
-  for (const row of rows) counts.set(row.group, (counts.get(row.group) ?? 0) + 1)
-  return [...counts]
+export function groups(rows: ShownRow[]): Group[] {
+  const found = new Map<string, Group>()
+  for (const row of rows) {
+    const name = groupOf(row)
+    const group = found.get(name)
+    if (group) group.count += 1
+    else found.set(name, { name, label: row.group, count: 1 })
+  }
+  return [...found.values()]
 }
 
 /** The communication area 1000h to 1FFFh is rarely wanted: it comes after everything else. */
-export function settingsFirst(rows: ParameterRow[]): ParameterRow[] {
+export function settingsFirst(rows: ShownRow[]): ShownRow[] {
   const communication = (row: ParameterRow) => /^1[0-9A-F]{3}:/.test(row.key)
   return [...rows.filter((row) => !communication(row)), ...rows.filter(communication)]
 }

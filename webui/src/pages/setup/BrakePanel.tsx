@@ -3,9 +3,11 @@ import { href } from '../../app/router'
 import type { BrakeTiming, IoInfo } from '../../api/schema'
 import { api, ask } from '../../api/client'
 import { useT } from '../../i18n'
-import { useReading, useRows } from '../../live/store'
+import { useReading } from '../../live/store'
 import { Panel } from '../../widgets/Panel'
 import { ParameterFields } from '../../widgets/ParameterFields'
+import { ProfileText } from '../../widgets/profile-text/ProfileText'
+import { useRows } from '../../widgets/profile-text/rows'
 import { useFetched } from '../../widgets/useFunctions'
 import { brakeCourse } from './brake'
 
@@ -24,7 +26,11 @@ export function BrakePanel({ drive, brake }: { drive: string; brake: BrakeTiming
       <Panel title={t('brake.title')}>
         <p className="note warn">{t('brake.warning')}</p>
         <Output drive={drive} functions={brake.output_functions ?? []} />
-        {brake.notes && <p className="prose">{brake.notes}</p>}
+        {brake.notes && (
+          <p className="prose">
+            <ProfileText drive={drive} text={brake.notes} />
+          </p>
+        )}
         <ParameterFields drive={drive} keys={brake.keys ?? []} />
       </Panel>
       <Panel title={t('brake.picture')}>

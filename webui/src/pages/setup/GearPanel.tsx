@@ -7,6 +7,8 @@ import { figure } from '../../widgets/format'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { ProcedureButton } from '../../widgets/Procedures'
+import { ProfileText } from '../../widgets/profile-text/ProfileText'
+import { useSay } from '../../widgets/profile-text/texts'
 import { useAction } from '../../widgets/useAction'
 import { setRecord } from '../../widgets/useFunctions'
 import { type Form, KINDS } from './mechanics'
@@ -86,7 +88,7 @@ export function GearPanel({ drive }: { drive: string }) {
         <ProblemNote problem={act.problem} onClose={act.clear} />
       </Panel>
       {plan && (
-        <PlanPanel plan={plan} busy={act.busy} onWrite={() => setAsked(true)}>
+        <PlanPanel drive={drive} plan={plan} busy={act.busy} onWrite={() => setAsked(true)}>
           {written && (
             <Written
               drive={drive}
@@ -170,17 +172,20 @@ function Written({
 }
 
 function PlanPanel({
+  drive,
   plan,
   busy,
   onWrite,
   children,
 }: {
+  drive: string
   plan: GearPlanInfo
   busy: boolean
   onWrite: () => void
   children: React.ReactNode
 }) {
   const t = useT()
+  const say = useSay(drive)
   const same = plan.values.every((value) => value.now === value.raw)
   const facts: [string, string][] = [
     [t('gear.perTurn'), `${figure(plan.travel_per_motor_turn, 7)} ${plan.unit}`],
@@ -234,8 +239,12 @@ function PlanPanel({
           {text}
         </p>
       ))}
-      {plan.acts && <p>{t('gear.acts', { acts: plan.acts })}</p>}
-      {plan.notes && <p className="dim">{plan.notes}</p>}
+      {plan.acts && <p>{t('gear.acts', { acts: say(plan.acts) })}</p>}
+      {plan.notes && (
+        <p className="dim">
+          <ProfileText drive={drive} text={plan.notes} />
+        </p>
+      )}
       {plan.source && <p className="dim">{t('source', { source: plan.source })}</p>}
       <Button variant="filled" disabled={same} loading={busy} onClick={onWrite}>
         {t('gear.write')}

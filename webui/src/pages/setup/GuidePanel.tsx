@@ -2,7 +2,7 @@ import { Button, Checkbox } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { Guide, ProcedureInfo } from '../../api/schema'
-import { known, useT } from '../../i18n'
+import { useT } from '../../i18n'
 import { setJob, useAxisState } from '../../live/store'
 import { JobNote } from '../../widgets/JobNote'
 import { NumberField } from '../../widgets/NumberField'
@@ -12,6 +12,7 @@ import { ProblemNote } from '../../widgets/ProblemNote'
 import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { StartButton } from '../../widgets/StartButton'
 import { ProcedureDialog, useProcedures } from '../../widgets/Procedures'
+import { useSay } from '../../widgets/profile-text/texts'
 import { useAction } from '../../widgets/useAction'
 import { useFunctions } from '../../widgets/useFunctions'
 import { useObstacle } from '../../widgets/useObstacle'
@@ -20,26 +21,33 @@ import { useRemembered } from '../motion/remembered'
 /** A course of the drive's manual, step by step, with the parameters and procedures of each. */
 export function GuidePanel({ drive, guide }: { drive: string; guide: Guide }) {
   const t = useT()
+  const say = useSay(drive)
   const procedures = useProcedures(drive)
   const [chosen, setChosen] = useState<ProcedureInfo | null>(null)
   const [job, setShown] = useState<string | null>(null)
   return (
-    <Panel title={guide.title}>
+    <Panel title={say(guide.title)}>
       {guide.warning && (
         <p className="note warn">
           <ProfileText drive={drive} text={guide.warning} />
         </p>
       )}
-      {guide.notes && <p className="dim">{guide.notes}</p>}
+      {guide.notes && (
+        <p className="dim">
+          <ProfileText drive={drive} text={guide.notes} />
+        </p>
+      )}
       <ol className="guide">
         {guide.steps.map((step, i) => {
           const procedure = procedures?.find((each) => each.name === step.procedure)
           return (
             <li key={step.title}>
               <h3>
-                {t('guide.step', { n: i + 1 })}: {step.title}
+                {t('guide.step', { n: i + 1 })}: {say(step.title)}
               </h3>
-              <p className="prose">{step.text}</p>
+              <p className="prose">
+                <ProfileText drive={drive} text={step.text} />
+              </p>
               {(step.keys ?? []).length > 0 && (
                 <ParameterFields drive={drive} keys={step.keys ?? []} />
               )}
@@ -49,7 +57,7 @@ export function GuidePanel({ drive, guide }: { drive: string; guide: Guide }) {
               {step.identifies && <Identify drive={drive} onStarted={setShown} />}
               {procedure && (
                 <Button variant="filled" onClick={() => setChosen(procedure)}>
-                  {known(t, 'procedure', procedure.title)}: {t('guide.run')}
+                  {say(procedure.title)}: {t('guide.run')}
                 </Button>
               )}
             </li>

@@ -9,6 +9,7 @@ import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ParameterFields } from '../../widgets/ParameterFields'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { useAction } from '../../widgets/useAction'
 import { useRemembered } from '../motion/remembered'
 import { useGains } from '../response/useGains'
@@ -151,7 +152,11 @@ export function RegenerationPanel({ drive, regen }: { drive: string; regen: Rege
         </Button>
         <ProblemNote problem={act.problem} onClose={act.clear} />
         {result && <Result result={result} />}
-        {regen?.notes && <p className="dim">{regen.notes}</p>}
+        {regen?.notes && (
+          <p className="dim">
+            <ProfileText drive={drive} text={regen.notes} />
+          </p>
+        )}
         {regen && <p className="dim">{t('source', { source: regen.source })}</p>}
       </Panel>
       {regen && (regen.keys ?? []).length > 0 && (

@@ -44,6 +44,17 @@ export function ProfileText({
   )
 }
 
+/** The English text beside a translation that is already shown, where somebody wants it there. */
+export function Original({ text, shown }: { text: string | undefined; shown: string }) {
+  const both = useOriginal()
+  if (!both || !text || text === shown) return null
+  return (
+    <span className="original" lang="en">
+      {text}
+    </span>
+  )
+}
+
 /** Shows the English originals beside the translated texts, or hides them. */
 export function OriginalSwitch() {
   const t = useT()

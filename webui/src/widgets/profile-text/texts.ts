@@ -54,6 +54,12 @@ export function useTexts(drive: string): Texts {
   return wanted === null ? null : texts
 }
 
+/** Says a profile's text in the page's language, for where an element cannot stand. */
+export function useSay(drive: string): (text: string) => string {
+  const texts = useTexts(drive)
+  return (text) => texts?.get(text) ?? text
+}
+
 /** Whether the English original stands beside each translated text. */
 export function useOriginal(): boolean {
   return useSyncExternalStore(subscribe, () => original)
