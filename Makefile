@@ -10,7 +10,7 @@ PAGE := webui/dist/index.html
 PAGE_SOURCES := $(shell find webui/src webui/public drivers/texts/catalogue -type f 2>/dev/null) webui/index.html \
 	webui/package.json webui/package-lock.json webui/vite.config.ts
 
-.PHONY: install run test bench fmt docs page clean check-python supply-chain wheels packages audit
+.PHONY: install run test bench fmt docs page new-drive clean check-python supply-chain wheels packages emulated audit
 
 install: $(VENV)/.installed $(PAGE) ## the virtual environment with the product in it
 
@@ -48,8 +48,14 @@ packages: $(VENV)/.dev $(PAGE) wheels ## all that is carried to a computer, with
 	$(BIN)/python -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir dist/wheels .
 	$(BIN)/python -m pip download --quiet --require-hashes --only-binary :all: --dest dist/wheels -r .ci/supply/run.txt
 	$(BIN)/python .ci/supply/debian.py dist/wheels dist
-	$(BIN)/python .ci/supply/portable.py dist/wheels dist
+	$(BIN)/python .ci/supply/portable.py dist/wheels dist x86_64
+	$(BIN)/python .ci/supply/portable.py dist/wheels dist aarch64
+	$(BIN)/python .ci/supply/container.py dist/wheels dist x86_64
+	$(if $(WINDOWS_PYTHON),$(BIN)/python .ci/supply/windows.py dist/wheels dist $(WINDOWS_PYTHON),@echo "no folder for Windows: WINDOWS_PYTHON=FILE names the embeddable CPython, see docs/install.md")
 	$(BIN)/python .ci/supply/checksums.py dist
+
+emulated: $(VENV)/.dev ## start the folder for aarch64 under qemu's user mode
+	$(BIN)/python .ci/supply/emulated.py $(lastword $(sort $(wildcard dist/servodeck-*-linux-aarch64.tar.gz)))
 
 audit: $(VENV)/.dev ## known weaknesses of the locked packages; asks their registries
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check pip-audit
@@ -83,6 +89,9 @@ page: $(PAGE) ## the web page
 $(PAGE): $(PAGE_SOURCES) webui/node_modules/.package-lock.json
 	@echo "== building the page"
 	cd webui && $(NPM) run --silent build
+
+new-drive: $(VENV)/.dev ## begin a drive family: make new-drive NAME=el7 TITLE="Leadshine EL7-EC"
+	$(BIN)/python .ci/new_drive "$(NAME)" "$(or $(TITLE),$(NAME))"
 
 clean: ## what can be made again
 	rm -rf $(VENV) webui/dist webui/node_modules site dist

@@ -1,13 +1,15 @@
 """Builds a self-contained folder for Linux: servodeck, all packages and a CPython of its own.
 
-    python .ci/supply/portable.py WHEELS OUTPUT
+    python .ci/supply/portable.py WHEELS OUTPUT [x86_64|aarch64]
 
-WHEELS is what ``debian.py`` takes. The interpreter is the one of Debian's packages, fetched by
-``apt-get download`` (apt checks their signatures) for the CPython version that builds it. It finds
-its library beside itself, wherever the folder lies; its shared libraries are found by a search
-path relative to the interpreter (DT_RPATH, set by patchelf). Modules whose libraries are not
-carried along (`_LEFT_OUT`) are left out. Only the C library, libstdc++ and libgcc_s come from the
-computer; the oldest C library that suffices is printed and stands in ``CONTENTS.txt``.
+WHEELS is what ``debian.py`` takes. For another processor than this computer's the packages are
+those of the lock (`foreign`), and apt reads that architecture's lists in a folder of its own. The
+interpreter is the one of Debian's packages, fetched by ``apt-get download`` (apt checks their
+signatures) for the CPython version that builds it. It finds its library beside itself, wherever
+the folder lies; its shared libraries are found by a search path relative to the interpreter
+(DT_RPATH, set by patchelf). Modules whose libraries are not carried along (`_LEFT_OUT`) are left
+out. Only the C library, libstdc++ and libgcc_s come from the computer; the oldest C library that
+suffices is printed and stands in ``CONTENTS.txt``.
 """
 
 from __future__ import annotations
@@ -24,9 +26,13 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
+import foreign
 from debian import install_wheels
 
-PYTHON = f"python{sys.version_info.major}.{sys.version_info.minor}"
+_VERSION = f"{sys.version_info.major}.{sys.version_info.minor}"
+PYTHON = f"python{_VERSION}"
+#: How Debian calls a processor.
+DEBIAN = {"x86_64": "amd64", "aarch64": "arm64"}
 _INTERPRETER = (f"{PYTHON}-minimal", f"lib{PYTHON}-minimal", f"lib{PYTHON}-stdlib")
 _LIBRARIES = (
     "libssl3", "libffi8", "libsqlite3-0", "libexpat1", "zlib1g", "liblzma5", "libbz2-1.0",
@@ -54,22 +60,32 @@ delete this folder to remove the program, and unpack a newer one beside it to up
 """
 
 
-def build(wheels: Path, output: Path, version: str) -> Path:
+def build(wheels: Path, output: Path, version: str, machine: str) -> Path:
     """The packed folder; returns its file.
 
     Raises:
         CalledProcessError: a package or wheel cannot be had.
+        SystemExit: something in it is for another system, or missing.
     """
-    machine = platform.machine()
+    system, own = foreign.SYSTEMS[machine], machine == platform.machine()
     name = f"servodeck-{version}-linux-{machine}"
     output.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=output) as place:
         scratch, folder = Path(place), Path(place) / name
-        packages = fetch((*_INTERPRETER, *_LIBRARIES, "patchelf"), scratch / "fetched")
-        put_interpreter(scratch / "fetched/root", folder)
-        install_wheels(wheels, folder / "lib/python3/dist-packages")
+        fetch(("patchelf",), scratch / "tools")
+        options = [] if own else lists_of(DEBIAN[machine], scratch / "apt")
+        packages = fetch((*_INTERPRETER, *_LIBRARIES), scratch / "fetched", options)
+        put_interpreter(scratch / "fetched/root", folder, scratch / "tools/root/usr/bin/patchelf")
+        site = folder / "lib/python3/dist-packages"
+        if own:
+            install_wheels(wheels, site)
+        else:
+            foreign.put_packages(site, system, _VERSION, wheels)
+        # Programs of the packages, with the path of the interpreter that has unpacked them.
+        shutil.rmtree(site / "bin", ignore_errors=True)
+        foreign.check(folder, site, system, _VERSION)
         known = {"version": version, "machine": machine, "glibc": oldest_glibc(folder)}
-        put_texts(folder, known, [*packages, *sorted(file.name for file in wheels.glob("*.whl"))])
+        put_texts(folder, known, [*packages, *foreign.contents(site)])
         # A stamp of the source's time would be wrong after unpacking on some file systems.
         compileall.compile_dir(
             str(folder / "lib"), quiet=2, workers=0,
@@ -77,22 +93,40 @@ def build(wheels: Path, output: Path, version: str) -> Path:
         )  # fmt: skip
         file = output / f"{name}.tar.gz"
         with tarfile.open(file, "w:gz", compresslevel=3) as packed:
-            packed.add(folder, name, filter=_by_root)
+            packed.add(folder, name, filter=owned_by_root)
     return file
 
 
-def fetch(names: Iterable[str], folder: Path) -> list[str]:
+def lists_of(architecture: str, folder: Path) -> list[str]:
+    """apt's options for another architecture, with lists of its own in ``folder``.
+
+    Raises:
+        CalledProcessError: the lists cannot be read.
+    """
+    (folder / "lists/partial").mkdir(parents=True)
+    (folder / "cache/archives/partial").mkdir(parents=True)
+    settings = {
+        "APT::Architecture": architecture, "APT::Architectures": architecture,
+        "Dir::State::Lists": f"{folder}/lists", "Dir::Cache": f"{folder}/cache",
+        "Dir::State::status": "/dev/null",
+    }  # fmt: skip
+    options = [part for name, value in settings.items() for part in ("-o", f"{name}={value}")]
+    subprocess.run(["apt-get", *options, "--quiet=2", "update"], check=True)
+    return options
+
+
+def fetch(names: Iterable[str], folder: Path, options: Iterable[str] = ()) -> list[str]:
     """Download Debian packages and unpack them into ``folder/root``; returns their files' names."""
     folder.mkdir(parents=True)
     folder.chmod(0o755)
-    subprocess.run(["apt-get", "--quiet=2", "download", *names], cwd=folder, check=True)
+    subprocess.run(["apt-get", *options, "--quiet=2", "download", *names], cwd=folder, check=True)
     files = sorted(folder.glob("*.deb"))
     for file in files:
         subprocess.run(["dpkg-deb", "--extract", str(file), str(folder / "root")], check=True)
-    return [file.name for file in files if not file.name.startswith("patchelf")]
+    return [file.name for file in files]
 
 
-def put_interpreter(root: Path, folder: Path) -> None:
+def put_interpreter(root: Path, folder: Path, patchelf: Path) -> None:
     """Interpreter, standard library and shared libraries from unpacked packages."""
     (folder / "bin").mkdir(parents=True)
     binary = folder / "bin" / PYTHON
@@ -114,10 +148,9 @@ def put_interpreter(root: Path, folder: Path) -> None:
         shutil.copyfile(text, target)
     # DT_RPATH (not RUNPATH) also serves what extension modules need in turn (ld.so(8)).
     subprocess.run(
-        [str(root / "usr/bin/patchelf"), "--force-rpath", "--set-rpath", "$ORIGIN/../lib",
-         str(binary)],
+        [str(patchelf), "--force-rpath", "--set-rpath", "$ORIGIN/../lib", str(binary)],
         check=True,
-    )  # fmt: skip
+    )
 
 
 def put_texts(folder: Path, known: dict[str, str], contents: Iterable[str]) -> None:
@@ -141,7 +174,8 @@ def oldest_glibc(folder: Path) -> str:
     return f"{newest[0]}.{newest[1]}"
 
 
-def _by_root(entry: tarfile.TarInfo) -> tarfile.TarInfo:
+def owned_by_root(entry: tarfile.TarInfo) -> tarfile.TarInfo:
+    """A packed file belongs to nobody of the computer that packs it."""
     entry.uid = entry.gid = 0
     entry.uname = entry.gname = "root"
     return entry
@@ -154,7 +188,8 @@ def main(arguments: list[str]) -> int:
         return 0
     wheels, output = Path(arguments[0]), Path(arguments[1])
     ours = next(wheels.glob("servodeck-*.whl"))
-    file = build(wheels, output, ours.name.split("-")[1])
+    machine = arguments[2] if len(arguments) > 2 else platform.machine()
+    file = build(wheels, output, ours.name.split("-")[1], machine)
     print(f"{file}: {file.stat().st_size >> 20} MiB")
     return 0
 

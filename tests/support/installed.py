@@ -24,7 +24,7 @@ HANG_S = 120.0
 @dataclass(frozen=True)
 class Served:
     """A running server: its address, and how long it took until the page was there, with the
-    processor time of its process (seconds).
+    processor time of its processes (seconds).
     """
 
     address: str
@@ -55,8 +55,10 @@ def served(
         assets = tuple(_ASSET.findall(page))
         for asset in assets:
             _get(f"{address}{asset}")
-        used = psutil.Process(process.pid).cpu_times()
-        yield Served(address, page, assets, time.monotonic() - began, used.user + used.system)
+        seconds = time.monotonic() - began
+        first = psutil.Process(process.pid)
+        used = [one.cpu_times() for one in (first, *first.children(recursive=True))]
+        yield Served(address, page, assets, seconds, sum(one.user + one.system for one in used))
     finally:
         process.terminate()
         # It ends by itself, or the guard ends it.

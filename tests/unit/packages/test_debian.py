@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import re
 import shutil
 import subprocess
 import sys
@@ -13,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from backend.station.service import systemd_unit
-from drivers.computer.permissions import NEEDED, USEFUL
 
 ROOT = Path(__file__).resolve().parents[3]
 _SPEC = importlib.util.spec_from_file_location("debian", ROOT / ".ci/supply/debian.py")
@@ -90,11 +88,3 @@ def test_from_installing_to_purging(tmp_path: Path, site: Path) -> None:
     assert not (root.folder / "opt/servodeck").exists()
     root.done("--purge", "servodeck")
     assert not state.exists()
-
-
-def test_the_container_declares_the_capabilities_that_are_needed_and_no_others() -> None:
-    text = (ROOT / ".ci/supply/Containerfile").read_text()
-    declared = re.search(r'servodeck\.capabilities="([^"]*)"', text)
-    assert declared is not None
-    assert declared[1].split() == [*NEEDED, *USEFUL]
-    assert {f"CAP_{name}" for name in re.findall(r"--cap-add (\w+)", text)} == {*NEEDED, *USEFUL}
