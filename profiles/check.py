@@ -106,7 +106,8 @@ def counts_of(profile: Profile, chapter: Chapter) -> dict[str, int]:
     pdo = () if profile.pdo is None else (profile.pdo, *profile.pdo.sets)
     others = (
         profile.identity, profile.units, *profile.links, *(link.watchdog for link in profile.links),
-        *profile.procedures, *profile.terminals, *profile.quirks, *profile.conflicts, *pdo,
+        *profile.procedures, *profile.terminals, *profile.quirks, *profile.notes,
+        *profile.conflicts, *pdo,
         *profile.stiffness,
     )  # fmt: skip
     found = {
@@ -148,10 +149,11 @@ def _check_parameter(profile: Profile, p: Parameter) -> list[Finding]:
 
 def _check_number(p: Parameter) -> list[Finding]:
     """Pgg.nn is object 2000h + gg, subindex nn + 1 (002 and 000, chapters on parameters)."""
-    if p.number is None or not p.number.startswith("P") or "." not in p.number:
+    numbered = re.fullmatch(r"P(\d+)\.(\d+)", p.number or "")
+    if numbered is None:
         return []
-    group, _, number = p.number[1:].partition(".")
-    expected = f"{0x2000 + int(group):04X}:{int(number) + 1:02X}"
+    group, number = map(int, numbered.groups())
+    expected = f"{0x2000 + group:04X}:{number + 1:02X}"
     if p.key == expected:
         return []
     return [Finding(p.key, f"{p.number} should be {expected}")]

@@ -22,6 +22,7 @@ def show(profile: Profile) -> dict[str, object]:
         "pdo": None if profile.pdo is None else profile.pdo.model_dump(mode="json"),
         "bring_up": None if profile.bring_up is None else profile.bring_up.model_dump(mode="json"),
         "quirks": [q.model_dump(mode="json") for q in profile.quirks],
+        "notes": [note.model_dump(mode="json") for note in profile.notes],
     }
 
 

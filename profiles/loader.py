@@ -127,10 +127,34 @@ def parse_profile(texts: dict[str, str]) -> Profile:
             else:
                 merged[field] = value
     _refuse_own_classes(merged)
+    _move_notes(merged)
     try:
         return classified(Profile.model_validate(merged))
     except ValidationError as error:
         raise ProfileError(_explain(merged, error)) from error
+
+
+#: Kinds of quirks of version 0.2.0 that no code acted upon: notes since.
+_NOTES_ONCE = frozenset({
+    "eeprom_on_every_write", "saving_mask", "trigger_bits_manual", "mode_change_pause",
+    "no_following_error_bit", "home_found_bit_15", "save_readback_ambiguous", "sdo_pause_on_save",
+    "gear_on_init", "brake_by_pdo", "partial_manual", "types_unreliable", "no_watchdog",
+    "positive_limit_first",
+})  # fmt: skip
+
+
+def _move_notes(merged: dict[str, Any]) -> None:
+    """A profile of the user's own from version 0.2.0 is read as one of today."""
+    quirks = merged.get("quirks")
+    if not isinstance(quirks, list):
+        return
+    moved = [q for q in quirks if isinstance(q, dict) and q.get("kind") in _NOTES_ONCE]
+    if moved:
+        merged["quirks"] = [q for q in quirks if q not in moved]
+        merged["notes"] = [
+            *merged.get("notes", ()),
+            *({k: q[k] for k in ("key", "help", "source") if k in q} for q in moved),
+        ]
 
 
 def _refuse_own_classes(merged: dict[str, Any]) -> None:

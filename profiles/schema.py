@@ -505,20 +505,24 @@ class Identity(Frozen):
 
 
 class Quirk(Frozen):
-    """A documented oddity that code acts upon. The vocabulary is closed."""
+    """A documented deviation that code acts upon: each kind has a reader. See also `Note`."""
 
     kind: Literal[
-        "write_settings", "eeprom_on_every_write", "saving_mask", "limit_bits_swapped",
-        "own_status_word", "enable_pause", "trigger_bits_manual", "mode_change_at_standstill",
-        "mode_change_pause", "mode_before_enable", "no_following_error_bit",
-        "error_code_low_byte", "warning_bit_7", "home_found_bit_15", "save_readback_ambiguous",
-        "sdo_pause_on_save", "gear_on_init", "brake_by_pdo", "unit_switch", "write_protect",
-        "partial_manual", "types_unreliable", "no_watchdog", "positive_limit_first",
-        "quick_stop_word", "torque_stop_by_slope",
+        "write_settings", "limit_bits_swapped", "own_status_word", "enable_pause",
+        "mode_change_at_standstill", "mode_before_enable", "error_code_low_byte", "warning_bit_7",
+        "unit_switch", "write_protect", "quick_stop_word", "torque_stop_by_slope",
     ]  # fmt: skip
     key: str | None = None
     raw: int | None = None
     milliseconds: float | None = None
+    help: str
+    source: str
+
+
+class Note(Frozen):
+    """What whoever uses the drive must know of it, and no code acts upon."""
+
+    key: str | None = None
     help: str
     source: str
 
@@ -565,6 +569,7 @@ class Profile(Frozen):
     stiffness: tuple[StiffnessTable, ...] = ()
     gains: GainSpec | None = None
     quirks: tuple[Quirk, ...] = ()
+    notes: tuple[Note, ...] = ()
     functions: Functions = Functions()
     motion_rules: tuple[MotionRule, ...] = Field(
         default=(), description="motion classes of the maker's objects; the first that fits counts"
@@ -654,7 +659,7 @@ def _referenced_keys(profile: Profile) -> list[str]:
 
     for part in (
         profile.faults, profile.procedures, profile.terminals, profile.signals,
-        profile.notch, profile.stiffness, profile.quirks, profile.links,
+        profile.notch, profile.stiffness, profile.quirks, profile.notes, profile.links,
     ):  # fmt: skip
         walk(part)
     for table in profile.stiffness:

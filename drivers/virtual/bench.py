@@ -25,6 +25,7 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from drivers.errors import NotAllowed, OutOfRange
+from drivers.texts import limits
 from drivers.urls import parse_url
 from drivers.virtual.mechanics.spec import MechanicsSpec, standard_mechanics
 from profiles.loader import ProfileError, load_profile
@@ -168,7 +169,7 @@ def _check_ports(axis: AxisSpec, path: Path) -> None:
             raise NotAllowed(
                 "virtual.bench-file-station-outside",
                 value=station,
-                limit=f"1 to {last}",
+                limit=limits.between(1, last),
                 path=str(path),
                 drive_name=axis.name,
                 url=url,

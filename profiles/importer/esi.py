@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, ParseError
 
 from defusedxml.common import DefusedXmlException
@@ -39,7 +40,7 @@ from profiles.importer.xml_tree import (
     children,
     flag_of,
     name_of,
-    strip_namespaces,
+    simplify_tags,
     text_of,
 )
 from profiles.schema import Access, DataType, PdoMapping, Raw
@@ -112,6 +113,18 @@ def read_device(file: EsiFile, device: int = 0) -> Description:
     )
 
 
+def _parsed(text: str) -> Element:
+    """The root of a document without DTD.
+
+    The reader of defusedxml refuses a DTD at the cost of Python's slow parser. Without these
+    letters there is none, and so no entity either: then the fast one reads the same.
+    """
+    if "<!DOCTYPE" in text:
+        refused: Element = fromstring(text, forbid_dtd=True)
+        return refused
+    return ElementTree.fromstring(text)  # noqa: S314 - no DTD, see above
+
+
 def open_esi(data: bytes, name: str, report: ImportReport) -> EsiFile:
     """Parse an ESI file.
 
@@ -120,17 +133,20 @@ def open_esi(data: bytes, name: str, report: ImportReport) -> EsiFile:
     """
     check_size(data, MAX_BYTES, name)
     try:
-        root: Element = fromstring(decode_xml(data, name, report), forbid_dtd=True)
+        root = _parsed(decode_xml(data, name, report))
     except ParseError as error:
         raise ImportFailed(f"{name} is not well-formed XML: {error}") from error
     except (DefusedXmlException, ValueError) as error:
         raise ImportFailed(
             f"{name} holds a DTD or entities, which are not read: {error}"
         ) from error
-    strip_namespaces(root)
+    simplify_tags(root)
     if root.tag == "EtherCATInfoList":
         report.noted(name, "a list of descriptions, as a master prints it: the first is read")
-        root = next(iter(children(root, "EtherCATInfo")), root)
+        inner = child(root, "EtherCATInfo")
+        if inner is not None:
+            root = inner
+            root.tag = "EtherCATInfo"
     if root.tag == "EtherCATConfig":
         raise ImportFailed(
             f"{name} is a network configuration (ENI), not a device description (ESI)"

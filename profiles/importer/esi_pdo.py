@@ -36,7 +36,7 @@ class PdoReader:
 
         A PDO without contents that can be written is one to be filled.
         """
-        place = f"{self._file}: {pdo.tag}"
+        place = f"{self._file}: {'RxPdo' if direction == 'rx' else 'TxPdo'}"
         index = whole_number(text_of(child(pdo, "Index")), place, self._report)
         if index is None:
             self._report.left_out(place, "a PDO without an index")

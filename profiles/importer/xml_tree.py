@@ -8,33 +8,28 @@ from xml.etree.ElementTree import Element
 _ENGLISH = "1033"
 
 
-def strip_namespaces(root: Element) -> None:
-    """Take ``{namespace}`` off every tag: makers use several, or none."""
+def simplify_tags(root: Element) -> None:
+    """Take ``{namespace}`` off every tag, and capitals off every tag below the root.
+
+    Makers use several namespaces or none, and write the same tag in other letters.
+    """
+    simple: dict[str, str] = {}
     for element in root.iter():
-        if isinstance(element.tag, str):
-            element.tag = element.tag.rpartition("}")[2]
+        tag = element.tag
+        if isinstance(tag, str):
+            if tag not in simple:
+                simple[tag] = tag.rpartition("}")[2].lower()
+            element.tag = simple[tag] if element is not root else tag.rpartition("}")[2]
 
 
 def child(element: Element | None, tag: str) -> Element | None:
-    """The first child with this tag; where there is none, with its letters in another case."""
-    if element is None:
-        return None
-    found = element.find(tag)
-    if found is not None:
-        return found
-    wanted = tag.lower()
-    for each in element:
-        if isinstance(each.tag, str) and each.tag.lower() == wanted:
-            return each
-    return None
+    """The first child with this tag, whatever the case of its letters; see `simplify_tags`."""
+    return None if element is None else element.find(tag.lower())
 
 
 def children(element: Element | None, tag: str) -> list[Element]:
     """All children with this tag, whatever the case of its letters."""
-    if element is None:
-        return []
-    wanted = tag.lower()
-    return [e for e in element if isinstance(e.tag, str) and e.tag.lower() == wanted]
+    return [] if element is None else element.findall(tag.lower())
 
 
 def text_of(element: Element | None) -> str:

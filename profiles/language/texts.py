@@ -55,6 +55,8 @@ def _all(profile: Profile) -> Iterator[Text]:
         yield from _of_parameter(parameter)
     for quirk in profile.quirks:
         yield Text("notes on the drive", ("quirks", quirk.kind), quirk.help)
+    for note in profile.notes:
+        yield Text("notes on the drive", (), note.help)
     for link in profile.links:
         yield Text("notes on the drive", ("watchdogs", link.kind), link.watchdog.help)
         yield Text("notes on the drive", ("wiring", link.kind), link.wiring)

@@ -95,7 +95,7 @@ def test_row(row: tuple[object, ...]) -> None:
 
 def test_it_says_that_it_is_partial() -> None:
     assert PROFILE.partial
-    assert PROFILE.quirk("partial_manual") is not None
+    assert any("excerpt" in note.help for note in PROFILE.notes)
 
 
 def test_check_has_nothing_to_say() -> None:
@@ -133,9 +133,8 @@ def test_modes() -> None:
     # 37-43, 404-409
     assert PROFILE.supported_modes == (6, 8, 9, 10)
     assert sorted(PROFILE.by_key["6060:00"].enum) == [0, 6, 8, 9, 10]
-    pause = PROFILE.quirk("mode_change_pause")
-    assert pause is not None
-    assert pause.milliseconds == 20  # 486
+    pause = next(note for note in PROFILE.notes if note.source == "001:486")
+    assert "20 ms" in pause.help
 
 
 def test_quick_stop_codes() -> None:
@@ -225,4 +224,4 @@ def test_gear_acts_when_the_bus_starts() -> None:
     # 1005, 1018
     for key in ("6091:01", "6091:02", "6092:01", "6092:02", "607E:00", "607C:00"):
         assert PROFILE.by_key[key].effective == "power_cycle"
-    assert PROFILE.quirk("gear_on_init") is not None
+    assert any(note.key == "6091:01" for note in PROFILE.notes)

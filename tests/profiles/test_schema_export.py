@@ -35,7 +35,7 @@ def test_shown_form(drive: str) -> None:
     shown = json.loads(json.dumps(show(load_profile(drive))))
     assert set(shown) == {
         "drive", "identity", "parameters", "faults", "procedures", "homing_methods", "quirks",
-        "pdo", "bring_up",
+        "notes", "pdo", "bring_up",
     }  # fmt: skip
     assert all(set(parameter) == PARAMETER_FIELDS for parameter in shown["parameters"])
     assert all(

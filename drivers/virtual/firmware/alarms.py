@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from drivers.virtual.firmware.axis import VirtualAxis
-from drivers.virtual.firmware.families.base import FaultInfo
+from drivers.virtual.firmware.cia402.base import FaultInfo
 from drivers.virtual.firmware.kernel import layout as k
 from profiles.schema import Fault, Profile
 
@@ -78,7 +78,10 @@ class Alarms:
         infos: Mapping[int, FaultInfo],
         axis: VirtualAxis,
         log: FaultLog,
+        *,
+        unknown_end: bool = False,
     ) -> None:
+        self._unknown_end = unknown_end
         self._table = {fault.code: fault for fault in profile.faults}
         self._infos = infos
         self._axis = axis
@@ -157,6 +160,8 @@ class Alarms:
         fault = self._table.get(info.fault)
         if fault is None or fault.reset_by in ("command", "automatic"):
             return True
+        if fault.reset_by == "unknown":
+            return self._unknown_end
         return fault.reset_by == "special" and fault.code in self.cleared_by_step
 
     def clear(self) -> None:

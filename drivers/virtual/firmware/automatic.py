@@ -13,12 +13,11 @@ more than P09.28, its frequency becomes P09.26. How, and how long it is watched,
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from drivers.virtual.firmware.cia402.keys import FoundNotchKeys, SwingKeys
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.families.base import SwingKeys
 from drivers.virtual.firmware.kernel import layout as k
 from profiles.loader import load_profile
 
@@ -29,57 +28,14 @@ _SWING_SAMPLES = 400
 """0.8 s: a swing of 2.5 Hz shows two of its turns."""
 
 
-@dataclass(frozen=True, slots=True)
-class RigidityKeys:
-    """Level and mode, and the gains that they set: (position, speed, integral) per set."""
-
-    mode: str
-    level: str
-    first: tuple[str, str, str]
-    second: tuple[str, str, str]
-    on: tuple[int, ...] = (1, 2)
-
-
-@dataclass(frozen=True, slots=True)
-class NotchKeys:
-    """Mode and the notches that it may set: frequency and width; ``result`` shows a resonance."""
-
-    mode: str
-    notches: tuple[tuple[str, str], ...]
-    off_raw: int
-    width_raw: int
-    count: dict[int, int]
-    restore: int
-    result: str | None = None
-
-
-RIGIDITY: dict[str, RigidityKeys] = {
-    "m6l": RigidityKeys(
-        "2009:07", "2009:08", ("2008:03", "2008:01", "2008:02"), ("2008:07", "2008:05", "2008:06")
-    ),
-    "r6l": RigidityKeys(
-        "2007:01", "2007:02", ("2006:03", "2006:01", "2006:02"), ("2006:06", "2006:04", "2006:05")
-    ),
-}
-NOTCHES: dict[str, NotchKeys] = {
-    "m6l": NotchKeys(
-        "2009:09", (("2009:0F", "2009:10"), ("2009:11", "2009:12")), 0, 100, {1: 1, 2: 2, 3: 0}, 4,
-        result="2009:17",
-    ),
-    "r6l": NotchKeys(
-        "2007:0C", (("2007:13", "2007:14"), ("2007:16", "2007:17")), 4000, 4, {1: 1, 2: 2}, 4
-    ),
-}  # fmt: skip
-
-
 class Automatic:
     """Watches its two modes; called after settings have changed and by its own timer."""
 
     def __init__(self, core: Core) -> None:
         self._core = core
         self._axis = core.axis
-        self._rigidity = RIGIDITY.get(core.profile.drive)
-        self._notches = NOTCHES.get(core.profile.drive)
+        self._rigidity = core.family.traits.rigidity
+        self._notches = core.family.traits.found_notches
         self._level: tuple[int, int] | None = None
         known = core.profile.by_key
         if self._rigidity is not None and self._rigidity.level not in known:
@@ -103,7 +59,7 @@ class Automatic:
         self._level = (mode, level)
         if mode not in keys.on:
             return
-        position_hz, speed_hz, integral_hz = load_profile("mms7").stiffness[0].rows[level]
+        position_hz, speed_hz, integral_hz = load_profile(keys.levels_of).stiffness[0].rows[level]
         for gains, factor in ((keys.first, 1.0), (keys.second, 1.2 if mode == 2 else 1.0)):
             self._put(gains[0], position_hz * factor)
             self._put(gains[1], speed_hz)
@@ -142,7 +98,7 @@ class Automatic:
         if isinstance(default, int):
             self._core.od.put(key, default)
 
-    def _hear(self, keys: NotchKeys, hertz: float, places: int) -> None:
+    def _hear(self, keys: FoundNotchKeys, hertz: float, places: int) -> None:
         if keys.result is not None:
             self._core.od.put(keys.result, round(hertz))
         free = [

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from drivers.virtual.firmware.cia402.base import BrakeTimes
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.families.base import BrakeTimes
-from drivers.virtual.firmware.families.terminals import TABLES
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.schedule import Timer
 
@@ -36,7 +35,7 @@ class HoldingBrake:
         motor, core = self._axis.spec.motor, self._core
         if not motor.brake or not motor.brake_supplied:
             return motor.brake
-        table = TABLES.get(core.family.name)
+        table = core.family.terminals
         if not motor.brake_output or table is None:
             return False
         return all(table.output_use(each, core.od) != "brake" for each in table.outputs)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from drivers.virtual.device import ABORT_DEVICE_STATE, ABORT_VALUE_RANGE, SdoAbort
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.load_identification import KEYS, LoadIdentification
+from drivers.virtual.firmware.load_identification import LoadIdentification
 from drivers.virtual.firmware.slow_store import SlowStore
 from drivers.virtual.firmware.storage import Storage
 from profiles.schema import Raw
@@ -35,7 +35,7 @@ class Commands:
             "identify_poles": self._identify_poles,
         }
         self.load: LoadIdentification | None = None
-        keys = KEYS.get(core.profile.drive)
+        keys = core.family.traits.load_identification
         if keys is not None and keys.ratio in core.profile.by_key:
             self.load = LoadIdentification(core, keys, self._identification_failed)
         self.store = (
@@ -113,7 +113,7 @@ class Commands:
             raise SdoAbort(ABORT_DEVICE_STATE)
 
     def _identification_failed(self) -> None:
-        keys = KEYS.get(self._core.profile.drive)
+        keys = self._core.family.traits.load_identification
         if keys is not None:
             self._raise(keys.fault)
 

@@ -7,8 +7,8 @@ from typing import Final
 
 from drivers.virtual.firmware.alarms import FaultLog
 from drivers.virtual.firmware.brake import HoldingBrake
+from drivers.virtual.firmware.cia402.base import FaultInfo
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.families.base import FaultInfo
 from drivers.virtual.firmware.faults import Faults
 from drivers.virtual.firmware.identification import Identification
 from drivers.virtual.firmware.jog import TerminalJog

@@ -3,28 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from drivers.virtual.device import Device
-from drivers.virtual.firmware.families.base import Family
-from drivers.virtual.firmware.families.cia402 import Cia402
-from drivers.virtual.firmware.families.mms7 import Mms7
-from drivers.virtual.firmware.families.power import SUPPLY_V
-from drivers.virtual.firmware.families.traits import TRAITS
+from drivers.virtual.firmware import families
 from drivers.virtual.firmware.rough_feedback import without_lacking
 from drivers.virtual.firmware.servo import VirtualServo
 from drivers.virtual.mechanics import MechanicsSpec, standard_mechanics
 from profiles.loader import load_profile
 from profiles.schema import Profile
-
-FAMILIES: dict[str, Callable[[Profile], Family]] = {
-    "mms7": lambda _: Mms7(),
-    **{
-        name: lambda profile, traits=traits: Cia402(profile, traits)  # type: ignore[misc]
-        for name, traits in TRAITS.items()
-    },
-}
 
 
 def make_device(
@@ -46,24 +34,26 @@ def make_device(
         ProfileError: the profile is missing or wrong.
     """
     profile = load_profile(drive) if isinstance(drive, str) else drive
-    build = FAMILIES.get(profile.drive)
-    if build is None and profile.from_description:
+    known = families.names()
+    name = profile.drive
+    if name not in known and profile.from_description:
         _require_known_units(profile)
         _require_whole_bytes(profile)
-        build = FAMILIES["generic402"]
-    if build is None:
-        raise ValueError(f"no virtual {profile.drive!r}; there are: {', '.join(sorted(FAMILIES))}")
+        name = "generic402"
+    if name not in known:
+        raise ValueError(f"no virtual {profile.drive!r}; there are: {', '.join(known)}")
+    family = families.family_of(profile, name)
     if mechanics is None:
         mechanics = standard_mechanics()
     elif not isinstance(mechanics, MechanicsSpec):
         mechanics = MechanicsSpec.model_validate(dict(mechanics))
     profile = without_lacking(profile, mechanics.rough_feedback)
-    if profile.drive in SUPPLY_V and "supply" not in mechanics.model_fields_set:
-        supply = mechanics.supply.model_copy(update={"voltage_v": SUPPLY_V[profile.drive]})
+    if family.supply_v is not None and "supply" not in mechanics.model_fields_set:
+        supply = mechanics.supply.model_copy(update={"voltage_v": family.supply_v})
         mechanics = mechanics.model_copy(update={"supply": supply})
     return VirtualServo(
         profile,
-        build(profile),
+        family,
         mechanics,
         nvm_path=None if nvm_dir is None else nvm_dir / f"{profile.drive}-{station}.json",
         station=station,

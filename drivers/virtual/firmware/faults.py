@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Protocol
 
 from drivers.virtual.firmware.alarms import Alarms, FaultLog, Snapshot, snapshot_of
+from drivers.virtual.firmware.cia402.base import FaultInfo
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.families.base import FaultInfo
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.schedule import Timer
 from drivers.virtual.firmware.states import State
@@ -43,6 +43,7 @@ class Faults:
         self.alarms = Alarms(
             core.profile, self._traits.faults, core.axis,
             FaultLog(self._traits.history_size) if log is None else log,
+            unknown_end=self._traits.unknown_faults_end,
         )  # fmt: skip
         self.emergencies: list[Emergency] = []
         self.levels: Callable[[], tuple[int, int]] = lambda: (0, 0)

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 
+from drivers.virtual.firmware.cia402.keys import TorqueHoming
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.schedule import Timer
@@ -201,13 +202,14 @@ class Homing:
 
     # --- methods ---------------------------------------------------------------------------
     def _run(self, method: int) -> Generator[Until, None, None]:
-        torque_methods = self._core.family.traits.torque_homing.methods
+        by_torque = self._core.family.traits.torque_homing
+        torque_methods = {} if by_torque is None else by_torque.methods
         stays = method in (35, 37) or (method in torque_methods and not torque_methods[method][1])
         if method in (35, 37):
             home = self._axis.angle_rad
-        elif method in torque_methods:
+        elif by_torque is not None and method in torque_methods:
             direction, back_to_index = torque_methods[method]
-            home = yield from self._by_torque(direction)
+            home = yield from self._by_torque(by_torque, direction)
             if back_to_index:
                 self._core.torque_cap_nm = math.inf
                 self._core.apply_motion()
@@ -266,9 +268,8 @@ class Homing:
         yield Until(k.EV_ARRIVED)
         core.zero_rad = home + offset if self._offset_way() == "travel_to_zero" else home
 
-    def _by_torque(self, direction: int) -> Script:
+    def _by_torque(self, keys: TorqueHoming, direction: int) -> Script:
         core = self._core
-        keys = core.family.traits.torque_homing
         torque = core.torque_of(core.number(keys.torque_key, 500))
         core.torque_cap_nm = torque
         core.apply_motion()

@@ -9,10 +9,10 @@ value starts it is not printed in either manual; any but 0 does here, and 0 stop
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
 
+from drivers.virtual.firmware.cia402.base import RPM
+from drivers.virtual.firmware.cia402.keys import LoadKeys
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.families.base import RPM
 from drivers.virtual.firmware.identification import regress
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.schedule import Timer
@@ -20,36 +20,6 @@ from drivers.virtual.firmware.schedule import Timer
 _SAMPLE_S = 0.002
 _SWINGS = 3
 Sample = tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class LoadKeys:
-    """Parameters: top speed [rpm], time to it [ms], pause [ms], the ratio; and the online mode.
-
-    ``ratio_per_one`` is the engineering value of the ratio parameter for a load like the rotor.
-    """
-
-    speed: str
-    ramp: str
-    pause: str
-    ratio: str
-    ratio_per_one: float
-    command: str
-    revolutions: str | None = None
-    online: str | None = None
-    fault: str = ""
-
-
-KEYS: dict[str, LoadKeys] = {
-    "m6l": LoadKeys(
-        "2009:02", "2009:03", "2009:05", "2009:27", 1.0, "2009:01",
-        revolutions="2009:04", online="2009:06", fault="Er.018",
-    ),
-    "r6l": LoadKeys(
-        "2007:07", "2007:08", "2007:09", "2006:0D", 100.0, "200C:0C",
-        revolutions="2007:0A", fault="AL.273",
-    ),
-}  # fmt: skip
 
 
 class LoadIdentification:

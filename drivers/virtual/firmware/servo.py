@@ -19,11 +19,11 @@ from drivers.virtual.device import (
 from drivers.virtual.firmware.alarms import FaultLog
 from drivers.virtual.firmware.automatic import Automatic
 from drivers.virtual.firmware.axis import VirtualAxis
+from drivers.virtual.firmware.cia402.base import Family
 from drivers.virtual.firmware.commands import Commands
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.dictionary import Entry, ObjectDictionary
-from drivers.virtual.firmware.families.base import Family
 from drivers.virtual.firmware.faults import Emergency
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.live import live_values

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from drivers.virtual.firmware.axis import VirtualAxis
+from drivers.virtual.firmware.cia402.base import FaultInfo, OffStop
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.families.base import FaultInfo, OffStop
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.modes import CST, PT, Modes
 

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Final
 
 from drivers.virtual.device import ABORT_STORE, SdoAbort
+from drivers.virtual.firmware.cia402.base import Family
 from drivers.virtual.firmware.dictionary import Entry, ObjectDictionary
-from drivers.virtual.firmware.families.base import Family
 from drivers.virtual.firmware.nvm import Nvm
 from drivers.virtual.firmware.settings import MotorData
 from drivers.virtual.mechanics import MechanicsSpec

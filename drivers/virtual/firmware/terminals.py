@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from drivers.virtual.firmware.control import DeviceControl
-from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.families.terminals import (
+from drivers.virtual.firmware.cia402.terminals import (
     SWITCHES,
     Input,
     InputUse,
@@ -15,6 +13,8 @@ from drivers.virtual.firmware.families.terminals import (
     TerminalTable,
     is_virtually_on,
 )
+from drivers.virtual.firmware.control import DeviceControl
+from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.states import State
 

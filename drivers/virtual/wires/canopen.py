@@ -32,6 +32,8 @@ from drivers.virtual.wires.sdo_server import SdoServer
 _STOPPED, _OPERATIONAL, _PREOPERATIONAL = 4, 5, 127
 _HEARTBEAT_LOST = 0x8130
 _PDO_TOO_SHORT = 0x8210
+_OWN_CONSTANTS = (0x1000, 0x1001, 0x1018)
+"""Device type, error register, identity: a node has them whatever its device leaves out."""
 _SERVO_DEVICE_TYPE = 0x00020192
 _HISTORY = 8
 #: Bits of the error register (CiA 301 clause 7.5.2.2): any error, and an error of communication.
@@ -283,6 +285,7 @@ class CanopenNode:
                 return bytes([len(values)])
             if subindex <= len(values):
                 return struct.pack("<I", values[subindex - 1])
+            raise SdoAbort(ABORT_NO_SUBINDEX)
         raise refusal
 
     def _past_error(self, subindex: int) -> bytes:
@@ -309,6 +312,9 @@ class CanopenNode:
                 # Only 0, which empties the list, may be written.
                 raise SdoAbort(ABORT_VALUE_RANGE if len(data) == 1 else ABORT_LENGTH)
             self._history.clear()
+        elif index in _OWN_CONSTANTS and index not in self.device.indices():
+            self._read(index, subindex)
+            raise SdoAbort(ABORT_READ_ONLY)
         else:
             self.device.write(index, subindex, data)
 

@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 
 from drivers.virtual.device import SdoAbort
-from drivers.virtual.firmware import make_device
-from drivers.virtual.firmware.factory import FAMILIES
+from drivers.virtual.firmware import families, make_device
 from drivers.virtual.firmware.families.mms7 import Mms7
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.servo import VirtualServo
@@ -367,7 +366,7 @@ def test_generic_drive_obeys_6007h(family, option: int, bits: int) -> None:
     assert b.status & 0x6F == bits
 
 
-@pytest.mark.parametrize("drive", sorted(set(FAMILIES) & set(drive_names())))
+@pytest.mark.parametrize("drive", sorted(set(families.names()) & set(drive_names())))
 def test_every_family_turns_with_its_real_profile(family, drive: str) -> None:
     """One revolution per second in PV or CSV, seen in the profile's own units."""
     profile = load_profile(drive)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from drivers.virtual.firmware.axis import VirtualAxis
-from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
-from drivers.virtual.firmware.families.base import (
+from drivers.virtual.firmware.cia402.base import (
     RPM,
     BrakeTimes,
     FaultInfo,
@@ -18,7 +18,9 @@ from drivers.virtual.firmware.families.base import (
     Wiring,
     inertia_kgm2,
 )
-from drivers.virtual.firmware.families.terminals import TerminalTable
+from drivers.virtual.firmware.cia402.keys import TorqueHoming
+from drivers.virtual.firmware.cia402.terminals import TerminalTable
+from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.settings import (
     Biquad,
@@ -31,14 +33,18 @@ from drivers.virtual.firmware.settings import (
 from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw, StiffnessTable
 
+if TYPE_CHECKING:
+    from drivers.virtual.firmware.monitors import Sources
+
 TWO_PI = 2 * math.pi
 _SIGNAL_OF_FUNCTION = {1: k.SIG_NEGATIVE, 2: k.SIG_POSITIVE, 3: k.SIG_HOME}  # 004:6476-6509
 
 
 class Mms7:
-    """See `drivers.virtual.firmware.families.base.Family`."""
+    """See `drivers.virtual.firmware.cia402.base.Family`."""
 
     name = "mms7"
+    supply_v: float | None = None
     terminals: TerminalTable | None = None
     traits = Traits(
         # Bit 5 is "not used" and bit 4 alone takes a new target (004:3748-3752).
@@ -57,6 +63,9 @@ class Mms7:
         limits=LimitSwitches(action="fault"),
         stops=Stops(torque_key="2002:05"),
         error_status_key="200B:0B",
+        torque_homing=TorqueHoming(
+            {-3: (-1, False), -2: (1, False)}, "2070:01", "2070:02"
+        ),  # 004:3840
         assigns_terminals=True,
         # Codes 004:4705-4917; fixed reactions 004:4951-4955.
         faults={
@@ -245,6 +254,10 @@ class Mms7:
             "2040:00": lambda: round(item(k.S_TEMPERATURE)),
         }
 
+    def monitors(self, sources: Sources) -> dict[str, Callable[[], float]]:  # noqa: ARG002
+        """All of them are `readings`."""
+        return {}
+
     def wiring(self, od: ObjectDictionary) -> Wiring:
         """Terminal functions 2030h, polarity and simulation 2031h (004:6470-6579).
 
@@ -282,3 +295,8 @@ def _bandwidth_gains(
     """Bandwidths in 0.1 Hz to gains: the rigid plant 1/(J·s) crosses over at the bandwidth."""
     kp = inertia_kgm2 * TWO_PI * speed * 0.1
     return GainSet(TWO_PI * position * 0.1, kp, kp * TWO_PI * integral * 0.1)
+
+
+def family(profile: Profile) -> Mms7:  # noqa: ARG001 - all of it stands here
+    """The family."""
+    return Mms7()

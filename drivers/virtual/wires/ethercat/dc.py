@@ -1,4 +1,4 @@
-"""Distributed clocks of one slave: local time, system time, receive times and the SYNC0 grid.
+"""Distributed clocks of one slave: local time, system time, receive times, SYNC0 and SYNC1.
 
 ETG.1000.4 clause 6.8. All methods take the wire's time in ns. The local clock starts at zero
 with the power; the master puts the difference to its own time into 920h.
@@ -14,7 +14,7 @@ from drivers.virtual.wires.ethercat.clock import WireClock
 HOP_NS = 600
 """Delay of one slave and its cable; the order of magnitude of real devices."""
 
-_ACTIVE, _SYNC0 = 0x01, 0x02
+_ACTIVE, _SYNC0, _SYNC1 = 0x01, 0x02, 0x04
 _U32, _I64 = struct.Struct("<I"), struct.Struct("<q")
 
 
@@ -30,6 +30,8 @@ class DistributedClock:
         self.sync0_first_ns: int | None = None
         """Wire time of the first SYNC0, None while SYNC0 is off or can never fire."""
         self.sync0_cycle_ns = 0
+        self.sync1_delay_ns: int | None = None
+        """From the first SYNC0 to the first SYNC1 (9A4h); None while SYNC1 is off."""
 
     def power_on(self, now_ns: int) -> None:
         """The local clock starts from zero."""
@@ -37,6 +39,7 @@ class DistributedClock:
         self._slewed_ns = 0.0
         self.sync0_first_ns = None
         self.sync0_cycle_ns = 0
+        self.sync1_delay_ns = None
 
     def local(self, now_ns: int) -> int:
         """Local time: runs since power-on, too fast by ``drift_ppm``, slewed by the master."""
@@ -81,16 +84,49 @@ class DistributedClock:
             self._slewed_ns -= difference / 8.0
 
     def activate(self, now_ns: int) -> None:
-        """A write to 981h starts or stops SYNC0; start and cycle time are taken over now."""
-        self.sync0_first_ns = None
+        """A write to 981h starts or stops the pulses; start and cycle times are taken over now."""
+        self.sync0_first_ns = self.sync1_delay_ns = None
         if self._memory[reg.DC_ACTIVATION] & (_ACTIVE | _SYNC0) != (_ACTIVE | _SYNC0):
             return
         start = struct.unpack_from("<Q", self._memory, reg.DC_START_TIME)[0]
-        self.sync0_cycle_ns = struct.unpack_from("<I", self._memory, reg.DC_SYNC0_CYCLE)[0]
+        self.sync0_cycle_ns, delay = struct.unpack_from("<II", self._memory, reg.DC_SYNC0_CYCLE)
         ahead = (start - self.system(now_ns)) & 0xFFFF_FFFF_FFFF_FFFF
         if self.sync0_cycle_ns == 0 or ahead >= 1 << 63:
             return  # a start time in the past is met only after the counter has wrapped
-        self.sync0_first_ns = self._clock.grid(now_ns + ahead, self.sync0_cycle_ns)
+        if self._memory[reg.DC_ACTIVATION] & _SYNC1:
+            self.sync1_delay_ns = delay
+        self.sync0_first_ns = self._clock.grid(now_ns + ahead, self.exchange_cycle_ns)
+
+    @property
+    def exchange_cycle_ns(self) -> int:
+        """Period of the pulse that outputs and inputs are exchanged with.
+
+        SYNC0 may run faster than the process data; SYNC1 then comes every
+        ``9A4h div 9A0h + 1`` SYNC0 cycles (ETG.1000.4 clause 6.8), once per cycle of process data.
+        """
+        if self.sync1_delay_ns is None or not self.sync0_cycle_ns:
+            return self.sync0_cycle_ns
+        return (self.sync1_delay_ns // self.sync0_cycle_ns + 1) * self.sync0_cycle_ns
+
+    @property
+    def exchange_first_ns(self) -> int | None:
+        """Wire time of the first SYNC1 where it is on, else of the first SYNC0."""
+        first = self.sync0_first_ns
+        return first if first is None else first + (self.sync1_delay_ns or 0)
+
+    def exchanges_at(self, now_ns: int) -> bool:
+        """The pulse at ``now_ns`` is one that process data are exchanged with."""
+        first = self.exchange_first_ns
+        if first is None or now_ns < first:
+            return False
+        return (now_ns - first) % self.exchange_cycle_ns == 0
+
+    def next_pulse(self, after_ns: int) -> int | None:
+        """Wire time of the first SYNC0 or SYNC1 later than ``after_ns``; None without them."""
+        sync0, first = self.next_sync0(after_ns), self.exchange_first_ns
+        if sync0 is None or first is None or self.sync1_delay_ns is None:
+            return sync0
+        return min(sync0, _next(first, self.exchange_cycle_ns, after_ns))
 
     @property
     def sync0_requested(self) -> bool:
@@ -102,9 +138,7 @@ class DistributedClock:
         first = self.sync0_first_ns
         if first is None:
             return None
-        if after_ns < first:
-            return first
-        return first + ((after_ns - first) // self.sync0_cycle_ns + 1) * self.sync0_cycle_ns
+        return _next(first, self.sync0_cycle_ns, after_ns)
 
     def last_sync0(self, until_ns: int) -> int | None:
         """Wire time of the last SYNC0 not later than ``until_ns``; None if there was none."""
@@ -112,3 +146,10 @@ class DistributedClock:
         if first is None or until_ns < first:
             return None
         return first + ((until_ns - first) // self.sync0_cycle_ns) * self.sync0_cycle_ns
+
+
+def _next(first_ns: int, cycle_ns: int, after_ns: int) -> int:
+    """The first time on the grid that is later than ``after_ns``."""
+    if after_ns < first_ns:
+        return first_ns
+    return first_ns + ((after_ns - first_ns) // cycle_ns + 1) * cycle_ns

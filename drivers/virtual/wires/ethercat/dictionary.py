@@ -37,7 +37,7 @@ class SyncReport:
     """What 1C32h/1C33h tell of the synchronisation; the process data keep it up to date."""
 
     mode: int = 0
-    """0 free run, 1 with the sync manager event, 2 with SYNC0 (ETG.1020 table 59)."""
+    """0 free run, 1 with the sync manager event, 2 with SYNC0, 3 with SYNC1 (ETG.1020 table 59)."""
     cycle_ns: int = 0
     missed: int = 0
     """SYNC0 events that found no new outputs, since Op."""

@@ -1,7 +1,9 @@
-"""Process data of one slave: outputs taken and inputs latched at SYNC0 or at the frame's event.
+"""Process data of one slave: exchanged at a SYNC pulse, or at the event of the frame.
 
-With SYNC0 the physics run on the slave's own grid and are computed lazily, when a frame comes;
-a frame that comes too late leaves the outputs of the cycle before in force, as in a drive.
+With a SYNC pulse the physics run on the slave's own grid and are computed lazily, when a frame
+comes; a frame that comes too late leaves the outputs of the cycle before in force, as in a drive.
+With SYNC1 beside a faster SYNC0, outputs and inputs are exchanged at SYNC1, and SYNC0 is the
+drive's own cycle (ETG.1020 clause 22, sync type 3).
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from drivers.virtual.wires.ethercat.syncmanager import SyncManager
 _SHORTEST_CYCLE_NS = 31_250
 """No drive of ours goes below; where the manual prints a limit, that one counts as well."""
 
-_FREE_RUN, _SYNC_MANAGER, _SYNC0 = 0, 1, 2
+_FREE_RUN, _SYNC_MANAGER, _SYNC0, _SYNC1 = 0, 1, 2, 3
 
 
 class ProcessData:
@@ -102,10 +104,15 @@ class ProcessData:
         self._running = True
         self._seen_sync0 = False
         self.written_ns = None
-        self._report.mode = _SYNC0 if self._clock.sync0_requested else _SYNC_MANAGER
-        self._report.cycle_ns = self._clock.sync0_cycle_ns
+        self._report.mode = self._mode()
+        self._report.cycle_ns = self._clock.exchange_cycle_ns
         self._device.advance(now_ns)
         self._latch()
+
+    def _mode(self) -> int:
+        if not self._clock.sync0_requested:
+            return _SYNC_MANAGER
+        return _SYNC0 if self._clock.sync1_delay_ns is None else _SYNC1
 
     def stop(self) -> None:
         """Below Safe-Op nothing is exchanged."""
@@ -137,15 +144,17 @@ class ProcessData:
 
     @property
     def next_tick_ns(self) -> int | None:
-        """Next SYNC0 that has work to do."""
-        return self._clock.next_sync0(self._ticked_ns) if self._running else None
+        """Next SYNC0 or SYNC1 that has work to do."""
+        return self._clock.next_pulse(self._ticked_ns) if self._running else None
 
     def tick(self, now_ns: int) -> None:
-        """SYNC0 at ``now_ns``: take outputs, latch inputs."""
+        """A pulse at ``now_ns``: the drive works; with that of the process data, exchange them."""
         self._ticked_ns = now_ns
         self._seen_sync0 = True
         self._device.advance(now_ns)
         if self._operational:
+            if not self._clock.exchanges_at(now_ns):
+                return
             if not self._fresh and self.has_outputs:
                 self._report.missed += 1
             self._fresh = False

@@ -120,9 +120,10 @@ class Segment:
         return now
 
     def _cycle_ns(self) -> int:
+        """Cycle of the process data; SYNC0 alone may be faster."""
         for slave in self.slaves:
             if slave.dc.sync0_first_ns is not None:
-                return slave.dc.sync0_cycle_ns
+                return slave.dc.exchange_cycle_ns
         return 0
 
     def _execute(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
+from drivers.virtual.firmware.cia402.base import RPM, Traits, Units
+from drivers.virtual.firmware.cia402.conversions import MS, TWO_PI, si_factor
+from drivers.virtual.firmware.cia402.keys import GainKeys
+from drivers.virtual.firmware.cia402.notches import notches_of
 from drivers.virtual.firmware.dictionary import ObjectDictionary
-from drivers.virtual.firmware.families.base import RPM, GainKeys, Traits, Units
-from drivers.virtual.firmware.families.conversions import MS, TWO_PI, si_factor
-from drivers.virtual.firmware.families.notches import notches_of
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.settings import (
     Compensation,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-from drivers.virtual.firmware.families.base import RPM
+from drivers.virtual.firmware.cia402.base import RPM
 
 TWO_PI = 2 * math.pi
 MS = 1e-3

@@ -1,4 +1,4 @@
-"""Terminals of each family as data: functions, polarities, forcing, and their bits in 60FDh.
+"""Terminals of a family as data: functions, polarities, forcing, and their bits in 60FDh.
 
 Codes are those of the manuals' tables: 000:3257-3290, 002:8989-9350, 003:495-540, 001:950-1000.
 The virtual machine's switches have normally open contacts and are wired to whichever input has
@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from drivers.virtual.firmware.cia402.base import Wiring
 from drivers.virtual.firmware.dictionary import ObjectDictionary
-from drivers.virtual.firmware.families.base import Wiring
 from drivers.virtual.firmware.kernel import layout as k
 
 InputUse = Literal[
@@ -120,108 +120,3 @@ def is_virtually_on(terminal: Input, od: ObjectDictionary) -> bool:
         return False
     key, bit = terminal.virtual
     return bool(int(od.number(key)) >> bit & 1)
-
-
-M6L = TerminalTable(
-    inputs=tuple(
-        Input(
-            f"DI{n + 1}", 16 + n, f"2003:{n + 1:02X}", Logic("2003:0E", n), virtual=("2003:0F", n)
-        )
-        for n in range(9)
-    ),
-    outputs=tuple(
-        Output(f"DO{n + 1}", 16 + n, f"2003:{0x10 + n:02X}", Logic("2003:16", n)) for n in range(5)
-    ),
-    input_uses={
-        2: "reset",
-        3: "gain",
-        17: "jog_forward",
-        18: "jog_backward",
-        32: "home",
-        34: "emergency",
-        35: "positive_limit",
-        36: "negative_limit",
-        38: "fault",
-        49: "probe1",
-        50: "probe2",
-    },
-    output_uses={
-        0: "ready",
-        1: "running",
-        4: "zero_speed",
-        5: "fault",
-        6: "warning",
-        11: "in_position",
-        18: "brake",
-        28: "bus",
-    },
-    inputs_key="200B:0D",
-    outputs_key="200B:0E",
-    bus_outputs_need_function=True,
-    bus_outputs_need_cycles=True,
-    keep_key="2014:1C",
-    probe_bits=(26, 27),
-)
-
-R6L = TerminalTable(
-    inputs=tuple(
-        Input(f"DI{n + 1}", 16 + n, f"2002:{2 * n + 1:02X}", Logic(f"2002:{2 * n + 2:02X}"))
-        for n in range(8)
-    ),
-    outputs=tuple(
-        Output(f"DO{n + 1}", 16 + n, f"2002:{0x21 + 2 * n:02X}", Logic(f"2002:{0x22 + 2 * n:02X}"))
-        for n in range(4)
-    ),
-    input_uses={
-        2: "reset",
-        5: "positive_limit",
-        6: "negative_limit",
-        7: "gain",
-        11: "emergency",
-        23: "home",
-        30: "probe1",
-        31: "probe2",
-        39: "jog_forward",
-        40: "jog_backward",
-    },
-    output_uses={0: "brake", 1: "fault", 2: "in_position", 6: "homed", 31: "bus"},
-    inputs_key="200D:14",
-    outputs_key="200D:15",
-    bus_outputs_need_function=True,  # the note at 002:14003
-)
-
-#: The parameters that select the functions stand before the excerpt: EMG on DI1, POT on DI2, NOT
-#: on DI3 and HOME on DI4 are this virtual drive's own wiring; HDI1 and HDI2 as printed (001:752).
-EP3E = TerminalTable(
-    inputs=(
-        Input("DI1", 19, fixed="emergency"),
-        Input("DI2", 20, fixed="positive_limit"),
-        Input("DI3", 21, fixed="negative_limit"),
-        Input("DI4", 22, fixed="home"),
-        Input("DI5", 23),
-        Input("HDI1", 30, fixed="probe1"),
-        Input("HDI2", 31, fixed="probe2"),
-    ),
-    outputs=(
-        Output("DO1", 16, fixed="ready"),
-        Output("DO2", 17, fixed="no_fault"),
-        Output("DO3", 18, fixed="bus"),
-        Output("DO4", 19, fixed="bus"),
-        Output("DO5", 20, fixed="brake"),
-    ),
-    bus_outputs_need_function=True,
-    masks_outputs=False,  # no mask for DO1 to DO5, only their function (001:988)
-)
-
-DS_C = TerminalTable(
-    inputs=tuple(Input(f"DI{n}", None, f"2400:{2 + n:02X}", Logic("2400:01", n)) for n in range(5)),
-    outputs=tuple(
-        Output(f"DO{n}", n, f"2400:{0x0D + n:02X}", Logic("2400:0C", n)) for n in range(3)
-    ),
-    input_uses={1: "home", 2: "positive_limit", 3: "negative_limit", 6: "emergency"},
-    output_uses={1: "fault", 2: "running", 3: "homed", 4: "in_position", 6: "brake"},
-    inputs_key="2100:00",
-    outputs_key="2101:00",
-)
-
-TABLES: dict[str, TerminalTable] = {"m6l": M6L, "r6l": R6L, "ep3e": EP3E, "ds_c": DS_C}

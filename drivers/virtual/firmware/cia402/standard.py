@@ -1,7 +1,7 @@
 """CiA 402 drives whose conventions the profile tells: gains, notches, units, faults.
 
-What a profile cannot tell is in `Traits` of each family; what no manual prints (thresholds of
-the power stage) is this virtual drive's own and said so below.
+What a profile cannot say stands in the family's module (`drivers.virtual.firmware.families`); what
+no manual prints (thresholds of the power stage) is this virtual drive's own and said so below.
 """
 
 from __future__ import annotations
@@ -9,48 +9,59 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar
 
 from drivers.virtual.firmware.axis import VirtualAxis
-from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
-from drivers.virtual.firmware.families import power
-from drivers.virtual.firmware.families.base import (
+from drivers.virtual.firmware.cia402 import power
+from drivers.virtual.firmware.cia402.base import (
     RPM,
     BrakeTimes,
     Traits,
     Units,
     Wiring,
 )
-from drivers.virtual.firmware.families.conversions import (
+from drivers.virtual.firmware.cia402.conversions import (
     MS,
     TWO_PI,
     per_rad_s,
     si_factor,
     volt_factor,
 )
-from drivers.virtual.firmware.families.loops import UNIT_GAIN, LoopReader
-from drivers.virtual.firmware.families.reports import faults_of
-from drivers.virtual.firmware.families.terminals import TABLES, TerminalTable
+from drivers.virtual.firmware.cia402.loops import UNIT_GAIN, LoopReader
+from drivers.virtual.firmware.cia402.reports import faults_of
+from drivers.virtual.firmware.cia402.terminals import TerminalTable
+from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.rough_feedback import unit_values
 from drivers.virtual.firmware.settings import LoopSettings, MotorData, ProtectionSettings
 from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw
 
+if TYPE_CHECKING:
+    from drivers.virtual.firmware.monitors import Sources
+
 
 class Cia402:
-    """A family described by its profile; see `drivers.virtual.firmware.families.base.Family`."""
+    """A family described by its profile; see `drivers.virtual.firmware.cia402.base.Family`.
 
-    def __init__(self, profile: Profile, traits: Traits | None = None) -> None:
+    A family's module derives from it: it states its traits and terminals, and overrides what its
+    manual prints otherwise.
+    """
+
+    TRAITS: ClassVar[Traits] = Traits()
+    TERMINALS: ClassVar[TerminalTable | None] = None
+    supply_v: float | None = None
+
+    def __init__(self, profile: Profile) -> None:
         self.name = profile.drive
         self._profile = profile
         self.terminals = self._table(profile)
-        base = traits or Traits()
+        base = self.TRAITS
         self.traits = replace(base, faults=base.faults or faults_of(profile, base.protections))
 
-    @staticmethod
-    def _table(profile: Profile) -> TerminalTable | None:
+    def _table(self, profile: Profile) -> TerminalTable | None:
         """The family's terminals, if this profile has their parameters."""
-        table = TABLES.get(profile.drive)
+        table = self.TERMINALS
         if table is None:
             return None
         keys = [t.function_key for t in table.inputs if t.function_key is not None]
@@ -95,12 +106,6 @@ class Cia402:
             "60C2:01": 1, "60C2:02": -3, "605A:00": 2, "605D:00": 1, "605E:00": 2, "6007:00": 1,
             "6502:00": sum(1 << (mode - 1) for mode in self._profile.supported_modes if mode > 0),
         }  # fmt: skip
-        if self.name == "ds_c":
-            # In-place window and time, out-of-tolerance threshold; origin and limits on DI0 to DI2.
-            fallback |= {
-                "2500:00": min(round(turn), 65535), "2501:00": window, "2502:00": 10,
-                "2400:02": 1, "2400:03": 2, "2400:04": 3,
-            }  # fmt: skip
         if self.traits.torque_limits is not None:
             positive, negative = self.traits.torque_limits
             for key, percent in ((positive, 300.0), (negative, 300.0)):
@@ -108,8 +113,6 @@ class Cia402:
                 if limit is not None:
                     below = limit.max_raw is not None and limit.max_raw <= 0
                     fallback[key] = limit.to_raw(-percent if below else percent)
-        if self.name == "r6l":
-            fallback["2000:16"] = round(1.2 * motor.rated_speed_rad_s / RPM)
         turns_per_s = {"606D:00": 1.0, "606F:00": 1.0, "6099:01": 2.0, "6099:02": 0.25}
         for key, turns in turns_per_s.items():
             parameter = self._profile.by_key.get(key)
@@ -204,7 +207,7 @@ class Cia402:
         motor: MotorData,
         units: Units,
     ) -> LoopSettings:
-        """Gains by the profile's convention; see `drivers.virtual.firmware.families.loops`."""
+        """Gains by the profile's convention; see `drivers.virtual.firmware.cia402.loops`."""
         return LoopReader(self._profile, self.traits, od, motor, units).settings()
 
     def protections(
@@ -214,10 +217,7 @@ class Cia402:
         units: Units,  # noqa: ARG002 - the seam's signature
     ) -> ProtectionSettings:
         """The virtual drive's own, refined by the parameters that the family has."""
-        base = power.own(motor)
-        refine = power.REFINE.get(self.name)
-        if refine is not None:
-            base = refine(od, motor, base)
+        base = self.refined(od, motor, power.own(motor))
         window = self._profile.by_role.get("following_error_window")
         size = od.number("6065:00" if window is None else window.key)
         unlimited = size in (0, 2**32 - 1) and window is not None
@@ -225,34 +225,34 @@ class Cia402:
         wait_s = od.number("6066:00", 0 if window is not None else 100) * MS
         return replace(base, following_error_s=wait_s if limited else math.inf)
 
+    def refined(
+        self,
+        od: ObjectDictionary,  # noqa: ARG002 - for families with parameters
+        motor: MotorData,  # noqa: ARG002
+        base: ProtectionSettings,
+    ) -> ProtectionSettings:
+        """The protections as the family's parameters set them; ``base`` where it has none."""
+        return base
+
     def refusal(self, od: ObjectDictionary, mode: int) -> str | None:  # noqa: ARG002 - the seam's
-        """EP3E: no mode or one that it has not (001:1538-1547), a gear out of range (001:1035)."""
-        if self.name != "ep3e":
-            return None
-        if mode == 0:
-            return "Err88"
-        if mode not in self._profile.supported_modes:
-            return "Err89"
+        """Nothing is refused."""
         return None
 
-    def gear_fault(self, od: ObjectDictionary) -> str | None:
-        """EP3E: from 1/1000 to 1000 (001:1035), else Err80."""
-        if self.name != "ep3e":
-            return None
-        parts = [od.number(key) for key in ("608F:01", "6091:01", "6092:02", "6091:02", "6092:01")]
-        if 0 in parts:
-            return "Err80"
-        ratio = parts[0] * parts[1] * parts[2] / (parts[3] * parts[4])
-        return None if 1e-3 <= ratio <= 1e3 else "Err80"
+    def gear_fault(self, od: ObjectDictionary) -> str | None:  # noqa: ARG002 - the seam's
+        """None is printed."""
+        return None
 
     def in_place_s(self, od: ObjectDictionary) -> float:
-        """6068h, or the family's own (2502h of the DS_C, 003:577)."""
-        return od.number("2502:00" if self.name == "ds_c" else "6068:00", 10) * MS
+        """6068h."""
+        return od.number("6068:00", 10) * MS
 
-    def brake(self, od: ObjectDictionary) -> BrakeTimes | None:
-        """Course of the brake, for a motor that has one."""
-        course = power.BRAKES.get(self.name)
-        return None if course is None else course(od)
+    def brake(self, od: ObjectDictionary) -> BrakeTimes | None:  # noqa: ARG002 - the seam's
+        """None is printed."""
+        return None
+
+    def monitors(self, sources: Sources) -> dict[str, Callable[[], float]]:  # noqa: ARG002
+        """None that a profile could tell."""
+        return {}
 
     def readings(self, axis: VirtualAxis) -> dict[str, Callable[[], Number]]:
         """Objects that a profile tells by role but that CiA 402 has no number for."""

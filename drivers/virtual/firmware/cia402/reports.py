@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from drivers.virtual.firmware.families.base import FaultInfo
+from drivers.virtual.firmware.cia402.base import FaultInfo
 from drivers.virtual.firmware.kernel import layout as k
 from profiles.schema import Profile
 

@@ -8,6 +8,20 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, Protocol
 
 from drivers.virtual.firmware.axis import VirtualAxis
+from drivers.virtual.firmware.cia402.keys import (
+    CompensationKeys,
+    FeedForward,
+    FoundNotchKeys,
+    GainKeys,
+    JogKeys,
+    LoadKeys,
+    OwnHomingKeys,
+    QuadrantKeys,
+    RigidityKeys,
+    SwingKeys,
+    SwitchKeys,
+    TorqueHoming,
+)
 from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.settings import LoopSettings, MotorData, ProtectionSettings
@@ -15,7 +29,8 @@ from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw
 
 if TYPE_CHECKING:
-    from drivers.virtual.firmware.families.terminals import TerminalTable
+    from drivers.virtual.firmware.cia402.terminals import TerminalTable
+    from drivers.virtual.firmware.monitors import Sources
 
 RPM = math.pi / 30
 """rad/s per rpm."""
@@ -79,127 +94,7 @@ class Autosave:
     last_index: int
 
 
-@dataclass(frozen=True, slots=True)
-class FeedForward:
-    """Parameters of the feed-forwards: gains in %, filter times in ms, selections (1 is on)."""
-
-    speed_gain: str
-    speed_filter: str
-    torque_gain: str | None = None
-    torque_filter: str | None = None
-    speed_select: str | None = None
-    torque_select: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class GainKeys:
-    """Parameters of one more gain set, in the units of the first."""
-
-    position: str | None = None
-    speed: str | None = None
-    integral: str | None = None
-    torque_filter: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class SwitchKeys:
-    """Parameters that choose between the first and the second gains.
-
-    ``kinds`` translates the condition to the kernel's SWITCH_*; ``on_raw`` are the values of
-    ``mode`` that let it switch, ``always_raw`` those that mean the second gains at all times.
-    """
-
-    mode: str
-    on_raw: tuple[int, ...] = ()
-    always_raw: tuple[int, ...] = ()
-    condition: str | None = None
-    kinds: dict[int, int] = field(default_factory=dict)
-    level: str | None = None
-    hysteresis: str | None = None
-    delay: str | None = None
-    ramp: str | None = None
-    third_delay: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class SwingKeys:
-    """Notch of the position command: frequency and width, and how the drive finds them itself.
-
-    With ``mode`` at ``automatic_raw`` it takes the frequency of a deviation above ``threshold``
-    (command units).
-    """
-
-    frequency: str
-    width: str
-    mode: str
-    threshold: str
-    automatic_raw: int = 1
-
-
-@dataclass(frozen=True, slots=True)
-class QuadrantKeys:
-    """Torque after a change of direction: % of the rated torque, ms, ms, command units."""
-
-    positive: str
-    negative: str
-    delay: str
-    filter: str
-    travel: str
-
-
-@dataclass(frozen=True, slots=True)
-class JogKeys:
-    """The drive's own jog: speed [rpm] and the times [ms] to 1000 rpm and back."""
-
-    speed: str
-    rise: str
-    fall: str
-    trigger: str | None = None
-    """A parameter that jogs: 1 forward, 2 backward, 0 ends it (values assumed)."""
-
-
-@dataclass(frozen=True, slots=True)
-class OwnHomingKeys:
-    """The drive's own homing: its trigger, method, speed [rpm], ramp and time limit [ms]."""
-
-    trigger: str
-    begins: tuple[int, ...]
-    method: str
-    speed: str
-    ramp: str
-    limit_ms: str
-
-
-@dataclass(frozen=True, slots=True)
-class CompensationKeys:
-    """Torques that the drive adds, in % of the rated torque by the parameters' own scales."""
-
-    bias: str | None = None
-    positive: str | None = None
-    negative: str | None = None
-    viscous: str | None = None
-    viscous_per_rpm: float = 1e-4
-    """Rated torque per rpm and per % of ``viscous``."""
-
-
 StatusStyle = Literal["cia402", "echo"]
-
-
-@dataclass(frozen=True, slots=True)
-class TorqueHoming:
-    """Homing against the mechanical limit.
-
-    ``methods`` gives the direction of each method and whether it goes back to the index;
-    ``torque_key`` is in ‰ of the rated torque, ``time_key`` in ms.
-    """
-
-    methods: dict[int, tuple[int, bool]]
-    torque_key: str
-    time_key: str
-
-
-#: MMS7 (004:3840-3842, 2070h).
-_MMS7_TORQUE_HOMING = TorqueHoming({-3: (-1, False), -2: (1, False)}, "2070:01", "2070:02")
 
 
 Action = Literal["fault", "warning", "stop"]
@@ -330,13 +225,18 @@ class Traits:
     """Low-pass of the speed feedback: parameter and "Hz", "ms" or "µs"."""
     feed_forward: FeedForward | None = None
     assigns_terminals: bool = False
-    torque_homing: TorqueHoming = _MMS7_TORQUE_HOMING
+    torque_homing: TorqueHoming | None = None
+    rigidity: RigidityKeys | None = None
+    found_notches: FoundNotchKeys | None = None
+    load_identification: LoadKeys | None = None
     homing_timeout: tuple[str, float] = ("2070:03", 1.0)  # parameter and its unit [s]
     index_search_reverses: bool = False
     index_at_once: bool = False
     home_side_reverses: bool = False
     homing_alarms: tuple[str, str] = ("", "")
     software_limits: tuple[str, dict[int, Literal["off", "on", "homed"]]] | None = None
+    unknown_faults_end: bool = False
+    """A reset ends faults of which nothing is known, as CiA 402-2 has it (transition 15)."""
     reset_after_s: dict[str, float] = field(default_factory=dict)
     """Faults that a reset ends only after so long."""
     emergency_warning: str = ""
@@ -349,6 +249,8 @@ class Family(Protocol):
     traits: Traits
     terminals: TerminalTable | None
     """None for a family whose terminals are the MMS7's, or that has none."""
+    supply_v: float | None
+    """Supply of its power stage, None where it takes what the bench has."""
 
     def factory_values(self, spec: MechanicsSpec, motor: MotorData) -> dict[str, Raw]:
         """What the maker sets for this motor, whatever the manual prints."""
@@ -368,6 +270,9 @@ class Family(Protocol):
         self, od: ObjectDictionary, motor: MotorData, units: Units
     ) -> ProtectionSettings:
         """Thresholds in SI units from the effective parameters."""
+
+    def monitors(self, sources: Sources) -> dict[str, Callable[[], float]]:
+        """Monitor parameters and fault records of the maker's own, in engineering values."""
 
     def wiring(self, od: ObjectDictionary) -> Wiring:
         """How the switches reach the drive."""

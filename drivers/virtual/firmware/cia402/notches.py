@@ -34,8 +34,9 @@ def _notch(profile: Profile, od: ObjectDictionary, encoding: str, slot: NotchSlo
     )  # fmt: skip
     if encoding == "hz_levels":
         # No formula is printed: width level/20 of the centre, depth level in percent of the
-        # amplitude that is left (0 is deepest). 4000 Hz switches the notch off.
-        if centre >= 4000:
+        # amplitude that is left (0 is deepest). The default, the highest frequency, is off.
+        frequency = profile.by_key[slot.frequency_key or ""]
+        if od.number(frequency.key) == frequency.default_raw:
             return None
         width, depth = centre * max(width, 1) / 20, 20 * math.log10(max(depth, 1) / 100)
     elif encoding == "hz_width":

@@ -1,0 +1,1 @@
+"""What families of CiA 402 drives share: their seam, gains, notches, terminals, protections."""
