@@ -21,6 +21,7 @@ from backend.people.accounts import Accounts
 from backend.people.errors import NoSuchPerson
 from backend.people.identity import Identity
 from backend.people.records import Account, Token
+from drivers.texts.message import text
 
 router = APIRouter()
 
@@ -58,7 +59,12 @@ async def make_token(people: ThePeople, record: TheRecord, me: Me, body: NewToke
     record.note(
         "account",
         "token made",
-        f"{me.person} made the token {token.name} ({', '.join(sorted(token.scopes))})",
+        text(
+            "journal.token-made",
+            person=me.person,
+            name=token.name,
+            scopes=", ".join(sorted(token.scopes)),
+        ),
         target=token.name,
         new=", ".join(sorted(token.scopes)),
         person=me.person,
@@ -80,7 +86,7 @@ async def revoke_token(people: ThePeople, record: TheRecord, me: Me, token_id: s
     record.note(
         "account",
         "token revoked",
-        f"{me.person} revoked the token {found.name}",
+        text("journal.token-revoked", person=me.person, name=found.name),
         target=found.name,
         person=me.person,
     )
@@ -119,7 +125,7 @@ async def add_account(
     record.note(
         "account",
         "made",
-        f"{me.person} made the account {made.name} ({made.role})",
+        text("journal.account-made", person=me.person, name=made.name, role=made.role),
         target=made.name,
         new=made.role,
         person=me.person,
@@ -139,7 +145,7 @@ async def change_account(
         record.note(
             "account",
             "role changed",
-            f"{me.person} made {known.name} {known.role}",
+            text("journal.role-changed", person=me.person, name=known.name, role=known.role),
             target=known.name,
             old=before,
             new=known.role,
@@ -150,7 +156,7 @@ async def change_account(
         record.note(
             "account",
             "password set",
-            f"{me.person} set a password for {known.name}",
+            text("journal.password-set", person=me.person, name=known.name),
             target=known.name,
             person=me.person,
         )
@@ -165,7 +171,7 @@ async def remove_account(people: ThePeople, record: TheRecord, me: Me, account_i
     record.note(
         "account",
         "deleted",
-        f"{me.person} deleted the account {name}",
+        text("journal.account-deleted", person=me.person, name=name),
         target=name,
         person=me.person,
     )

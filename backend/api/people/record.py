@@ -7,9 +7,10 @@ from typing import Annotated, Literal
 from fastapi import Depends
 
 from backend.api.context import TheBench
-from backend.audit.facts import Fact
+from backend.audit.facts import Action, Fact
 from backend.station.bench import Bench
 from backend.work.journal import Level
+from drivers.texts.message import Text
 
 
 class PeopleRecord:
@@ -21,19 +22,19 @@ class PeopleRecord:
     def note(
         self,
         kind: Literal["login", "account", "invitation", "lease"],
-        action: str,
-        text: str,
+        action: Action,
+        line: Text,
         *,
         target: str = "",
         person: str | None = None,
         drive: str | None = None,
         level: Level = "info",
-        outcome: str = "",
+        outcome: Text | None = None,
         old: str | None = None,
         new: str | None = None,
     ) -> None:
-        """``text`` is for the log; the audit keeps the rest."""
-        self._bench.journal.add(text, level=level, drive=drive, person=person or "")
+        """``line`` is for the log; the audit keeps the rest."""
+        self._bench.journal.add(line, level=level, drive=drive, person=person or "")
         connected = self._bench.connected_drives.get(drive) if drive else None
         axis = connected.drive.name if connected else ""
         fact = Fact(

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
+
 from fastapi import APIRouter, Request, Response
 
-from backend.api.context import Me, ThePeople
+from backend.api.context import Me, TheBench, ThePeople
+from backend.api.errors import NotFound
 from backend.api.people.models import LogIn, PasswordChange, Session, SessionInfo, SetUp
 from backend.api.people.record import TheRecord
 from backend.api.security.gate import COOKIE, SECURE_COOKIE, credentials
@@ -19,6 +22,8 @@ from backend.api.security.own_session import (
     with_cookie,
 )
 from backend.people.errors import NoSuchPerson, NotLoggedIn
+from backend.people.tls import authority_file
+from drivers.texts.message import text
 
 router = APIRouter()
 
@@ -29,6 +34,23 @@ async def session(request: Request, people: ThePeople) -> Session:
     brought = credentials(request.scope)
     identity = people.identify(brought.cookie, brought.bearer)
     return session_of(people, identity, brought.cookie)
+
+
+@router.get(
+    "/certificate",
+    response_class=Response,
+    responses={200: {"content": {"application/x-x509-ca-cert": {}}}},
+)
+async def certificate(request: Request, bench: TheBench) -> Response:
+    """The certificate of the station's authority, for a phone or computer that is to trust it."""
+    file = authority_file(bench.state_folder)
+    if request.url.scheme != "https" or not await asyncio.to_thread(file.is_file):
+        raise NotFound("api-people.no-authority")
+    return Response(
+        await asyncio.to_thread(file.read_bytes),
+        media_type="application/x-x509-ca-cert",
+        headers={"Content-Disposition": 'attachment; filename="servodeck.crt"'},
+    )
 
 
 @router.post("/session")
@@ -45,10 +67,10 @@ async def log_in(
         record.note(
             "login",
             "refused",
-            f"log-in failed for {body.name!r} from {address_of(request)}",
+            text("journal.log-in-failed", name=repr(body.name), address=address_of(request)),
             target=body.name,
             person="",
-            outcome="wrong name or password",
+            outcome=text("people.wrong-name-or-password"),
             level="warning",
         )
         raise
@@ -57,7 +79,7 @@ async def log_in(
     record.note(
         "login",
         "logged in",
-        f"{made.person} logged in from {address_of(request)}",
+        text("journal.logged-in", person=made.person or "", address=address_of(request)),
         target=address_of(request),
         person=made.person or "",
     )
@@ -69,10 +91,12 @@ async def log_out(people: ThePeople, record: TheRecord, me: Me) -> Response:
     """Log out."""
     if me.kind == "session":
         await people.accounts.log_out(me.session)
-        record.note("login", "logged out", f"{me.person} logged out", person=me.person)
+        line = text("journal.logged-out", person=me.person)
+        record.note("login", "logged out", line, person=me.person)
     elif me.is_guest and (found := people.support.of_session(me.session)) is not None:
         people.support.revoke(found.id, "the guest left")
-        record.note("invitation", "left", f"{me.person} left", person=me.person)
+        line = text("journal.guest-left", person=me.person)
+        record.note("invitation", "left", line, person=me.person)
     response = Response(status_code=204)
     response.delete_cookie(COOKIE, path="/", httponly=True, samesite="strict")
     response.delete_cookie(SECURE_COOKIE, path="/", secure=True, httponly=True, samesite="strict")
@@ -93,7 +117,7 @@ async def set_up(
     record.note(
         "account",
         "made",
-        f"{made.person} is the first administrator",
+        text("journal.first-administrator", person=made.person or ""),
         target=made.person or "",
         person=made.person,
         level="warning",
@@ -112,7 +136,7 @@ async def change_password(
     record.note(
         "account",
         "password changed",
-        f"{me.person} changed their password",
+        text("journal.password-changed", person=me.person),
         target=me.person,
         person=me.person,
     )
@@ -156,7 +180,7 @@ async def end_session(people: ThePeople, record: TheRecord, me: Me, session_id: 
     record.note(
         "login",
         "session ended",
-        f"{me.person} ended a session of {whose}",
+        text("journal.session-ended", person=me.person, whose=whose),
         target=whose,
         person=me.person,
     )

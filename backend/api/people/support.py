@@ -23,6 +23,7 @@ from backend.api.people.record import TheRecord
 from backend.api.security.gate import require_right
 from backend.api.security.own_session import address_of, with_cookie
 from backend.people.errors import Forbidden, NotLoggedIn
+from drivers.texts.message import text
 
 router = APIRouter()
 
@@ -67,17 +68,17 @@ async def join(
         record.note(
             "invitation",
             "refused",
-            f"a guest was refused from {address_of(request)}: {error.message}",
+            text("journal.guest-refused", address=address_of(request), cause=error.text),
             target=address_of(request),
             person="",
-            outcome=error.message,
+            outcome=error.text,
             level="warning",
         )
         raise
     record.note(
         "invitation",
         "joined",
-        f"{invitation.guest} joined as a guest from {address_of(request)}",
+        text("journal.guest-joined", guest=invitation.guest, address=address_of(request)),
         target=address_of(request),
         person=f"{invitation.guest} (guest)",
         level="warning",
@@ -106,7 +107,13 @@ async def invite(
     record.note(
         "invitation",
         "made",
-        f"{me.person} invited {made.guest} for {body.minutes:g} min ({allowed})",
+        text(
+            "journal.guest-invited",
+            person=me.person,
+            guest=made.guest,
+            minutes=f"{body.minutes:g}",
+            allowed=allowed,
+        ),
         target=made.guest,
         new=f"{allowed}, {body.minutes:g} min",
         level="warning",
@@ -125,7 +132,7 @@ async def revoke_invitation(
     record.note(
         "invitation",
         "ended",
-        f"{me.person} ended the invitation of {ended.guest}",
+        text("journal.invitation-ended", person=me.person, guest=ended.guest),
         target=ended.guest,
         level="warning",
         person=me.person,
@@ -154,7 +161,7 @@ async def grant(
     record.note(
         "invitation",
         "granted",
-        f"{me.person} granted {granted.guest} {rights}",
+        text("journal.granted", person=me.person, guest=granted.guest, rights=rights),
         target=granted.guest,
         new=rights,
         level="warning",
@@ -173,7 +180,7 @@ async def withdraw_grant(
     record.note(
         "invitation",
         "grant withdrawn",
-        f"{me.person} withdrew the grant of {ended.guest}",
+        text("journal.grant-withdrawn", person=me.person, guest=ended.guest),
         target=ended.guest,
         level="warning",
         person=me.person,

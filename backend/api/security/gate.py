@@ -29,6 +29,7 @@ from backend.people.lease import Leases
 from backend.people.rights import Right
 from backend.people.station import People
 from drivers.errors import DriveError, NotAllowed
+from drivers.texts.message import text
 
 log = logging.getLogger(__name__)
 
@@ -276,7 +277,9 @@ class Gate:
             return
         given = header(scope["headers"], CSRF_HEADER.encode())
         if brought.cookie is None or not same_text(given or "", csrf_of(brought.cookie)):
-            raise Forbidden("api-security.request-not-come-page", limit=f"the header {CSRF_HEADER}")
+            raise Forbidden(
+                "api-security.request-not-come-page", limit=text("limit.header", header=CSRF_HEADER)
+            )
 
     def _own_connection(self, scope: Scope, identity: Identity | None) -> str | None:
         """The live connection that a request names, if it is one of the same session."""

@@ -28,7 +28,8 @@ from backend.station.second_port import missing_ports
 from backend.work.jobs import JobResult, Progress
 from drivers.errors import NotAllowed
 from drivers.link import Found
-from drivers.texts.message import text
+from drivers.texts import limits
+from drivers.texts.message import reason_of, text
 from profiles import drive_names, load_profile
 from profiles.importer import ImportFailed, export_eds
 from profiles.importer.esi import MAX_BYTES
@@ -61,7 +62,7 @@ async def _upload(request: Request, file: str) -> bytes:
         if len(data) > MAX_BYTES:
             raise BadDescription(
                 "api-station.larger-mib",
-                limit=f"{MAX_BYTES} bytes",
+                limit=limits.size(MAX_BYTES),
                 file=file,
                 max_mib=MAX_BYTES >> 20,
             )
@@ -100,7 +101,10 @@ async def import_description(
     async def work(progress: Progress) -> JobResult:
         progress(0.0, text("api-station.reading", file=file))
         made = ImportedDescription.model_validate(await import_in_process(task))
-        bench.journal.add(f"imported {file} as {made.profile}: {made.summary}")
+        line = text(
+            "journal.description-imported", file=file, profile=made.profile, summary=made.summary
+        )
+        bench.journal.add(line)
         return made.model_dump(mode="json")
 
     return convert.job(bench.jobs.start("import", text("api-station.import", file=file), work))
@@ -123,11 +127,14 @@ async def read_dictionary(bench: TheBench, request: ReadDictionaryRequest) -> Jo
             task = await drive_task(link, found, request.profile, progress)
         except ImportFailed as error:
             raise BadDescription(
-                f"{place}: {error}", remedy="import the maker's file, or use the generic profile"
+                "api-station.description-of-drive", place=place, cause=str(error)
             ) from error
         progress(0.95, text("api-station.making-profile"))
         made = ImportedDescription.model_validate(await import_in_process(task))
-        bench.journal.add(f"read {place} as {made.profile}: {made.summary}")
+        line = text(
+            "journal.dictionary-read", place=place, profile=made.profile, summary=made.summary
+        )
+        bench.journal.add(line)
         return made.model_dump(mode="json")
 
     return convert.job(
@@ -155,7 +162,9 @@ async def export_profile(
     try:
         known = load_profile(profile)
     except ProfileError as error:
-        raise NotFound(str(error), value=profile, remedy="see the list of profiles") from error
+        raise NotFound(
+            reason_of(error), value=profile, remedy="api-station.see-profiles"
+        ) from error
     text = export_eds(known, datetime.now())
     return Response(
         text.encode("utf-8"),
@@ -174,7 +183,9 @@ async def profile_texts(
         known = load_profile(profile)
         overlay = load_overlay(profile, language)
     except ProfileError as error:
-        raise NotFound(str(error), value=profile, remedy="see the list of profiles") from error
+        raise NotFound(
+            reason_of(error), value=profile, remedy="api-station.see-profiles"
+        ) from error
     return ProfileTexts(profile=profile, language=language, texts=translations(known, overlay))
 
 

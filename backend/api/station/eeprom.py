@@ -21,16 +21,12 @@ from drivers.ethercat.eeprom.expected import against_profile
 from drivers.ethercat.eeprom.image import MOST_BYTES, Difference, Image, differences
 from drivers.ethercat.eeprom.plan import Plan
 from drivers.ethercat.link import EthercatLink
-from drivers.texts.message import Text, language
+from drivers.texts.message import Text, language, text
 from profiles.loader import load_profile
 
 router = APIRouter()
 
-_WARNING = (
-    "The EEPROM says to the controller what the drive is and where its memory lies: with wrong"
-    " contents the drive does not start. Save the present contents first, and do not switch"
-    " anything off until the change is done. It counts after the drive was switched off and on"
-)
+_WARNING = "api-station.eeprom-warning"
 _BODY = {
     "requestBody": {
         "required": False,
@@ -136,8 +132,7 @@ async def restore_eeprom(
     calm_segment(bench, link, connection)
     await asyncio.shield(link.eeprom.carry_out(station, plan, digest, _unheard))
     bench.journal.add(
-        f"{url}: EEPROM of station {station} written ({plan.words} words);"
-        " valid after a power cycle",
+        text("journal.eeprom-written", url=url, station=station, words=plan.words),
         level="warning",
     )
     return _plan(plan)

@@ -34,20 +34,15 @@ from drivers.ethercat.link import EthercatLink, segment_of
 from drivers.ethercat.process import firmware
 from drivers.ethercat.process.survey import ExchangeFigures, Survey, SurveyedStation
 from drivers.ethercat.wire.al_status import AlState
+from drivers.texts import limits
 from drivers.texts.message import Text, language, text
 
 router = APIRouter()
 
 _SCHEME = "ethercat://"
 _MAX_FIRMWARE_BYTES = 32 << 20
-_FIRMWARE_WARNING = (
-    "An interrupted download can leave the drive without firmware. Have the right file for"
-    " exactly this drive, save its parameters to a file first, and do not switch anything off"
-)
-_ALIAS_WARNING = (
-    "The alias is written to the drive's EEPROM and is valid after its supply was switched off"
-    " and on. Machines whose controller addresses drives by alias must be reported"
-)
+_FIRMWARE_WARNING = "api-station.firmware-warning"
+_ALIAS_WARNING = "api-station.alias-warning"
 _FIRMWARE_BODY = {
     "requestBody": {
         "required": True,
@@ -115,7 +110,7 @@ async def clear_counters(
         raise NotAllowed("api-station.station-not-answer", value=request.station, url=request.url)
     for station in chosen:
         await link.clear_port_counters(station)
-    bench.journal.add(f"{request.url}: error counters of {len(chosen)} stations cleared")
+    bench.journal.add(text("journal.counters-cleared", url=request.url, count=len(chosen)))
     return Response(status_code=204)
 
 
@@ -132,8 +127,12 @@ async def write_alias(
             await confirm_identity(connected.drive)
     await link.set_alias(request.station, request.alias)
     bench.journal.add(
-        f"{request.url}: alias {request.alias} written to station {request.station};"
-        " valid after a power cycle"
+        text(
+            "journal.alias-written",
+            url=request.url,
+            alias=str(request.alias),
+            station=request.station,
+        )
     )
     return Response(status_code=204)
 
@@ -168,14 +167,15 @@ async def load_firmware(
             return link.load_firmware(station, file, data, tell, password=password, where=state)
 
         where = await _to_the_end(load, progress)
-        bench.journal.add(f"{connected.drive.name}: {file} loaded", drive=connected.drive.id)
+        line = text("journal.firmware-loaded", drive=connected.drive.name, file=file)
+        bench.journal.add(line, drive=connected.drive.id)
         return {"bytes": len(data), "file": file, "state": where}
 
     title = text("api-station.load-firmware", file=file, drive=connected.drive.name)
     job = bench.jobs.start(
         "firmware", title, work, drive=connected.drive.id, motion=True, stoppable=False
     )
-    bench.journal.add(title.words(), level="warning", drive=connected.drive.id)
+    bench.journal.add(title, level="warning", drive=connected.drive.id)
     return convert.job(job)
 
 
@@ -230,7 +230,7 @@ async def _body(request: Request, file: str) -> bytes:
         if len(data) > _MAX_FIRMWARE_BYTES:
             raise OutOfRange(
                 "api-station.larger-mib-right-file",
-                limit=f"{_MAX_FIRMWARE_BYTES} bytes",
+                limit=limits.size(_MAX_FIRMWARE_BYTES),
                 file=file,
                 max_firmware_mib=_MAX_FIRMWARE_BYTES >> 20,
             )
@@ -277,7 +277,7 @@ def require_confirmed(confirmed: bool, warning: str) -> None:
         NotAllowed: not yet.
     """
     if not confirmed:
-        raise NotAllowed(warning, remedy="send it again with confirmed=true if all that is so")
+        raise NotAllowed(warning, remedy="api-station.send-confirmed")
 
 
 def _firmware_port(connected: ConnectedDrive) -> tuple[EthercatLink, int]:

@@ -7,8 +7,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from backend.api.models import Message, MessageInfo
+from backend.api.models import Message
 from backend.api.station.printed import PrintedLines, PrintedName
+from backend.tools.wire_message import MessageInfo
 
 
 class Health(Message):
@@ -211,6 +212,7 @@ class DriveSummary(Message):
     serial: int | None
     firmware: str
     identity_warning: str = Field(description="non-empty when another drive answers here")
+    identity_warning_message: MessageInfo | None = Field(description="the same as code and facts")
     unsaved: int = Field(description="parameters in the drive but not in its memory")
     pending: int = Field(description="parameters waiting for write-settings, enable or power-off")
     pending_restores: list[PendingRestoreValue] = Field(

@@ -27,6 +27,7 @@ from backend.preflight.run import judged, preflight
 from backend.preflight.texts import Language, fix_name, purpose_name, verdict_words, words
 from backend.preflight.verdicts import Verdict
 from backend.station.bench import Bench
+from backend.station.box.roles import require_not_office
 from backend.work.jobs import JobResult, Progress
 from drivers.computer.lateness import EDGES_US, Measured
 from drivers.errors import Busy
@@ -49,6 +50,9 @@ async def look(
 @router.post("/preflight", status_code=202)
 async def start_preflight(bench: TheBench, request: PreflightRequest) -> JobInfo:
     """Measure wake-ups, and with an interface frames, at 1 and 4 kHz; the result is kept."""
+    if request.interface:
+        # It sends EtherCAT frames there.
+        require_not_office(bench.state_folder, f"ethercat://{request.interface}")
     if any(job.kind == "preflight" and job.state == "running" for job in bench.jobs.all()):
         raise Busy("api-station.preflight-runs-already-two")
 

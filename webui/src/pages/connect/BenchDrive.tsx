@@ -4,7 +4,7 @@ import { api, ask } from '../../api/client'
 import type { DriveSummary } from '../../api/schema'
 import { href } from '../../app/router'
 import { linkLook } from '../../app/states'
-import { useT } from '../../i18n'
+import { useSay, useT } from '../../i18n'
 import { ConfirmDelete } from '../../widgets/ConfirmDelete'
 import { Icon } from '../../widgets/Icon'
 import { ProblemNote } from '../../widgets/ProblemNote'
@@ -15,6 +15,7 @@ import { QualityTable } from './QualityTable'
 /** A drive of the bench: identity, connection, name and notes. */
 export function BenchDrive({ drive }: { drive: DriveSummary }) {
   const t = useT()
+  const say = useSay()
   const [editing, setEditing] = useState(false)
   const [removing, setRemoving] = useState(false)
   const accept = useAction()
@@ -45,7 +46,8 @@ export function BenchDrive({ drive }: { drive: DriveSummary }) {
       {drive.identity_warning && (
         <div className="note fault" role="alert">
           <p>
-            <strong>{t('connect.swapped')}</strong> {drive.identity_warning}
+            <strong>{t('connect.swapped')}</strong>{' '}
+            {say.message(drive.identity_warning_message, drive.identity_warning)}
           </p>
           <Button loading={accept.busy} onClick={() => void acceptIdentity()}>
             {t('connect.accept')}

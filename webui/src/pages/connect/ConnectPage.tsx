@@ -13,6 +13,7 @@ import { ConnectHelp } from './ConnectHelp'
 import { NotListedPanel } from './NotListed'
 import { Preflight } from './Preflight'
 import { Scan } from './Scan'
+import { StationBox } from './StationBox'
 import { InterfacePermissions } from './segment/Permissions'
 import { VirtualBench } from './VirtualBench'
 
@@ -69,6 +70,7 @@ export function ConnectPage() {
   return (
     <div className="page">
       <h1>{t('page.connect')}</h1>
+      <StationBox />
       <div className="columns">
         <Panel
           title={t('connect.interfaces')}

@@ -1,0 +1,1 @@
+"""Name and network ports of a station in the cabinet."""

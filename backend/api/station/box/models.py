@@ -1,0 +1,39 @@
+"""Messages about the name and the network ports of the station."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from backend.api.models import Message
+
+PortName = Annotated[str, Field(max_length=15)]
+
+
+class BoxPort(Message):
+    """A network port of this computer."""
+
+    name: str
+    up: bool
+    wired: bool
+    addresses: list[str] = Field(description="IPv4 addresses that it has now")
+    here: bool = Field(description="this request came by it")
+
+
+class BoxInfo(Message):
+    """What was set up, and what could be chosen."""
+
+    configured: bool
+    name: str
+    ethercat: str = Field(description="port of the drives; empty: any but the office's")
+    office: str = Field(description="port of people; no EtherCAT is allowed there")
+    ports: list[BoxPort]
+
+
+class BoxChange(Message):
+    """The name is in force from the next start of the server on, the ports at once."""
+
+    name: Annotated[str, Field(min_length=1, max_length=63)]
+    ethercat: PortName = ""
+    office: PortName = ""

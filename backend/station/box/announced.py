@@ -1,0 +1,47 @@
+"""The name of the station in the office's network: NAME.local, by mDNS (RFC 6762)."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+from collections.abc import AsyncIterator, Callable, Sequence
+
+from backend.station.box.kept import Box
+
+_SERVICE = "_https._tcp.local."
+
+
+@contextlib.asynccontextmanager
+async def announced(
+    box: Box, addresses: Sequence[str], port: int, failed: Callable[[str], None]
+) -> AsyncIterator[None]:
+    """Answer for the name on the ports with these IPv4 addresses, and on no others.
+
+    Whoever serves goes on where that is not possible; ``failed`` is called with the reason, as
+    when another computer has the name.
+    """
+    from zeroconf import Error, IPVersion
+    from zeroconf.asyncio import AsyncServiceInfo, AsyncZeroconf
+
+    try:
+        responder = AsyncZeroconf(interfaces=list(addresses), ip_version=IPVersion.V4Only)
+    except (OSError, Error) as error:
+        failed(str(error))
+        yield
+        return
+    service = AsyncServiceInfo(
+        _SERVICE,
+        f"servodeck {box.name}.{_SERVICE}",
+        port=port,
+        addresses=[socket.inet_aton(address) for address in addresses],
+        server=f"{box.name}.local.",
+    )
+    try:
+        try:
+            # Asks first whether somebody has the name (clause 8.1), then tells it twice.
+            await (await responder.async_register_service(service))
+        except (OSError, Error) as error:
+            failed(str(error) or type(error).__name__)
+        yield
+    finally:
+        await responder.async_close()
