@@ -10,11 +10,12 @@ import importlib
 import io
 import os
 import sys
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from backend import __version__
 from drivers.texts.message import Language, language_of, speak
 
 COMMANDS = {
@@ -26,6 +27,10 @@ COMMANDS = {
     "doctor": (
         "doctor:doctor",
         "Why a drive does not reach Operational. Nothing moves.",
+    ),
+    "conformance": (
+        "conformance:conformance",
+        "Which rules of the public standards a slave keeps. Never enables; nothing moves.",
     ),
     "eeprom": (
         "eeprom:app",
@@ -72,6 +77,11 @@ COMMANDS = {
     "inertia": (
         "tools:inertia",
         "Measure inertia and friction and write them as JSON. The axis moves.",
+    ),
+    "step": (
+        "tools:step",
+        "Command a step of speed or a move and read overshoot, settling and torque. "
+        "The axis moves.",
     ),
     "friction": (
         "tools:friction",
@@ -180,12 +190,30 @@ def _speak_any_letter() -> None:
             stream.reconfigure(encoding=None if stream.isatty() else "utf-8", errors="replace")
 
 
-def _take_language(arguments: list[str]) -> Language:
-    """The language of errors and progress: ``--language`` before the command, else the locale's."""
-    if len(arguments) > 2 and arguments[1] == "--language" and arguments[2] in ("en", "zh"):
-        chosen = arguments[2]
-        del arguments[1:3]
-        return language_of(chosen)
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"servodeck {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _whole(
+    *,
+    language: Annotated[
+        Language | None,
+        typer.Option(help="of errors, progress and reports; by default that of the system"),
+    ] = None,
+    version: Annotated[  # noqa: ARG001 - the option acts by its callback
+        bool,
+        typer.Option("--version", help="print the version and end", callback=_print_version,
+                     is_eager=True),
+    ] = False,
+) -> None:  # fmt: skip
+    if language is not None:
+        speak(language)
+
+
+def _language_of_locale() -> Language:
     names = (os.environ.get(name) for name in ("LC_ALL", "LC_MESSAGES", "LANG"))
     return language_of(next((name for name in names if name), None))
 
@@ -193,7 +221,7 @@ def _take_language(arguments: list[str]) -> Language:
 def main() -> None:
     """Entry point. A defect of the program itself ends it with exit code 70, in one sentence."""
     _speak_any_letter()
-    speak(_take_language(sys.argv))
+    speak(_language_of_locale())
     try:
         app()
     except Exception as error:

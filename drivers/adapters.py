@@ -27,6 +27,7 @@ from serial.tools import list_ports
 
 from drivers.computer.terminals import has_descriptor, own_terminals
 from drivers.errors import LinkLost, OutOfRange
+from drivers.texts.message import text
 
 _COM = re.compile(r"(?:\\\\\.\\)?COM[1-9]\d{0,2}", re.IGNORECASE)
 #: Absolute, without control signs, and without the signs that the libraries give a meaning to.
@@ -39,7 +40,7 @@ _DEVICE = re.compile(
 #: As the kernel names interfaces, without the signs that only a trap would use.
 _INTERFACE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.@:\-]{0,14}")
 
-SERIAL_LIMIT = "the path of a serial device, as /dev/ttyUSB0, or COM1 to COM999"
+SERIAL_LIMIT = text("limit.serial-device")
 
 
 def require_serial_form(place: str) -> None:
@@ -106,7 +107,7 @@ def require_interface(name: str) -> None:
         raise OutOfRange(
             "link.no-network-interface",
             value=name,
-            limit="1 to 15 letters, digits and . _ - @ :, as eth0",
+            limit=text("limit.interface-name"),
         )
 
 
@@ -120,7 +121,7 @@ def _require_multicast(channel: str) -> None:
         raise OutOfRange(
             "link.no-multicast-address",
             value=channel,
-            limit="224.0.0.0 to 239.255.255.255, ff00::/8",
+            limit="224.0.0.0…239.255.255.255, ff00::/8",
         )
 
 

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from drivers.link import Link, LinkTraits
+from drivers.texts.message import Text, text
 from profiles.schema import LinkKind
 
 
@@ -61,6 +62,6 @@ class BusKind:
     serial: SerialLine | None = None
 
     @property
-    def like(self) -> str:
+    def like(self) -> Text:
         """How URLs of this kind are written."""
-        return f"write it like {self.example}"
+        return text("link.write-it-like", example=self.example)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 
 from drivers.errors import OutOfRange, ProtocolError
+from drivers.texts.message import text
 from profiles.schema import INTEGER_RANGE, DataType, Raw
 
 _FORMAT: dict[str, str] = {
@@ -60,7 +61,9 @@ def _octets(raw: Raw) -> bytes:
         return bytes.fromhex(raw) if isinstance(raw, str) else bytes([int(raw)])
     except (ValueError, OverflowError) as error:
         raise OutOfRange(
-            "link.no-row-bytes-hexadecimal", value=raw, limit="such as 0a ff 00"
+            "link.no-row-bytes-hexadecimal",
+            value=raw,
+            limit=text("limit.bytes-as", example="0a ff 00"),
         ) from error
 
 

@@ -23,7 +23,7 @@ from __future__ import annotations
 from enum import Enum
 
 from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted
-from drivers.texts.message import Param, Text, as_text, text
+from drivers.texts.message import Param, Text, as_text, cause_of, joined, prose, text
 
 
 class DriveError(Exception):
@@ -46,7 +46,7 @@ class DriveError(Exception):
         drive: str | None = None,
         parameter: str | None = None,
         value: object = None,
-        limit: str | None = None,
+        limit: str | Text | None = None,
         remedy: str | Text | None = None,
         **params: Param,
     ) -> None:
@@ -57,7 +57,8 @@ class DriveError(Exception):
         self.drive = drive
         self.parameter = parameter
         self.value = value
-        self.limit = limit
+        #: What the value may be: a message, or figures, names and forms, which have no words.
+        self.limit_text = prose(limit) if isinstance(limit, str) else limit
         #: What to do about it, where that is not what the catalogue says to the code.
         self.own_remedy = as_text(remedy, self.text.params) if remedy else None
 
@@ -65,6 +66,11 @@ class DriveError(Exception):
     def code(self) -> str:
         """What happened, as a code of the catalogue; empty for words that others made."""
         return self.text.code
+
+    @property
+    def limit(self) -> str | None:
+        """What the value may be, in English."""
+        return None if self.limit_text is None else self.limit_text.words()
 
     @property
     def message(self) -> str:
@@ -87,7 +93,7 @@ class DriveError(Exception):
         """What to do next: the nearest remedy that is known."""
         if (known := self.remedy_text) is not None:
             return known
-        usual = self.usual_remedy or ("error.within-limit" if self.limit else None)
+        usual = self.usual_remedy or ("error.within-limit" if self.limit_text else None)
         return None if usual is None else as_text(usual, self.text.params)
 
     @property
@@ -109,6 +115,17 @@ class DriveError(Exception):
 def internal_error(error: Exception) -> Text:
     """What says that an error is ours, with what Python calls it."""
     return text("error.internal", kind=type(error).__name__, detail=str(error))
+
+
+def why_of(error: Exception) -> Text:
+    """What an error says, as a message: of ours its code, of others the words they made."""
+    return error.text if isinstance(error, DriveError) else cause_of(error)
+
+
+def with_remedy(error: DriveError) -> Text:
+    """What happened, and what helps against it."""
+    remedy = error.remedy_text
+    return error.text if remedy is None else joined((error.text, remedy))
 
 
 def _fact(value: object) -> Param:
@@ -157,7 +174,7 @@ class Rejected(DriveError):
         drive: str | None = None,
         parameter: str | None = None,
         value: object = None,
-        limit: str | None = None,
+        limit: str | Text | None = None,
         remedy: str | Text | None = None,
         **params: Param,
     ) -> None:

@@ -20,7 +20,7 @@ from drivers.dictionary import Described
 from drivers.errors import DriveError, NotAllowed
 from drivers.feedback import FeedbackScale
 from drivers.halt import LoopState
-from drivers.texts.message import Text
+from drivers.texts.message import Text, text
 from profiles.schema import DataType, LinkKind, Profile
 
 
@@ -89,6 +89,9 @@ Progress = Callable[[float, Text], None]
 Unsubscribe = Callable[[], None]
 
 
+_CHECK_WHEN_SILENT = text("link.check-when-silent")
+
+
 @dataclass(frozen=True, slots=True)
 class LinkTraits:
     """What a kind of bus is like: callers ask for a trait, never for a kind."""
@@ -105,7 +108,9 @@ class LinkTraits:
     """Setpoints and samples share one instant of every cycle without clocks in the drives."""
     description: Literal["none", "dictionary", "stored_eds"] = "none"
     """How a drive tells of its own objects: not, by `Link.enumerate`, or by an EDS in 1021h."""
-    silent: str = "power, cable and address"
+    fills_network: bool = False
+    """Its frames fill the network of the port that they are sent on."""
+    silent: Text = _CHECK_WHEN_SILENT
     """What to look at where nothing answers."""
 
 

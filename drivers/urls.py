@@ -20,6 +20,7 @@ from urllib.parse import parse_qsl
 from drivers.bus import BusKind, BusUrl
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.link import Link
+from drivers.texts.message import text
 from profiles.schema import LinkKind
 
 SCHEMES: tuple[LinkKind, ...] = get_args(LinkKind)
@@ -31,28 +32,31 @@ def bus_kind(kind: LinkKind) -> BusKind:
     return found
 
 
-def parse_url(text: str) -> BusUrl:
+def parse_url(url: str) -> BusUrl:
     """Take a bus URL apart.
 
     Raises:
         OutOfRange: no such scheme, no adapter named, one that is not of the forms in
             `drivers.adapters`, or an option given twice.
     """
-    match = re.fullmatch(r"([a-z]+)://([^?]*)(?:\?(.*))?", text.strip())
+    match = re.fullmatch(r"([a-z]+)://([^?]*)(?:\?(.*))?", url.strip())
     scheme = next((known for known in SCHEMES if match and known == match[1]), None)
-    if match is None or scheme is None or not text.strip().isprintable():
+    if match is None or scheme is None or not url.strip().isprintable():
         raise OutOfRange(
             "link.no-bus-url-must",
-            value=text,
+            value=url,
             schemes=", ".join(f"{known}://" for known in SCHEMES),
-            remedy="write it like " + " or ".join(bus_kind(known).example for known in SCHEMES),
+            remedy=text(
+                "link.write-it-like",
+                example=", ".join(bus_kind(known).example for known in SCHEMES),
+            ),
         )
     place = match[2]
     if not place.strip("/"):
-        raise OutOfRange("link.names-no-adapter", value=text, remedy=bus_kind(scheme).like)
+        raise OutOfRange("link.names-no-adapter", value=url, remedy=bus_kind(scheme).like)
     options = parse_qsl(match[3] or "", keep_blank_values=True)
     if len(dict(options)) != len(options):
-        raise OutOfRange("link.gives-option-twice", value=text, remedy=bus_kind(scheme).like)
+        raise OutOfRange("link.gives-option-twice", value=url, remedy=bus_kind(scheme).like)
     bus = BusUrl(scheme, place, tuple(options))
     if not bus.is_virtual:
         bus_kind(scheme).require_place(place)

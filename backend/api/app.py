@@ -16,7 +16,7 @@ import backend
 from backend.api import errors
 from backend.api.audit import routes as routes_audit
 from backend.api.audit.audited import AuditedAnswers
-from backend.api.described import DescribedApp
+from backend.api.described import DescribedApp, refusals
 from backend.api.drive import functions as routes_functions
 from backend.api.drive import motion_class as routes_motion_class
 from backend.api.drive import restore as routes_pending
@@ -28,7 +28,6 @@ from backend.api.handover import routes as routes_handover
 from backend.api.health import routes as routes_health
 from backend.api.library import routes as routes_library
 from backend.api.live.live import LiveHub
-from backend.api.models import Problem
 from backend.api.people import accounts as routes_accounts
 from backend.api.people import session as routes_session
 from backend.api.people import support as routes_support
@@ -49,6 +48,7 @@ from backend.api.station import ethercat as routes_ethercat
 from backend.api.station import flight as routes_flight
 from backend.api.station import preflight as routes_preflight
 from backend.api.station import routes as routes_bench
+from backend.api.station.box import routes as routes_box
 from backend.api.tuning import measure as routes_tune
 from backend.functions.forcing import ForcingSessions
 from backend.people.station import People
@@ -88,6 +88,7 @@ _PARTS = (
     routes_doctor,
     routes_flight,
     routes_preflight,
+    routes_box,
     routes_lists,
     routes_sets,
     routes_handover,
@@ -161,7 +162,7 @@ def make_app(
         redoc_url=None,
         lifespan=lifespan,
         generate_unique_id_function=_operation_id,
-        responses={status: {"model": Problem, "description": text} for status, text in _PROBLEMS},
+        responses=refusals(_PROBLEMS),
     )
     app.state.bench = bench
     app.state.recordings = recordings

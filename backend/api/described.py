@@ -2,11 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from fastapi import FastAPI
 
+from backend.api.models import Problem
+
 _PLAIN, _PROBLEM = "application/json", "application/problem+json"
+
+
+_SCHEMAS = "#/components/schemas/{model}"
+
+
+def refusals(statuses: Iterable[tuple[int, str]]) -> dict[int | str, dict[str, Any]]:
+    """Answers that every route may refuse with, by status and its description.
+
+    As a reference: with the model itself FastAPI would make a validator of it for every route and
+    status at every start, thousands of them, that nothing uses.
+    """
+    schema = {"$ref": _SCHEMAS.format(model=Problem.__name__)}
+    return {
+        status: {"description": text, "content": {_PROBLEM: {"schema": schema}}}
+        for status, text in statuses
+    }
 
 
 class DescribedApp(FastAPI):
@@ -19,7 +38,20 @@ class DescribedApp(FastAPI):
             for operations in document["paths"].values():
                 for operation in operations.values():
                     _correct(operation["responses"])
+            _describe_problem(document["components"]["schemas"])
         return super().openapi()
+
+
+def _describe_problem(schemas: dict[str, Any]) -> None:
+    made = Problem.model_json_schema(ref_template=_SCHEMAS)
+    parts = made.pop("$defs", {})
+    for field in made["properties"].values():
+        # As FastAPI describes an optional field of every other answer.
+        if field.get("default", "") is None:
+            del field["default"]
+    merged = {**parts, **schemas, Problem.__name__: made}
+    schemas.clear()
+    schemas.update(sorted(merged.items()))
 
 
 def _correct(responses: dict[str, Any]) -> None:

@@ -11,8 +11,9 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
-from backend.api.models import MessageInfo, Problem
+from backend.api.models import Problem
 from backend.people.errors import Forbidden, NoSuchPerson, NotLoggedIn, TooOften
+from backend.tools.wire_message import MessageInfo
 from drivers.errors import (
     Busy,
     DriveError,
@@ -105,7 +106,8 @@ def problem_of(error: Exception) -> Problem:
         drive=error.drive,
         parameter=error.parameter,
         value=value,
-        limit=error.limit,
+        limit=None if error.limit_text is None else error.limit_text.words(spoken),
+        limit_message=message_or_none(error.limit_text),
         remedy=None if advice is None else advice.words(spoken),
         code=error.code or None,
         params=message_of(error.text).params,

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from backend.tools.results import ToolOutcome
+from backend.tools.wire_message import MessageInfo
 
 Raw = int | float | str
 
@@ -25,17 +26,6 @@ Finite = Annotated[float, Field(ge=-_MOST, le=_MOST, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=1e-9, le=_MOST, allow_inf_nan=False)]
 
 
-class MessageInfo(BaseModel):
-    """A message without words: a code of the catalogue and its facts.
-
-    Empty codes carry words that others made in ``params.words``; the code ``+`` strings the other
-    params together with ``params.joint``.
-    """
-
-    code: str
-    params: dict[str, str | int | float | MessageInfo | None] = Field(default_factory=dict)
-
-
 class Problem(BaseModel):
     """RFC 9457 problem details, with what a person needs to act."""
 
@@ -47,6 +37,7 @@ class Problem(BaseModel):
     parameter: str | None = None
     value: Raw | None = None
     limit: str | None = None
+    limit_message: MessageInfo | None = Field(default=None, description="limit as code and facts")
     remedy: str | None = None
     code: str | None = Field(
         default=None, description="what happened, as a stable code", examples=["canopen.not-open"]
@@ -56,6 +47,12 @@ class Problem(BaseModel):
     )
     advice: MessageInfo | None = Field(default=None, description="the remedy as code and facts")
     abort_code: int | None = Field(default=None, description="SDO abort or Modbus exception code")
+
+
+class PlainResult(BaseModel):
+    """What a job that is no tool concludes: a scan, reading all parameters, loading a set."""
+
+    model_config = ConfigDict(extra="allow")
 
 
 class JobInfo(Message):
@@ -73,8 +70,8 @@ class JobInfo(Message):
     started: datetime
     ended: datetime | None
     motion: bool
-    result: Annotated[ToolOutcome | dict[str, object] | None, Field(union_mode="left_to_right")] = (
-        Field(description="of a tool: its result, which its field tool names")
+    result: Annotated[ToolOutcome | PlainResult | None, Field(union_mode="left_to_right")] = Field(
+        description="of a tool: its result, which its field tool names"
     )
     problem: Problem | None
 

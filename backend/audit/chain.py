@@ -16,6 +16,7 @@ from sqlalchemy import insert, select
 from sqlalchemy.orm import Session
 
 from backend.store.audit_tables import AuditEntry, AuditHead
+from drivers.texts.message import Text, text
 
 #: What stands for the hash before the first entry.
 ZERO = "0" * 64
@@ -41,7 +42,7 @@ class Verdict:
     entries: int
     head: Anchor
     broken: int | None = None
-    why: str = ""
+    why: Text | None = None
 
     @property
     def ok(self) -> bool:
@@ -87,35 +88,35 @@ def verify(
     number, previous = 0, ZERO
     for entry in entries:
         why = _wrong(entry, number + 1, previous)
-        if not why and anchor and entry.number == anchor.number and entry.hash != anchor.hash:
-            why = f"its hash is not that of the anchor, {anchor.hash}: history was rewritten"
-        if why:
+        if why is None and anchor and entry.number == anchor.number and entry.hash != anchor.hash:
+            why = text("audit.hash-not-of-anchor", anchor=anchor.hash)
+        if why is not None:
             return Verdict(number, Anchor(number, previous), min(entry.number, number + 1), why)
         number, previous = entry.number, entry.hash
     end = Anchor(number, previous)
     if head is None:
-        return Verdict(number, end, number + 1, "the head of the chain is gone")
+        return Verdict(number, end, number + 1, text("audit.head-gone"))
     if head != end:
-        why = f"the chain ended with entry {head.number}; the last that is here is {number}"
+        why = text("audit.end-missing", ended=head.number, last=number)
         return Verdict(number, end, number + 1, why)
     if anchor is not None and anchor.number > number:
-        why = f"the anchor names entry {anchor.number}; the last that is here is {number}"
+        why = text("audit.anchor-beyond-end", anchor=anchor.number, last=number)
         return Verdict(number, end, number + 1, why)
     return Verdict(number, end)
 
 
-def _wrong(entry: AuditEntry, number: int, previous: str) -> str:
+def _wrong(entry: AuditEntry, number: int, previous: str) -> Text | None:
     if entry.number != number:
-        return f"entry {number} is missing"
+        return text("audit.entry-missing", number=number)
     if entry.previous != previous:
-        return "it does not follow the entry before it"
+        return text("audit.entry-does-not-follow")
     if link(previous, entry.body) != entry.hash:
-        return "its contents are not those that were written"
+        return text("audit.contents-altered")
     try:
         parts = columns(entry.body)
     except (ValueError, KeyError, TypeError):
-        return "its contents are unreadable"
+        return text("audit.contents-unreadable")
     for name, value in parts.items():
         if getattr(entry, name) != value:
-            return f"its column {name} is not what its contents say"
-    return ""
+            return text("audit.column-altered", column=name)
+    return None

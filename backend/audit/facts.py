@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Literal
 
+from drivers.texts.message import Text
+
 Kind = Literal[
     "write", "procedure", "motion", "job", "stop", "lease", "login", "account", "invitation",
     "file", "station", "audit",
@@ -18,6 +20,16 @@ KINDS: tuple[Kind, ...] = (
     "file", "station", "audit",
 )  # fmt: skip
 
+Action = Literal[
+    "written", "refused", "commanded", "started", "done", "failed", "cancelled",
+    "pressed", "taken", "given back", "passed on", "saved", "annotated", "deleted", "taken back",
+    "purged", "connected", "taken off the bench", "made", "changed", "logged in", "logged out",
+    "left", "session ended", "password changed", "password set", "role changed", "token made",
+    "token revoked", "joined", "granted", "grant withdrawn", "ended", "motion enabled",
+    "motion ended", "asks", "gives", "keeps", "hands over", "overrides", "lost",
+]  # fmt: skip
+"""What was done; entries keep this word, and the page has its text for it."""
+
 Value = int | float | str | bool | None
 _MAX_TEXT = 2000
 
@@ -26,25 +38,28 @@ _MAX_TEXT = 2000
 class Fact:
     """One event. ``person`` is filled in from who is acting where it is None.
 
-    ``action`` is a verb ("written", "started", "given"), ``target`` what it was done to (a
-    parameter's key, a file's name, a person), ``old`` and ``new`` raw values, ``outcome`` empty
-    for success, else what went wrong.
+    ``target`` is what it was done to (a parameter's key, a file's name, a person), ``old`` and
+    ``new`` are raw values, ``outcome`` is what went wrong, None for success, and ``title`` what a
+    job was called. An entry keeps messages as code and facts, and in English for whoever searches
+    or reads it without a catalogue.
     """
 
     kind: Kind
-    action: str
+    action: Action
     axis: str = ""
     target: str = ""
     old: Value = None
     new: Value = None
-    outcome: str = ""
+    outcome: Text | None = None
     person: str | None = None
+    title: Text | None = None
     detail: Mapping[str, Value] = field(default_factory=dict)
 
 
 def body_of(fact: Fact, *, moment: datetime, station: str, person: str) -> str:
     """Canonical JSON: sorted keys, no spaces, UTF-8, numbers as Python writes them."""
-    content = {
+    detail = dict(fact.detail) if fact.title is None else {**fact.detail, "title": str(fact.title)}
+    content: dict[str, object] = {
         "time": stamp(moment),
         "station": station,
         "person": person,
@@ -54,9 +69,13 @@ def body_of(fact: Fact, *, moment: datetime, station: str, person: str) -> str:
         "target": _plain(fact.target),
         "old": _plain(fact.old),
         "new": _plain(fact.new),
-        "outcome": _plain(fact.outcome),
-        "detail": {str(key): _plain(value) for key, value in fact.detail.items()},
+        "outcome": "" if fact.outcome is None else _plain(str(fact.outcome)),
+        "detail": {str(key): _plain(value) for key, value in detail.items()},
     }
+    messages = {"outcome": fact.outcome, "title": fact.title}
+    known = {name: each for name, each in messages.items() if each is not None and each.code}
+    if known:
+        content["messages"] = {name: _wire(each.to_wire()) for name, each in known.items()}
     return json.dumps(
         content, ensure_ascii=False, sort_keys=True, separators=(",", ":"), allow_nan=False
     )
@@ -65,6 +84,13 @@ def body_of(fact: Fact, *, moment: datetime, station: str, person: str) -> str:
 def stamp(moment: datetime) -> str:
     """ISO 8601 in UTC with microseconds and Z: sorts as text."""
     return moment.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%S.%fZ")
+
+
+def _wire(value: object) -> object:
+    """A message as plain values, each of which JSON and both databases hold."""
+    if isinstance(value, dict):
+        return {str(name): _wire(each) for name, each in value.items()}
+    return _plain(value) if isinstance(value, (int, float, str)) else value
 
 
 def _plain(value: Value) -> Value:

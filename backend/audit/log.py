@@ -28,6 +28,8 @@ from backend.audit.pending import PendingFile
 from backend.people.identity import acting_person
 from backend.store.audit_tables import AuditEntry
 from backend.store.database import DatabaseFailed, Store
+from drivers.errors import internal_error
+from drivers.texts.message import Text, text
 
 log = logging.getLogger(__name__)
 
@@ -56,8 +58,8 @@ class _Queue:
 class AuditLog:
     """The audit of one station. Nothing is touched before the first event, or `start`.
 
-    ``changed`` is called on the writing thread with a new problem, or with an empty text when
-    it is over.
+    ``changed`` is called on the writing thread with a new problem, or with None when it is
+    over.
     """
 
     def __init__(
@@ -66,7 +68,7 @@ class AuditLog:
         station: str,
         *,
         capacity: int = 50_000,
-        changed: Callable[[str], None] = lambda _problem: None,
+        changed: Callable[[Text | None], None] = lambda _problem: None,
     ) -> None:
         self._store = store
         self.station = station
@@ -81,8 +83,8 @@ class AuditLog:
         #: Bodies of transactions that failed: those may have been committed all the same.
         self._unsure: set[str] = set()
         self._last_time = datetime.min.replace(tzinfo=UTC)
-        self.problem = ""
-        """Why events are not in the database yet; empty while all is well."""
+        self.problem: Text | None = None
+        """Why events are not in the database yet; None while all is well."""
 
     # --- adding -----------------------------------------------------------------------
 
@@ -214,7 +216,7 @@ class AuditLog:
         if not queue.lost:
             return []
         fact = Fact(
-            "audit", "lost", outcome=f"{queue.lost} events found no room", new=queue.lost,
+            "audit", "lost", outcome=text("audit.events-lost", count=queue.lost), new=queue.lost,
             detail={"since": queue.lost_since},
         )  # fmt: skip
         return [body_of(fact, moment=datetime.now(UTC), station=self.station, person=PROGRAM)]
@@ -232,24 +234,24 @@ class AuditLog:
                 queue.kept += queue.lost
                 queue.lost, queue.lost_since = 0, ""
             self._resolve()
-            over = bool(self.problem)
-            self.problem = ""
+            over = self.problem is not None
+            self.problem = None
         if emptied:
             self._file.clear()
         if over:
-            self._changed("")
+            self._changed(None)
 
     def _failed(self, error: Exception, batch: list[str]) -> None:
         self._unsure.update(batch)
-        text = error.message if isinstance(error, DatabaseFailed) else repr(error)
+        known = isinstance(error, DatabaseFailed)
+        why = error.text if isinstance(error, DatabaseFailed) else internal_error(error)
         with self._wake:
-            first = not self.problem
-            self.problem = text
+            first = self.problem is None
+            self.problem = why
             self._file_takes = True
         if first:
-            known = isinstance(error, DatabaseFailed)
-            log.error("the audit cannot be written: %s", text, exc_info=None if known else error)
-            self._changed(text)
+            log.error("the audit cannot be written: %s", why, exc_info=None if known else error)
+            self._changed(why)
 
     def _spool(self) -> None:
         """Put into the file what is only in memory; where that fails, memory has to do."""

@@ -6,11 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from backend.audit.asked import settings_now
-from backend.audit.facts import Fact, Kind, Value
+from backend.audit.facts import Action, Fact, Kind, Value
 from backend.audit.log import AuditLog
 from backend.drive.readings import CommandRecord, Refusal, WriteRecord
 from backend.people.lease import Holder
 from backend.work.jobs import Job
+from drivers.errors import why_of
+from drivers.texts.message import Text, text
 
 #: Jobs that only read what the pages show anyway.
 _UNREMARKABLE = frozenset({"reread", "read_all"})
@@ -24,12 +26,12 @@ class _Sent:
     first: int
     last: int
     count: int = 1
-    problem: str = ""
+    problem: Text | None = None
 
     def __str__(self) -> str:
         span = str(self.first) if self.count == 1 else f"{self.first} → {self.last}"
         times = "" if self.count == 1 else f" ({self.count}×)"
-        return f"{span}{times}{', ' + self.problem if self.problem else ''}"
+        return f"{span}{times}{f', {self.problem}' if self.problem else ''}"
 
 
 @dataclass(slots=True)
@@ -49,7 +51,7 @@ class AuditRecorder:
         self._holders: dict[str, str] = {}
         self._running: dict[str, _Running] = {}
         #: By drive and parameter the last command that no motion had sent.
-        self._commanded: dict[tuple[str, str], tuple[int, str]] = {}
+        self._commanded: dict[tuple[str, str], tuple[int, Text | None]] = {}
 
     def wrote(self, record: WriteRecord) -> None:
         """A parameter was written, or may have been."""
@@ -61,8 +63,8 @@ class AuditRecorder:
         if isinstance(reason := settings_now().get("reason"), str) and reason:
             detail["reason"] = reason
         outcome = record.problem
-        if not outcome and record.after != record.wanted:
-            outcome = "the drive keeps another value"
+        if outcome is None and record.after != record.wanted:
+            outcome = text("audit.another-value-kept", wanted=record.wanted, kept=record.after)
         self._audit.add(
             Fact(
                 "write",
@@ -127,7 +129,7 @@ class AuditRecorder:
         """A job began or ended; progress between is not kept."""
         if job.kind in _UNREMARKABLE:
             return
-        detail: dict[str, Value] = {"title": job.title}
+        detail: dict[str, Value] = {}
         if job.drive is not None:
             detail["drive"] = job.drive
         if job.state == "running":
@@ -149,8 +151,9 @@ class AuditRecorder:
                 "started" if job.state == "running" else job.state,
                 axis=self._name_of(job.drive) if job.drive else "",
                 target=job.id,
-                outcome=str(job.error) if job.error else "",
+                outcome=None if job.error is None else why_of(job.error),
                 detail=detail,
+                title=job.title_text,
             )
         )
 
@@ -165,7 +168,7 @@ class AuditRecorder:
         if before == now:
             return
         self._holders[drive] = now
-        action = "taken" if not before else ("given back" if not now else "passed on")
+        action: Action = "taken" if not before else ("given back" if not now else "passed on")
         self._audit.add(
             Fact(
                 "lease",

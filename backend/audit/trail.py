@@ -5,10 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Literal
+from typing import Any, Literal
 
 from sqlalchemy import Select, select
 from sqlalchemy.orm import Session
@@ -18,6 +18,7 @@ from backend.audit.facts import Kind, Value, stamp
 from backend.store.audit_tables import AuditEntry, AuditHead
 from backend.store.database import Store
 from backend.store.spreadsheet import as_text
+from drivers.texts.message import Language, Text, prose
 
 Format = Literal["csv", "jsonl"]
 _CHUNK = 500
@@ -80,8 +81,17 @@ class Event:
     target: str
     old: Value
     new: Value
-    outcome: str
+    outcome: Text | None
+    title: Text | None
     detail: dict[str, Value]
+
+    def detail_in(self, language: Language) -> dict[str, Value]:
+        """Its details, the title of a job in this language."""
+        return (
+            self.detail
+            if self.title is None
+            else self.detail | {"title": self.title.words(language)}
+        )
 
 
 class Trail:
@@ -113,9 +123,10 @@ class Trail:
                 for name, c in columns.items()
             }
 
-    def export(self, wanted: Filter, form: Format) -> Iterator[str]:
+    def export(self, wanted: Filter, form: Format, language: Language = "en") -> Iterator[str]:
         """Lines, oldest first. JSON lines carry body, number and both hashes, so that a chain
-        exported as a whole can be checked without the database.
+        exported as a whole can be checked without the database; a table has its sentences in this
+        language.
 
         Raises:
             DatabaseFailed: the database.
@@ -130,7 +141,7 @@ class Trail:
             with self._store.reading() as session:
                 entries = list(session.scalars(query))
             for entry in entries:
-                yield _json_line(entry) if form == "jsonl" else _csv_line(_csv_row(entry))
+                yield _json_line(entry) if form == "jsonl" else _csv_line(_csv_row(entry, language))
             if not entries:
                 return
             last = entries[-1].number
@@ -164,6 +175,7 @@ def _head(session: Session) -> Anchor | None:
 
 def _event(entry: AuditEntry) -> Event:
     content = json.loads(entry.body)
+    detail = content["detail"]
     return Event(
         number=entry.number,
         hash=entry.hash,
@@ -176,9 +188,18 @@ def _event(entry: AuditEntry) -> Event:
         target=content["target"],
         old=content["old"],
         new=content["new"],
-        outcome=content["outcome"],
-        detail=content["detail"],
+        outcome=_message(content, "outcome", content["outcome"]),
+        title=_message(content, "title", detail.get("title", "")),
+        detail=detail,
     )
+
+
+def _message(content: Mapping[str, Any], name: str, words: object) -> Text | None:
+    """A message of an entry; the words alone of an entry that was made before there were codes."""
+    found = content.get("messages", {}).get(name)
+    if found is not None:
+        return Text.from_wire(found)
+    return prose(str(words)) if words else None
 
 
 def _json_line(entry: AuditEntry) -> str:
@@ -197,10 +218,16 @@ _CSV = [
 ]  # fmt: skip
 
 
-def _csv_row(entry: AuditEntry) -> list[str]:
-    content = json.loads(entry.body)
-    detail = json.dumps(content["detail"], ensure_ascii=False) if content["detail"] else ""
-    row = {**content, "number": entry.number, "hash": entry.hash, "detail": detail}
+def _csv_row(entry: AuditEntry, language: Language) -> list[str]:
+    content, event = json.loads(entry.body), _event(entry)
+    shown = event.detail_in(language)
+    row = {
+        **content,
+        "number": entry.number,
+        "hash": entry.hash,
+        "outcome": event.outcome.words(language) if event.outcome else "",
+        "detail": json.dumps(shown, ensure_ascii=False) if shown else "",
+    }
     return [_cell(row[name]) for name in _CSV]
 
 

@@ -7,6 +7,7 @@ from backend.scales.resolve import read_reported
 from backend.scales.taught import Taught
 from backend.scales.units_found import nearest_unit
 from drivers.errors import NotAllowed, OutOfRange
+from drivers.texts import limits
 
 #: Revolutions that an eye can tell; fewer are a guess.
 _LEAST_REV = 0.05
@@ -31,7 +32,7 @@ async def confirmed(axis: Axis, turned_rev: float) -> Taught:
             "axis.rev-cannot-reported-eye",
             drive=drive.name,
             value=turned_rev,
-            limit=f"at least {_LEAST_REV:g} rev",
+            limit=limits.at_least(_LEAST_REV, "rev"),
         )
     if last.raw_per_inc_s is not None and last.raw_per_inc_s < 0:
         raise NotAllowed("axis.606ch-6064h-opposite-signs", drive=drive.name, parameter="606C:00")
@@ -68,7 +69,11 @@ async def stated(
     ):  # fmt: skip
         if value is not None and not 0 < value < 1e12:
             raise OutOfRange(
-                "axis.detail", drive=axis.drive.name, value=value, limit="above 0", name=name
+                "axis.detail",
+                drive=axis.drive.name,
+                value=value,
+                limit=limits.above_zero(),
+                name=name,
             )
     return Taught(
         counts_per_rev=counts_per_rev or before.counts_per_rev,

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from backend.commands.options import Server, Url, server_for
+from backend.commands.printing import print_text
 from backend.commands.session import opened, run, show_progress
 from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
@@ -41,7 +42,7 @@ def record(
     async def work() -> None:
         data = await _recorded(url, station, seconds, server)
         write_atomically(out, data)
-        print(f"{out}: {len(data)} bytes")
+        print_text("printed.file-bytes", file=str(out), size=len(data))
 
     run(work)
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from backend.commands.options import Json, Profile, Server, Url, server_for
+from backend.commands.printing import print_text, words_of
 from backend.commands.session import opened, run, show_progress
 from backend.station.matching import match_profiles
 from drivers.doctor.diagnosis import Cause
@@ -121,12 +122,15 @@ def _show(results: list[dict[str, Any]], *, as_json: bool) -> None:
         return
     for each in results:
         if each["reached"]:
-            print(f"station {each['station']}: reaches Operational")
+            print_text("printed.reaches-operational", station=str(each["station"]))
             continue
-        print(f"station {each['station']}: {each['refusal'] or 'not in Operational'}")
+        head = words_of("printed.station", station=str(each["station"]))
+        print(f"{head}: {each['refusal'] or words_of('printed.not-operational')}")
         for number, cause in enumerate(each["causes"], start=1):
             print(f"  {number}. {cause['title']}")
             for fact in cause["facts"]:
-                wanted = "" if fact["expected"] is None else f", should be {fact['expected']}"
-                print(f"     {fact['name']} = {fact['actual']}{wanted}")
-            print(f"     remedy: {cause['remedy']}")
+                line = f"     {fact['name']} = {fact['actual']}"
+                if fact["expected"] is not None:
+                    line += words_of("printed.should-be", expected=str(fact["expected"]))
+                print(line)
+            print_text("printed.cause-remedy", remedy=str(cause["remedy"]))

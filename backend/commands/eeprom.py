@@ -9,6 +9,7 @@ from typing import Annotated, Any, NamedTuple
 import typer
 
 from backend.commands.options import Json, Server, Station, Url, server_for
+from backend.commands.printing import print_text, words_of
 from backend.commands.session import opened, run, show_progress
 from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
@@ -17,7 +18,6 @@ from drivers.ethercat.eeprom.image import Difference, Image, differences
 from drivers.ethercat.eeprom.plan import Plan
 from drivers.ethercat.link import EthercatLink, segment_of
 from drivers.link import Link
-from drivers.texts.message import language
 from profiles.importer import import_file
 from profiles.importer.files import is_xml
 from profiles.schema import Profile
@@ -56,10 +56,10 @@ def read(
     async def work() -> None:
         image = Image(await _contents(url, station, size, server))
         write_atomically(out, image.data)
-        print(f"{out}: {len(image.data)} bytes")
+        print_text("printed.file-bytes", file=str(out), size=len(image.data))
         problem = image.problem()
         if problem is not None:
-            print(f"attention: {problem.words(language())}")
+            print_text("printed.attention", problem=problem)
 
     run(work)
 
@@ -91,9 +91,9 @@ def compare(
         if as_json:
             print(json.dumps(rows, indent=1))
         else:
-            _print_changes(rows, "drive", "file")
+            _print_changes(rows, words_of("printed.drive"), words_of("printed.file"))
             if not rows:
-                print("the EEPROM is as the file says")
+                print_text("printed.eeprom-as-file")
         return not rows
 
     if not run(work):
@@ -153,7 +153,7 @@ def alias(
                 segment = _segment(link)
                 await segment.scan(show_progress)
                 await segment.set_alias(station, value)
-        print(f"alias {value} written to station {station}; switch the drive off and on")
+        print_text("printed.alias-written", alias=value, station=station)
 
     run(work)
 
@@ -225,13 +225,13 @@ def _confirmed(shown: _Shown, confirm: str | None, yes: bool) -> bool:
         NotAllowed: one of them is missing, or the digest is of another change.
     """
     if not shown.changes:
-        print("the EEPROM is like this already; nothing is written")
+        print_text("printed.eeprom-like-this")
         return False
-    _print_changes(shown.changes, "now", "then")
+    _print_changes(shown.changes, words_of("printed.now"), words_of("printed.then"))
     if shown.keeps_serial:
-        print("the drive keeps its own serial number")
-    print(f"{shown.words} words are written; digest {shown.digest}")
-    given = confirm or typer.prompt("type the digest to confirm this change").strip()
+        print_text("printed.keeps-serial")
+    print_text("printed.words-to-write", count=shown.words, digest=shown.digest)
+    given = confirm or typer.prompt(words_of("printed.type-digest")).strip()
     if given != shown.digest:
         raise NotAllowed("ethercat.eeprom-plan-changed", digest=shown.digest)
     if not yes and not typer.confirm("write it now? Do not switch anything off until it is done"):
@@ -278,4 +278,4 @@ def _short(data: str | None) -> str:
 
 
 def _print_done(shown: _Shown) -> None:
-    print(f"{shown.words} words written and read back; switch the drive off and on")
+    print_text("printed.words-written", count=shown.words)

@@ -13,11 +13,13 @@ from pydantic import ValidationError
 from backend.commands import local_functions, remote_functions
 from backend.commands.function_answers import Faults, Gear, Terminal, of_plan
 from backend.commands.options import Json, Place, Profile, Server, Station, Url, place
+from backend.commands.printing import print_text, words_of
 from backend.commands.session import reporting_errors, run
 from backend.functions.regeneration import BrakingCycle, BrakingLimits, Resistor
 from backend.functions.regeneration import braking as braking_of
 from backend.scales.gear_calculator import Mechanics, plan_gear
 from drivers.errors import OutOfRange
+from drivers.texts import limits as limit_texts
 from profiles import load_profile
 
 _UNKNOWN = "not in the profile"
@@ -51,8 +53,11 @@ def io(
             print(json.dumps([state._asdict() for state in states], indent=1))
             return
         for state in states:
-            on = "?" if state.on is None else "on" if state.on else "off"
-            twins = f"  SAME AS {', '.join(state.same_function)}" if state.same_function else ""
+            on = "?" if state.on is None else words_of("printed.on" if state.on else "printed.off")
+            twins = ""
+            if state.same_function:
+                same = ", ".join(state.same_function)
+                twins = f"  {words_of('printed.same-function', terminals=same)}"
             print(f"{state.name:6} {on:4} {state.function_name}{twins}")
 
     run(work)
@@ -77,11 +82,11 @@ def faults(
             for text in fault.remedies:
                 print(f"    {text}")
         if not found.active:
-            print("no fault is active")
+            print_text("printed.no-fault-active")
         for entry in found.past:
             print(f"{entry.record}: {entry.code} {entry.name or entry.error or _UNKNOWN}")
         if found.hidden:
-            print(f"the drive keeps {found.hidden} past faults that only its maker can read")
+            print_text("printed.faults-hidden", count=found.hidden)
 
     run(work)
 
@@ -134,14 +139,16 @@ def gear_command(
 def _show(plan: Gear) -> None:
     for key, name, raw in plan.values:
         print(f"{key} {name}: {raw}")
-    print(f"one motor revolution: {plan.travel_per_motor_turn:.9g} {plan.unit}")
-    print(f"increments per motor revolution: {plan.reached:.12g} ({plan.error_ppm:.2g} ppm off)")
+    print_text("printed.gear-travel", travel=f"{plan.travel_per_motor_turn:.9g}", unit=plan.unit)
+    print_text(
+        "printed.gear-increments", increments=f"{plan.reached:.12g}", ppm=f"{plan.error_ppm:.2g}"
+    )
     for text in plan.warnings:
-        print(f"note: {text}")
+        print_text("printed.note", words=text)
     if plan.before is not None:
-        print(f"written; before: {plan.before}")
+        print_text("printed.gear-written", before=str(plan.before))
         for key, why in (plan.waits or {}).items():
-            print(f"  {key} waits for {why}")
+            print_text("printed.waits-for", key=key, why=str(why))
 
 
 @reporting_errors
@@ -164,7 +171,7 @@ def braking(
             raise OutOfRange(
                 "command.no-model-table",
                 value=model,
-                limit=", ".join(models) or "none",
+                limit=limit_texts.one_of(", ".join(models)),
                 drive_name=drive,
                 models=", ".join(models) or "none",
             )
@@ -178,6 +185,8 @@ def braking(
     given = {"inertia": inertia, "speed": speed, "time": time, "cycle": cycle, "stops": stops}
     for name, number in (given | ({} if voltage is None else {"voltage": voltage})).items():
         if not 0 < number < math.inf:
-            raise OutOfRange("command.give-number", value=number, limit="greater than 0", name=name)
+            raise OutOfRange(
+                "command.give-number", value=number, limit=limit_texts.above_zero(), name=name
+            )
     result = braking_of(BrakingCycle(inertia, speed, time, cycle, stops), limits)
     print(json.dumps(asdict(result), indent=1))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
@@ -13,6 +12,7 @@ import typer
 
 from backend.commands.drive_values import Now, values_now
 from backend.commands.options import Json, Profile, Server, Station, Url, place
+from backend.commands.printing import note, print_text, words_of
 from backend.commands.session import run
 from backend.commands.values import bytes_of
 from backend.handover.conflicts import Verdict, changed_since
@@ -110,17 +110,17 @@ def _show_export(
 ) -> None:
     writes = sum(len(axis.writes) for axis in axes)
     left = sum(len(axis.left_out) for axis in axes)
-    print(f"{out}: {writes} writes, {left} rows left out")
+    print_text("printed.handover-written", file=str(out), writes=writes, left=left)
     for name in list(files)[1:]:
-        print(f"beside it: {name}")
+        print_text("printed.beside-it", name=name)
     for axis in axes:
         place = f"{axis.name}: " if len(axes) > 1 else ""
         for each in axis.left_out:
-            print(f"left out: {place}{each.key}: {each.reason}")
-        for note in axis.notes:
-            print(f"note: {place}{note}")
+            print_text("printed.left-out", place=place, key=each.key, reason=str(each.reason))
+        for words in axis.notes:
+            print_text("printed.note", words=f"{place}{words}")
     for remark in remarks(axes, form):
-        print(f"note: {remark}")
+        print_text("printed.note", words=str(remark))
     print(f"sha256: {digest(files[out.name])}")
 
 
@@ -180,22 +180,22 @@ def _show(verdict: Verdict, form: str, *, as_json: bool) -> None:
         print(json.dumps({"format": form, **asdict(verdict)}, indent=1))
         return
     for conflict in verdict.conflicts:
-        both = f" (drive now {conflict.drive})" if conflict.drive is not None else ""
+        both = ""
+        if conflict.drive is not None:
+            both = f" {words_of('printed.drive-now', value=str(conflict.drive))}"
         print(f"{conflict.consequence}: {conflict.sentence}{both}")
     for finding in verdict.findings:
         print(f"{finding.kind}: {finding.text}")
     if verdict.unknown_here:
         keys = ", ".join(verdict.unknown_here)
-        print(f"not compared, neither set nor drive gives a value: {keys}")
+        print_text("printed.not-compared", keys=keys)
     if verdict.not_read:
-        print(f"not read from the drive, compare again: {', '.join(verdict.not_read)}")
-    print(
-        f"{form}: {len(verdict.conflicts)} conflicts, {verdict.same} equal, "
-        f"{len(verdict.restored)} changed in the drive and restored by the controller, "
-        f"{len(verdict.findings)} defects of the list, {len(verdict.not_written)} values of the "
-        f"set that the controller does not write, {len(verdict.not_read)} values that the drive "
-        "did not give"
-    )
+        print_text("printed.not-read-compare-again", keys=", ".join(verdict.not_read))
+    print_text(
+        "printed.handover-verdict", form=form, conflicts=len(verdict.conflicts), same=verdict.same,
+        restored=len(verdict.restored), defects=len(verdict.findings),
+        not_written=len(verdict.not_written), not_read=len(verdict.not_read),
+    )  # fmt: skip
 
 
 @app.command("watch")
@@ -223,11 +223,11 @@ def watch(
         for each in changes:
             print(f"{each.consequence}: {each.sentence}")
         _show_unread(unread)
-        print(f"{now.name}: {len(changes)} of {len(ours)} values changed since the hand-over")
+        print_text("printed.changed-since", name=now.name, changed=len(changes), count=len(ours))
 
     run(work)
 
 
 def _show_unread(keys: Iterable[str]) -> None:
     for key in keys:
-        print(f"{key}: not read", file=sys.stderr)
+        note("printed.key-not-read", key=key)

@@ -15,7 +15,6 @@ import typer
 
 from backend.api.health.models import AxisHealth, HealthFinding
 from backend.api.health.routes import info_of
-from backend.api.models import MessageInfo
 from backend.api.station.models import DriveSummary
 from backend.commands.keep import Config, Database, station_records
 from backend.commands.options import DEFAULT_SERVER, Json, Server
@@ -26,6 +25,7 @@ from backend.health.compare import CHECKS, LEAST_REPEATS
 from backend.health.records import HealthRecords
 from backend.tools.health.result import UNITS, HealthResult
 from backend.tools.registry import BY_KIND
+from backend.tools.wire_message import MessageInfo
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, language, text
 

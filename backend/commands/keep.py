@@ -16,6 +16,7 @@ from backend.audit.chain import Anchor
 from backend.audit.export_check import check_lines
 from backend.audit.trail import Filter
 from backend.commands.options import Json
+from backend.commands.printing import note, print_text
 from backend.commands.session import reporting_errors
 from backend.commands.state import chosen_folder, state_folder
 from backend.library.backup.backup import make_backup
@@ -86,7 +87,7 @@ def backup(
     parts = make_backup(store, archive, recordings=recordings, overwrite=overwrite)
     store.close()
     size = sum(part.bytes for part in parts.values())
-    print(f"{archive}: {len(parts)} files, {size} bytes, each with its checksum")
+    print_text("printed.backup-made", file=str(archive), files=len(parts), size=size)
 
 
 @reporting_errors
@@ -104,11 +105,13 @@ def restore(
     """Put a backup in place, after checking it as a whole. End the server first."""
     folder = chosen_folder(config)
     done = restore_archive(archive, folder, database=database, replace=replace_)
-    print(f"{folder}: {done.parts} files, audit of {done.audit_entries} entries is whole")
+    print_text(
+        "printed.backup-restored", folder=str(folder), files=done.parts, entries=done.audit_entries
+    )
     if done.copied_rows:
-        print(f"{done.copied_rows} rows of library and audit are in the database")
+        print_text("printed.rows-in-database", rows=done.copied_rows)
     if done.aside is not None:
-        print(f"what was there before is in {done.aside}")
+        print_text("printed.before-is-in", folder=str(done.aside))
 
 
 # --- audit -------------------------------------------------------------------------------
@@ -134,10 +137,10 @@ def verify(
         verdict = records.trail.verify(known)
         records.store.close()
     if not verdict.ok:
-        print(f"BROKEN at entry {verdict.broken}: {verdict.why}", file=sys.stderr)
+        note("printed.audit-broken", entry=verdict.broken, why=str(verdict.why))
         raise typer.Exit(1)
-    print(f"{verdict.entries} entries, the chain is whole")
-    print(f"anchor: {verdict.head}")
+    print_text("printed.audit-whole", entries=verdict.entries)
+    print_text("printed.anchor", head=str(verdict.head))
 
 
 def _anchor(text: str) -> Anchor | None:
@@ -213,7 +216,7 @@ def list_(
         tags = f"  [{', '.join(e.tags)}]" if e.tags else ""
         print(f"{e.kind:<12} {e.name}  v{e.latest.number}  {e.latest.axis.name}{tags}")
     if total > len(entries):
-        print(f"… and {total - len(entries)} more: search for less")
+        print_text("printed.more-entries", count=total - len(entries))
 
 
 def _kinds(name: str) -> tuple[Kind, ...]:
@@ -257,7 +260,9 @@ def import_sets(
         data = file.read_bytes()
         parameter_set.parse(data, file.name)
         stored = records.sets.store(file.name, data, overwrite=True, tags=tag or ())
-        print(f"{stored} version {records.sets.entry(stored).versions}")
+        print_text(
+            "printed.stored-version", name=stored, version=records.sets.entry(stored).versions
+        )
     records.audit.close()
     records.store.close()
 
@@ -276,5 +281,7 @@ def purge(
     records.audit.close()
     records.store.close()
     for entry in gone:
-        print(f"{entry.kind} {entry.name}: {entry.versions} versions deleted")
-    print(f"{len(gone)} deleted")
+        print_text(
+            "printed.versions-deleted", kind=entry.kind, name=entry.name, count=entry.versions
+        )
+    print_text("printed.deleted", count=len(gone))

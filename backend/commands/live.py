@@ -24,6 +24,7 @@ from websockets.exceptions import WebSocketException
 
 from backend.api.live.messages import Hello, JogEnded, Refused, ScopeInfo
 from backend.commands.options import Profile, Server, Station, Url, server_for
+from backend.commands.printing import print_text
 from backend.commands.remote import authorisation, remote
 from backend.commands.samples import Samples, decode
 from backend.commands.session import run
@@ -67,11 +68,11 @@ def jog(
                 "torque_limit": torque,
             }  # fmt: skip
             async with bench.exchange(url, cycle_us), _page(at) as page:
-                print(f"{drive.name} moves; Ctrl+C stops it")
+                print_text("printed.axis-moves", drive=drive.name)
                 ended = await _hold(page, request, seconds)
         if ended.problem is not None:
             raise NotAllowed(ended.problem.detail, remedy=ended.problem.remedy)
-        print(f"ended: {ended.reason}")
+        print_text("printed.jog-ended", reason=str(ended.reason))
 
     run(work)
 
@@ -97,7 +98,7 @@ def scope(
                 with out.open("w", encoding="utf-8", newline="") as file:
                     recorded = Recording(file, {d.id: d.name for d in drives})
                     await _record(page, channels, seconds, recorded)
-        print(f"{out}: {recorded.rows} samples, {recorded.dropped} lost on the way")
+        print_text("printed.samples", file=str(out), samples=recorded.rows, lost=recorded.dropped)
 
     run(work)
 

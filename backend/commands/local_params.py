@@ -9,6 +9,7 @@ from pathlib import Path
 from backend.axis.axis import Axis
 from backend.commands import values
 from backend.commands.options import Place
+from backend.commands.printing import print_text
 from backend.commands.restoring import require_own_values, show_restored, stop_what_was_moved
 from backend.commands.session import drive_and_pending, drive_at, progress, show_progress
 from backend.commands.values import Compared
@@ -63,7 +64,8 @@ async def dump(
         sys.stdout.write(data.decode())
     else:
         write_atomically(out, data)
-        print(f"{out}: {sum(r.raw is not None for r in readings.values())} parameters")
+        count = sum(r.raw is not None for r in readings.values())
+        print_text("printed.parameters-in-file", file=str(out), count=count)
     values.tell_missing(data)
 
 
@@ -75,7 +77,7 @@ async def save(place: Place) -> None:
             raise NotAllowed("command.no-procedure-saves-keeps", drive=drive.name)
         require_own_values(drive)
         await procedures.run_procedure(Axis(drive), known, True, progress())
-        print(f"{drive.name}: saved in the drive's memory")
+        print_text("printed.saved-in-drive", drive=drive.name)
 
 
 async def restore(place: Place, *, keep: bool) -> None:
@@ -83,12 +85,14 @@ async def restore(place: Place, *, keep: bool) -> None:
     async with drive_and_pending(place.url, place.station, place.profile) as (drive, pending):
         listed = drive.pending_restores.entries
         if not listed:
-            print(f"{drive.name}: nothing is pending")
+            print_text("printed.nothing-pending", drive=drive.name)
             return
         if keep:
             drive.pending_restores.settle([value.key for value in listed])
             for value in listed:
-                print(f"{drive.name}: {value.key} (was {value.raw}) stays as it is")
+                print_text(
+                    "printed.value-stays", drive=drive.name, key=value.key, was=str(value.raw)
+                )
             return
         axis = Axis(drive)
         await stop_what_was_moved(axis, pending)

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from backend.commands.options import Json, Url
+from backend.commands.printing import print_text, words_of
 from backend.commands.session import opened, run, show_progress
 from drivers.canopen.link import CanopenLink
 from drivers.canopen.lss.access import LssNode
@@ -38,7 +39,7 @@ def search(url: Url, as_json: Json = False) -> None:
         if as_json:
             print(json.dumps(None if found is None else found.identity._asdict() | _number(found)))
         elif found is None:
-            print("no node with layer setting services answers at this bit rate")
+            print_text("printed.no-lss-node")
         else:
             print(_named(found))
         return found is not None
@@ -63,9 +64,13 @@ def node(
         async with opened(url) as link:
             can = _can(link)
             meant = await _meant(can, identity)
-            _confirm(f"give {_text(meant)} the number {number}?", yes)
+            _confirm(words_of("printed.give-number", node=_text(meant), number=number), yes)
             await can.lss.set_node(meant, number, store=store)
-        print(f"{_text(meant)} has number {number}{' and stored it' if store else ''}")
+        print_text(
+            "printed.has-stored-number" if store else "printed.has-number",
+            node=_text(meant),
+            number=number,
+        )
 
     run(work)
 
@@ -85,9 +90,9 @@ def bit_rate(
         async with opened(url) as link:
             can = _can(link)
             meant = await _meant(can, identity)
-            _confirm(f"set {_text(meant)} to {kbit} kbit/s?", yes)
+            _confirm(words_of("printed.set-bit-rate", node=_text(meant), kbit=kbit), yes)
             await can.lss.set_bit_rate(meant, kbit, store=True)
-        print(f"{_text(meant)} is set to {kbit} kbit/s; switch it off and on")
+        print_text("printed.bit-rate-set", node=_text(meant), kbit=kbit)
 
     run(work)
 
@@ -129,7 +134,10 @@ def _text(identity: LssIdentity) -> str:
 
 
 def _named(found: LssNode) -> str:
-    number = "no number" if found.node is None else f"number {found.node}"
+    if found.node is None:
+        number = words_of("printed.no-number")
+    else:
+        number = words_of("printed.number", number=found.node)
     return f"{_text(found.identity)}  {number}"
 
 

@@ -15,6 +15,7 @@ from backend.api.station.models import DriveSummary
 from backend.axis.axis import Axis, Envelope
 from backend.axis.cyclic import CyclicSession
 from backend.commands.options import Json, Server, server_for
+from backend.commands.printing import print_text
 from backend.commands.remote import Remote, remote
 from backend.commands.restoring import restore_first
 from backend.commands.session import drive_and_pending, progress, run_in_order
@@ -233,7 +234,7 @@ def show(
     for line in reported(answer):
         print(line)
     if out is not None:
-        print(f"written: {out}")
+        print_text("printed.written", file=str(out))
 
 
 def _reported(answer: Answer) -> list[str]:

@@ -11,6 +11,7 @@ import typer
 
 from backend.commands import local_params, remote_params
 from backend.commands.options import Json, Place, Profile, Server, Station, Url, place
+from backend.commands.printing import print_text
 from backend.commands.session import run
 from backend.commands.values import bytes_of
 from backend.parameters.lists import export_list, import_list
@@ -187,7 +188,7 @@ def export(
         content = parse(bytes_of(file), file.name)
         data = export_list(content, load_profile(content.profile), out.name, datetime.now())
         write_atomically(out, data)
-        print(f"{out}: {len(content.rows)} parameters")
+        print_text("printed.parameters-in-file", file=str(out), count=len(content.rows))
 
     run(work)
 
@@ -207,6 +208,9 @@ def import_(
         for problem in found.problems:
             print(problem, file=sys.stderr)
         write_atomically(out, data)
-        print(f"{out}: {len(found.readings)} parameters, {len(found.problems)} lines not used")
+        print_text(
+            "printed.parameters-of-list", file=str(out), count=len(found.readings),
+            unused=len(found.problems),
+        )  # fmt: skip
 
     run(work)

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from backend.commands.printing import print_text
 from backend.commands.session import run
 from backend.commands.state import state_folder
 from backend.people.accounts import Accounts
@@ -62,7 +63,7 @@ def list_accounts(config: Config = None) -> None:
     async def work(accounts: Accounts) -> None:
         for each in accounts.directory.all():
             here = len(accounts.directory.sessions(each.id))
-            print(f"{each.name}  {each.role}  {here} {'session' if here == 1 else 'sessions'}")
+            print_text("printed.account", name=each.name, role=each.role, sessions=here)
 
     _with(config, work)
 
@@ -78,7 +79,7 @@ def add(
 
     async def work(accounts: Accounts) -> None:
         made = await accounts.add(name, password, role)
-        print(f"made {made.name}, {made.role}")
+        print_text("printed.account-made", name=made.name, role=made.role)
 
     _with(config, work)
 
@@ -89,7 +90,7 @@ def set_password(name: Name, password: NewPassword, config: Config = None) -> No
 
     async def work(accounts: Accounts) -> None:
         await accounts.set_password(_find(accounts, name).id, password)
-        print("set")
+        print_text("printed.password-set")
 
     _with(config, work)
 
@@ -100,7 +101,7 @@ def set_role(name: Name, role: Role, config: Config = None) -> None:
 
     async def work(accounts: Accounts) -> None:
         await accounts.set_role(_find(accounts, name).id, role)
-        print(f"{name} is {role}")
+        print_text("printed.account-role", name=name, role=role)
 
     _with(config, work)
 
@@ -111,7 +112,7 @@ def remove(name: Name, config: Config = None) -> None:
 
     async def work(accounts: Accounts) -> None:
         await accounts.remove(_find(accounts, name).id)
-        print(f"removed {name}")
+        print_text("printed.account-removed", name=name)
 
     _with(config, work)
 

@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from backend.commands.printing import print_text, words_of
 from backend.commands.session import reporting_errors
 from backend.commands.state import state_folder
 from backend.preflight import kept
@@ -52,7 +53,7 @@ def preflight_command(
         for change in undone.restored:
             print(f"{change.setting}: {change.before}")
         for change in undone.left:
-            print(f"{change.setting}: left, as it was changed since")
+            print_text("printed.setting-left", setting=str(change.setting))
         return
     if fix:
         if fix not in set(Fix):
@@ -90,7 +91,9 @@ def as_data(result: Preflight, language: Language) -> dict[str, object]:
 
 def _show(result: Preflight, language: Language) -> None:
     facts = result.facts
-    print(f"Linux {facts.kernel} ({facts.preemption}), {facts.cores} cores")
+    print_text(
+        "printed.computer", kernel=facts.kernel, preemption=str(facts.preemption), cores=facts.cores
+    )
     for number, one in enumerate(result.findings):
         what, remedy = words(one, language)
         cost = f" [{one.delay_us:.0f} µs]" if one.effect is Effect.DELAYS else ""
@@ -105,22 +108,27 @@ def _show(result: Preflight, language: Language) -> None:
 
 
 def _show_run(run: Measured) -> None:
-    print(
-        f"cycle {run.period_us} µs: {run.cycles} cycles, {run.missed} missed, SCHED_FIFO"
-        f" {'granted' if run.fifo else 'not granted'}, memory"
-        f" {'locked' if run.memory_locked else 'not locked'}"
+    print_text(
+        "printed.cycle-measured",
+        period_us=run.period_us,
+        cycles=run.cycles,
+        missed=run.missed,
+        fifo=words_of("printed.granted" if run.fifo else "printed.not-granted"),
+        memory=words_of("printed.locked" if run.memory_locked else "printed.not-locked"),
     )
     _show_histogram("wake-up lateness", run.lateness)
     if run.round_trip is not None:
         _show_histogram("frame round trip", run.round_trip)
     elif run.unanswered:
-        print("  no frame came back: is a drive connected and switched on?")
+        print_text("printed.no-frame-back")
 
 
 def _show_histogram(name: str, histogram: Histogram) -> None:
     most = max(histogram.counts)
-    print(f"  {name}: 99.9 % below {histogram.below_us(0.999):.0f} µs,"
-          f" latest {histogram.most_us:.0f} µs")  # fmt: skip
+    print_text(
+        "printed.lateness", name=name, most_us=f"{histogram.below_us(0.999):.0f}",
+        latest_us=f"{histogram.most_us:.0f}",
+    )  # fmt: skip
     for count, edge in zip(histogram.counts, (*EDGES_US, None), strict=True):
         if count:
             limit = f"<= {edge:g}" if edge is not None else f"> {EDGES_US[-1]:g}"

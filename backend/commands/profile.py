@@ -16,10 +16,12 @@ import typer
 from backend.audit import Fact
 from backend.audit.facts import Value
 from backend.commands.keep import station_records
+from backend.commands.printing import print_text
 from backend.commands.session import opened, reporting_errors, show_progress
 from backend.station.description import profile_of_drive
 from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
+from drivers.texts.message import reason_of, text
 from profiles import drive_names, load_profile
 from profiles.check import check as check_profile
 from profiles.check import coverage, motion_counts, unclassified
@@ -50,7 +52,9 @@ def show(
     if as_json:
         print(json.dumps(shown(profile), indent=1, ensure_ascii=False))
         return
-    print(f"{profile.title} ({profile.drive}), manual {profile.manual}")
+    print_text(
+        "printed.profile-head", title=profile.title, drive=profile.drive, manual=profile.manual
+    )
     for parameter in profile.parameters:
         number = f" {parameter.number}" if parameter.number else ""
         print(
@@ -65,7 +69,7 @@ def _importing() -> Iterator[None]:
     try:
         yield
     except (ImportFailed, ValueError) as error:
-        raise NotAllowed(str(error), remedy="see docs/drives/not-listed.md") from error
+        raise NotAllowed(reason_of(error), remedy="command.see-not-listed") from error
 
 
 def _number(option: str, text: str | None) -> int | None:
@@ -82,7 +86,7 @@ def _check_name(name: str | None) -> None:
         raise NotAllowed(
             "command.cannot-name-profile",
             value=name,
-            limit="lower-case letters, digits and _, a letter first",
+            limit=text("limit.profile-name"),
         )
     if name in drive_names():
         raise NotAllowed("command.profile-already", value=name)
@@ -119,15 +123,18 @@ def import_description(
         target = write_profile(imported.profile, folder or user_folder())
     for finding in imported.report.findings:
         print(f"  {finding}")
-    print(f"{imported.profile.title}: {len(imported.profile.parameters)} parameters, "
-          f"{imported.report.summary()}")  # fmt: skip
+    print_text(
+        "printed.profile-imported", title=imported.profile.title,
+        count=len(imported.profile.parameters), summary=str(imported.report.summary()),
+    )  # fmt: skip
     for device in imported.others:
-        print(
-            f"also in the file: {device.name}"
-            f" (--product-code {device.product_code or 0:#x} --revision {device.revision or 0:#x})"
-            + ("" if device.has_control_word else ", without a control word: not a drive")
+        print_text(
+            "printed.also-in-file" if device.has_control_word else "printed.also-in-file-no-drive",
+            name=device.name,
+            options=f"--product-code {device.product_code or 0:#x}"
+            f" --revision {device.revision or 0:#x}",
         )
-    print(f"written to {target}; use it as {imported.profile.drive}")
+    print_text("printed.profile-written", file=str(target), name=imported.profile.drive)
 
 
 @app.command("from-drive")
@@ -153,7 +160,10 @@ def import_from_drive(
         target = write_profile(imported.profile, user_folder())
     for finding in imported.report.findings:
         print(f"  {finding}")
-    print(f"{len(imported.profile.parameters)} parameters written to {target}; use it as {name}")
+    print_text(
+        "printed.profile-of-drive-written", count=len(imported.profile.parameters),
+        file=str(target), name=name,
+    )  # fmt: skip
 
 
 @app.command("classify")
@@ -193,7 +203,7 @@ def classify_object(
             )
     except (decisions.CannotClassify, ValueError) as error:
         raise NotAllowed(
-            str(error), parameter=key, remedy="see docs/drives/not-listed.md"
+            reason_of(error), parameter=key, remedy="command.see-not-listed"
         ) from error
     records = station_records(config, database)
     reported_as: dict[str, Value] = {
@@ -206,7 +216,10 @@ def classify_object(
     )
     records.audit.close()
     records.store.close()
-    print(f"{now.key} {now.name}: {now.motion}{', safe in motion' if now.safe_in_motion else ''}")
+    print_text(
+        "printed.motion-class-safe" if now.safe_in_motion else "printed.motion-class",
+        key=now.key, name=now.name, motion=now.motion,
+    )  # fmt: skip
 
 
 @app.command("export-eds")
@@ -217,7 +230,7 @@ def export_description(
     """Write a profile's objects as a CANopen EDS file."""
     profile = load_profile(drive)
     write_atomically(out, export_eds(profile, datetime.now(), out.name).encode("utf-8"))
-    print(f"{out} written")
+    print_text("printed.written", file=str(out))
 
 
 @app.command("check")
@@ -235,12 +248,15 @@ def check(drive: Annotated[str | None, typer.Argument()] = None) -> None:
         findings = check_profile(profile)
         for overlay in overlays.values():
             findings += check_overlay(profile, overlay)
-        print(f"{name}: {len(profile.parameters)} parameters, {len(profile.faults)} faults, "
-              f"{len(findings)} findings")  # fmt: skip
+        print_text(
+            "printed.profile-checked", name=name, parameters=len(profile.parameters),
+            faults=len(profile.faults), findings=len(findings),
+        )  # fmt: skip
         counts = ", ".join(f"{count} {motion}" for motion, count in motion_counts(profile).items())
-        print(f"  motion classes: {counts}; {len(unclassified(profile))} not classified")
+        print_text("printed.motion-classes", counts=counts, unclassified=len(unclassified(profile)))
         for language, overlay in overlays.items():
-            print(f"  in {language}: {', '.join(overlay_coverage(profile, overlay))}")
+            covered = ", ".join(overlay_coverage(profile, overlay))
+            print_text("printed.overlay", language=language, covered=covered)
         for finding in findings:
             print(f"  {finding}")
         for line in coverage(profile):

@@ -15,6 +15,7 @@ from backend.api.sets.models import Diff
 from backend.api.station.models import DriveSummary, FoundDrive
 from backend.commands import values
 from backend.commands.options import Place
+from backend.commands.printing import note, print_text
 from backend.commands.remote import Remote, remote
 from backend.commands.restoring import show_restored
 from backend.commands.values import Compared
@@ -46,19 +47,21 @@ async def save(place: Place) -> None:
     """Store the drive's settings in its own memory."""
     async with remote_drive(place) as (at, drive):
         await at.result(f"/drives/{drive.id}/procedures/save", {"confirmed": True})
-        print(f"{drive.name}: saved in the drive's memory")
+        print_text("printed.saved-in-drive", drive=drive.name)
 
 
 async def restore(place: Place, *, keep: bool) -> None:
     """Restore what a motion left that was cut off, or let it stay as it is."""
     async with remote_drive(place) as (at, drive):
         if not drive.pending_restores:
-            print(f"{drive.name}: nothing is pending")
+            print_text("printed.nothing-pending", drive=drive.name)
             return
         if keep:
             await at.ask("DELETE", f"/drives/{drive.id}/pending-restores", DriveSummary)
             for value in drive.pending_restores:
-                print(f"{drive.name}: {value.key} (was {value.raw}) stays as it is")
+                print_text(
+                    "printed.value-stays", drive=drive.name, key=value.key, was=str(value.raw)
+                )
             return
         found = await at.result(f"/drives/{drive.id}/jobs/put-back", {})
         show_restored(drive.name, found)
@@ -80,7 +83,7 @@ async def dump(
         sys.stdout.write(data.decode())
     else:
         write_atomically(out, data)
-        print(f"{out}: also kept by the server as {kept.file}")
+        print_text("printed.also-kept", file=str(out), name=kept.file)
     values.tell_missing(data)
 
 
@@ -134,7 +137,7 @@ async def _differences(
     query = {"file": kept.file, "version": str(kept.version)}
     reported = await at.ask("GET", f"/drives/{drive.id}/diff", Diff, query=query)
     for warning in reported.warnings:
-        print(f"note: {warning}", file=sys.stderr)
+        note("printed.note", words=str(warning))
     rows = [row for row in reported.rows if row.status not in ("same", "not_in_file")]
     return kept, [
         Compared(

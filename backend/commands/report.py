@@ -13,6 +13,7 @@ import typer
 from backend.api.report.models import ReportInfo
 from backend.commands.measure import AxisName, Profile, Station, Where
 from backend.commands.options import Json, Server
+from backend.commands.printing import print_text, words_of
 from backend.commands.remote import remote
 from backend.commands.session import run
 from backend.library.measurements import SUFFIX, BadMeasurement, Head, MeasurementStore, unpack
@@ -64,7 +65,11 @@ def report(
         else:
             data = _from_files([Path(each) for each in given], form, language, about)
         write_atomically(out, data)
-        print(json.dumps({"written": str(out)}) if as_json else f"written: {out}")
+        print(
+            json.dumps({"written": str(out)})
+            if as_json
+            else words_of("printed.written", file=str(out))
+        )
 
     run(work)
 
@@ -122,18 +127,21 @@ def recompute(
 
         made = evaluate(found)
         head = found.head
-        print(f"{head.kind} of {head.drive}, {head.saved:%Y-%m-%d %H:%M:%S %Z}")
+        print_text(
+            "printed.measurement-of", kind=head.kind, drive=head.drive,
+            saved=f"{head.saved:%Y-%m-%d %H:%M:%S %Z}",
+        )  # fmt: skip
         print(_agreement(made))
         if out is not None:
             write_atomically(out, json.dumps(made.result, indent=1).encode())
-            print(f"written: {out}")
+            print_text("printed.written", file=str(out))
 
     run(work)
 
 
 def _agreement(made: Evaluation) -> str:
     if made.agrees is None:
-        return "evaluated; the file tells no earlier result to compare with"
+        return words_of("printed.evaluated")
     if made.agrees:
-        return "evaluated; the result is the one of that time"
-    return f"evaluated; the result is another than at that time: {', '.join(made.differences)}"
+        return words_of("printed.evaluated-same")
+    return words_of("printed.evaluated-other", differences=", ".join(made.differences))

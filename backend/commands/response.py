@@ -9,9 +9,11 @@ from typing import Annotated
 
 import typer
 
+from backend.commands.printing import print_text
 from backend.commands.session import reported
 from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
+from drivers.texts import limits
 
 app = typer.Typer(help="Frequency responses from recordings of other programs. Nothing moves.",
                   no_args_is_help=True)  # fmt: skip
@@ -53,7 +55,7 @@ def columns(
     if as_json:
         print(json.dumps(found, indent=1))
         return
-    print(f"{found['form']}, {found['rows']} rows")
+    print_text("printed.form-and-rows", form=str(found["form"]), rows=str(found["rows"]))
     rows = found["columns"]
     for row in rows if isinstance(rows, list) else []:
         print(f"{row['number']:3}  {row['name']:32}  {row['low']:>12.6g} … {row['high']:<12.6g}")
@@ -126,7 +128,7 @@ def import_(
         write_atomically(out, json.dumps(answer, indent=1).encode())
     for line in _reported(answer):
         print(line)
-    print(f"written: {out}")
+    print_text("printed.written", file=str(out))
 
 
 def _bytes(file: Path) -> bytes:
@@ -135,7 +137,7 @@ def _bytes(file: Path) -> bytes:
     size = file.stat().st_size
     if size > MAX_FILE_BYTES:
         raise NotAllowed(
-            "command.bytes", value=size, limit=f"{MAX_FILE_BYTES} bytes", file=file.name
+            "command.bytes", value=size, limit=limits.size(MAX_FILE_BYTES), file=file.name
         )
     return file.read_bytes()
 

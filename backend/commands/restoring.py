@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from datetime import datetime
 
 from backend.axis.axis import Axis
+from backend.commands.printing import note
 from backend.commands.state import state_folder
 from backend.drive.drive import Drive
 from backend.restore.identity import identity_of
@@ -23,15 +24,19 @@ def recall(drive: Drive, url: str, station: int) -> Pending:
     known = RestoreStore(state_folder(None), command).list_of(identity_of(drive), drive.id)
 
     def failed(error: StorageFailed) -> None:
-        print(f"note: if this command is killed, nobody knows what to restore: {error}",
-              file=sys.stderr)  # fmt: skip
+        note("printed.list-not-kept", error=error.text)
 
     keep_list(drive, known, in_motion=lambda: drive.pending_restores.in_motion, failed=failed)
     if drive.pending_restores:
-        print(_notice(drive, known.pending, url, station), file=sys.stderr)
+        pending = known.pending
+        since = datetime.fromtimestamp(pending.since).astimezone()
+        note(
+            "printed.cut-off" if pending.by else "printed.server-cut-off",
+            drive=drive.name, by=pending.by, since=f"{since:%Y-%m-%d %H:%M:%S}",
+            values=_values(drive), url=url, station=station,
+        )  # fmt: skip
     if known.pending.held_by:
-        print(f"note: {drive.name}: {known.pending.held_by} moves it now and has borrowed values",
-              file=sys.stderr)  # fmt: skip
+        note("printed.moves-it-now", drive=drive.name, held_by=known.pending.held_by)
     return known.pending
 
 
@@ -71,19 +76,10 @@ def require_own_values(drive: Drive) -> None:
 
 def show_restored(name: str, found: Mapping[str, object]) -> None:
     """What `settle` did, line by line."""
-    for what, words in (("back", "restored"), ("left", "not restored")):
+    for what, code in (("back", "printed.restored"), ("left", "printed.not-restored")):
         values = found[what]
         for key, value in values.items() if isinstance(values, dict) else ():
-            print(f"{name}: {words}: {key} = {value}", file=sys.stderr)
-
-
-def _notice(drive: Drive, pending: Pending, url: str, station: int) -> str:
-    when = datetime.fromtimestamp(pending.since).astimezone()
-    return (
-        f"note: {drive.name}: {pending.by or 'a server'} was cut off on {when:%Y-%m-%d %H:%M:%S} "
-        f"and left borrowed values, which are not the drive's own: {_values(drive)}\n"
-        f"      restore them: servodeck params restore {url} --station {station}"
-    )
+            note(code, name=name, key=key, value=str(value))
 
 
 def _values(drive: Drive) -> str:

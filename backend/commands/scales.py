@@ -16,6 +16,7 @@ from backend.api.drive.models_scales import ScalesInfo
 from backend.axis import teaching
 from backend.axis.axis import Axis
 from backend.commands.options import Json, Place, Profile, Server, Station, Url, place
+from backend.commands.printing import words_of
 from backend.commands.remote_params import remote_drive
 from backend.commands.session import drive_at, progress, run, run_in_order
 from backend.commands.state import state_folder
@@ -24,6 +25,7 @@ from backend.drive.identity import read_serial
 from backend.scales.scale import Scale, what_to_do
 from backend.scales.taught import Taught
 from backend.store.files import write_atomically
+from drivers.texts.message import language
 
 app = typer.Typer(
     help="What a raw position and speed mean: show, state, or teach by a small move (moves).",
@@ -202,10 +204,7 @@ async def _teach_here(
 
 def _turned(increments: int) -> float | None:
     """How far the shaft turned as a person saw it; None: too little to tell, move further."""
-    question = (
-        f"moved {increments} increments. How far did the shaft turn, in revolutions? "
-        "(empty: not visible, move ten times as far)"
-    )
+    question = words_of("printed.how-far", increments=increments)
     answer = str(typer.prompt(question, default="", show_default=False))
     return float(answer.replace(",", ".")) if answer.strip() else None
 
@@ -226,13 +225,15 @@ def _print(scales: tuple[Scale, ...], *, as_json: bool = False) -> None:
     for scale in scales:
         unit, source = _UNITS[scale.quantity], f"  {scale.source}" if scale.source else ""
         if scale.raw_per_unit is None:
-            print(f"{scale.quantity.value:12} NOT CERTAIN: {scale.why}{source}")
-            print(f"{'':12} {what_to_do(scale)}")
+            why = words_of("printed.scale-not-certain", why=scale.why)
+            print(f"{scale.quantity.value:12} {why}{source}")
+            print(f"{'':12} {what_to_do(scale).words(language())}")
         else:
-            print(
-                f"{scale.quantity.value:12} {scale.raw_per_unit:.9g} per {unit}"
-                f"  ({scale.origin.value}){source}"
-            )
+            per_unit = words_of(
+                "printed.raw-per-unit", raw=f"{scale.raw_per_unit:.9g}", unit=unit,
+                origin=scale.origin.value,
+            )  # fmt: skip
+            print(f"{scale.quantity.value:12} {per_unit}{source}")
 
 
 def _print_info(info: ScalesInfo, *, as_json: bool = False) -> None:

@@ -6,6 +6,7 @@ import json
 from dataclasses import asdict
 
 from backend.commands.options import Json, Server, Url, server_for
+from backend.commands.printing import print_text, words_of
 from backend.commands.session import opened, run, show_progress
 from backend.station.matching import match_profiles
 from drivers.urls import bus_kind, parse_url
@@ -25,11 +26,18 @@ def scan(
             return
         for row, fits in rows:
             which = ", ".join(f"{name} ({sure})" for name, sure in fits.items())
-            name = row["name"] or "no name"
-            serial = "no serial number" if row["serial"] is None else f"serial {row['serial']}"
-            print(f"station {row['station']}: {name}  {serial}  {which}")
+            name = row["name"] or words_of("printed.no-name")
+            serial = (
+                words_of("printed.no-serial")
+                if row["serial"] is None
+                else words_of("printed.serial", serial=str(row["serial"]))
+            )
+            head = words_of("printed.station", station=str(row["station"]))
+            print(f"{head}: {name}  {serial}  {which}")
         if not rows:
-            print(f"no drive answers: check {bus_kind(parse_url(url).scheme).traits.silent}")
+            print_text(
+                "printed.no-drive-answers", check=bus_kind(parse_url(url).scheme).traits.silent
+            )
 
     run(work)
 

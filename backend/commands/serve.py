@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import importlib
 import socket
 import ssl
 import webbrowser
@@ -16,10 +17,15 @@ import uvicorn
 from backend.api.admission.accepting import AcceptingSocket
 from backend.api.app import make_app
 from backend.api.security.protocol import AcceptingConfig, PatientProtocol, PatientSocket
+from backend.commands.printing import print_text
 from backend.people.login.marker import AccountsMarker
 from backend.people.station import People
 from backend.people.tls import Certificate, machine_names, own_certificate, station_certificate
 from backend.station.bench import Bench
+from backend.station.box.announced import announced
+from backend.station.box.kept import Box, names_of, read
+from backend.station.box.roles import addresses_of
+from backend.station.box.shown import phone_address, scan_code
 from backend.store.database import FILE
 from backend.work.journal import Entry
 from drivers.computer import scheduling
@@ -39,6 +45,13 @@ PING_S, PONG_S = 5.0, 10.0
 BACKLOG = 2048
 #: Files and connections at once: what a process may have at first is often a thousand.
 DESCRIPTORS = 8192
+
+
+#: What the start leaves out, so that the page is there sooner, and loads behind it.
+LATE = (
+    "scipy.fft", "scipy.ndimage", "scipy.optimize", "scipy.signal",
+    "scipy.special", "backend.report.pdf",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,10 +98,11 @@ async def _serve_claimed(
     bench: Bench, serving: Serving, ready: Callable[[], Awaitable[object]] | None
 ) -> None:
     needed = await accounts_needed(bench.state_folder, serving)
+    box = _box(bench.state_folder)
     people = People(bench.state_folder, accounts_needed=needed)
-    certificate = _certificate(bench.state_folder, serving)
+    certificate = _certificate(bench.state_folder, serving, box)
     listening = _listen(serving.host, serving.port)
-    config = _config(bench, people, serving, certificate)
+    config = _config(bench, people, serving, certificate, names_of(box))
     config.accepting = [listening]
     raise_descriptors(DESCRIPTORS)
     server = uvicorn.Server(config)
@@ -98,13 +112,47 @@ async def _serve_claimed(
     if server.started:
         if ready is not None:
             await ready()
-        shown = _address(serving, certificate, listening.getsockname()[1])
+        port = listening.getsockname()[1]
+        shown = _address(serving, certificate, port)
         _tell(shown, people, certificate)
+        if people.setup_needed and not serving.on_loopback:
+            _tell_phone(phone_address(serving.host, port))
         _tell_problems(bench)
         if serving.open_page:
             webbrowser.open(shown)
-        await settle()
+        async with _known_by_name(box, serving, port):
+            await settle()
+            await running
     await running
+
+
+def _box(folder: Path) -> Box | None:
+    """Name and ports of the station. One that cannot be read keeps no server from its work: where
+    it matters, EtherCAT is refused.
+    """
+    try:
+        return read(folder)
+    except NotAllowed as error:
+        print_text("printed.note-beside", words=str(error.text))
+        return None
+
+
+def _tell_phone(address: str) -> None:
+    print_text("printed.scan-code", url=address)
+    print(scan_code(address), flush=True)
+
+
+def _known_by_name(
+    box: Box | None, serving: Serving, port: int
+) -> contextlib.AbstractAsyncContextManager[None]:
+    addresses = addresses_of(box.office) if box is not None else []
+    if box is None or serving.on_loopback or not addresses:
+        return contextlib.nullcontext()
+
+    def failed(cause: str) -> None:
+        print_text("printed.box-name-taken", name=box.name, cause=cause)
+
+    return announced(box, addresses, port, failed)
 
 
 async def settle() -> None:
@@ -112,7 +160,14 @@ async def settle() -> None:
     # One that cannot be read is reported where it is asked for, and keeps no server from its work.
     with contextlib.suppress(ProfileError, OSError, UnicodeDecodeError):
         await asyncio.to_thread(load_all)
+    await asyncio.to_thread(_load_late)
     scheduling.spare_collector()
+
+
+def _load_late() -> None:
+    """Libraries that no page needs at first: a measurement must not wait for them in motion."""
+    for name in LATE:
+        importlib.import_module(name)
 
 
 async def accounts_needed(folder: Path, serving: Serving) -> bool:
@@ -143,20 +198,24 @@ async def accounts_needed(folder: Path, serving: Serving) -> bool:
         people.close()
 
 
-def _certificate(folder: Path, serving: Serving) -> Certificate | None:
+def _certificate(folder: Path, serving: Serving, box: Box | None) -> Certificate | None:
     if serving.certificate is not None and serving.key is not None:
         return own_certificate(serving.certificate, serving.key)
     if serving.certificate is not None or serving.key is not None:
         raise NotAllowed("command.certificate-key-belong-together")
     if serving.on_loopback:
         return None
-    return station_certificate(folder / "tls", machine_names())
+    return station_certificate(folder / "tls", {*machine_names(), *names_of(box)})
 
 
 def _config(
-    bench: Bench, people: People, serving: Serving, certificate: Certificate | None
+    bench: Bench,
+    people: People,
+    serving: Serving,
+    certificate: Certificate | None,
+    own_names: frozenset[str] = frozenset(),
 ) -> AcceptingConfig:
-    names = LOOPBACK
+    names = LOOPBACK | own_names
     if not serving.on_loopback:
         names |= {f"[{n}]" if ":" in n else n for n in machine_names()}
     own = certificate is not None and certificate.own
@@ -204,12 +263,14 @@ def _address(serving: Serving, certificate: Certificate | None, port: int) -> st
 
 
 def _tell(shown: str, people: People, certificate: Certificate | None) -> None:
-    print(f"servodeck is at {shown}  (Ctrl+C ends it)", flush=True)
+    print_text("printed.server-is-at", url=shown)
     if certificate is not None and not certificate.own:
-        print("  the certificate is the station's own; compare its fingerprint once:")
+        print_text("printed.own-certificate")
         print(f"  SHA-256 {certificate.fingerprint}", flush=True)
+        print_text("printed.own-authority")
+        print(f"  SHA-256 {certificate.authority}", flush=True)
     if people.setup_needed:
-        print("  there is no administrator yet; the page asks for this code:")
+        print_text("printed.setup-code")
         print(f"  {people.accounts.setup_code}", flush=True)
 
 
@@ -220,7 +281,7 @@ def _tell_problems(bench: Bench) -> None:
 
     def tell(entry: Entry) -> None:
         if entry.level == "error" and entry.drive is None:
-            print(f"  note: {entry.text}", flush=True)
+            print_text("printed.note-beside", words=str(entry.text))
 
     for entry in reversed(bench.journal.entries()):
         tell(entry)

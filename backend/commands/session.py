@@ -12,6 +12,7 @@ from typing import ParamSpec, TypeVar
 
 import typer
 
+from backend.commands.printing import note, words_of
 from backend.commands.restoring import recall
 from backend.drive.drive import Drive
 from backend.drive.ports import Port
@@ -39,16 +40,16 @@ def reported(code: int = 1) -> Iterator[None]:
         remedy = None if advice is None else advice.words(spoken)
         raise _reported(error.text.words(spoken), remedy, code) from error
     except ProfileError as error:
-        raise _reported(str(error), "see `servodeck profile check`", code) from error
+        raise _reported(str(error), words_of("printed.see-profile-check"), code) from error
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
         raise _reported(f"{place}{error.strerror or error}", None, code) from error
 
 
 def _reported(message: str, remedy: str | None, code: int) -> typer.Exit:
-    print(f"error: {message}", file=sys.stderr)
+    note("printed.error", message=message)
     if remedy:
-        print(f"try:   {remedy}", file=sys.stderr)
+        note("printed.remedy", remedy=remedy)
     return typer.Exit(code)
 
 
@@ -57,7 +58,7 @@ def run(work: Callable[[], Awaitable[T]], *, error_code: int = 1) -> T:
     try:
         return _run(work, error_code)
     except KeyboardInterrupt:
-        print("cancelled", file=sys.stderr)
+        note("printed.cancelled")
         raise typer.Exit(130) from None
 
 
@@ -79,7 +80,7 @@ def run_in_order(work: Callable[[], Awaitable[T]]) -> T:
         try:
             return _run(work)
         except KeyboardInterrupt:
-            print("cancelled; the axis is disabled, its settings are as before", file=sys.stderr)
+            note("printed.cancelled-axis-disabled")
             raise typer.Exit(130) from None
 
 

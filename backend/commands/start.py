@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from backend.commands.keep import BlobPlace, Database
+from backend.commands.printing import print_text
 from backend.commands.serve import Serving
 from backend.commands.serve import serve as run_server
 from backend.commands.session import until_interrupted
@@ -92,12 +93,12 @@ def demo(
     async def work() -> None:
         with tempfile.TemporaryDirectory(prefix="servodeck-") as folder:
             state = state_folder(config) if config else Path(folder) / "state"
-            print("starting the virtual drives …", flush=True)
+            print_text("printed.starting-virtual")
             with DemoBench(bench, Path(folder) / "wires", state / "nvm", steady=True) as drives:
                 for url, real in drives.addresses.items():
-                    print(f"  {url}  is  {real}")
+                    print_text("printed.wire-is", url=url, real=str(real))
                 for problem in drives.problems:
-                    print(f"  note: {problem}")
+                    print_text("printed.note-beside", words=str(problem))
                 server_bench = Bench(
                     state, drives.wires, database=database, blobs=blobs, names=drives.names
                 )

@@ -133,6 +133,7 @@ def _settings(tool: AnyTool, given: dict[str, Any]) -> Any:
 
 
 inertia = command_of(BY_KIND["inertia"])
+step = command_of(BY_KIND["step"])
 friction = command_of(BY_KIND["friction"])
 brake_test = command_of(BY_KIND["brake-test"])
 first_power = command_of(BY_KIND["first-power"])

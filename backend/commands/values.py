@@ -10,6 +10,7 @@ from typing import NamedTuple, Protocol, TypeVar
 
 import typer
 
+from backend.commands.printing import print_text, words_of
 from backend.parameters import set_file as parameter_set
 from backend.tools.parameters import without
 from drivers.errors import NotAllowed
@@ -91,6 +92,13 @@ D = TypeVar("D", bound=Described)
 
 #: The widest word with bits: a negative one is reported as it is on the wire.
 _WIDEST = 0xFFFF_FFFF
+#: What a row of a comparison is, where its values do not differ.
+_STATUS = {
+    "differs": "printed.row-differs", "same": "printed.row-same",
+    "not_in_drive": "printed.row-not-in-drive", "not_in_file": "printed.row-not-in-file",
+    "invalid": "printed.row-invalid", "read_only": "printed.row-read-only",
+    "energises": "printed.row-energises",
+}  # fmt: skip
 
 
 def finite(key: str, name: str, text: str) -> float:
@@ -129,7 +137,9 @@ def assignment(find: Callable[[str], D], text: str) -> tuple[D, Raw]:
 def line(parameter: Described, reported: Reported) -> str:
     """A parameter and its value."""
     if reported.raw is None:
-        return f"{parameter.key}  {parameter.name}: {reported.error or 'not read'}"
+        return (
+            f"{parameter.key}  {parameter.name}: {reported.error or words_of('printed.not-read')}"
+        )
     label = _label(parameter, reported)
     shown = _in_unit(reported.raw, reported.value, parameter.unit)
     if parameter.bits and isinstance(reported.raw, int):
@@ -194,10 +204,10 @@ def show(rows: Iterable[Compared], *, as_json: bool = False) -> None:
         if row.differs:
             ours = _in_unit(row.drive_raw, row.drive_value, row.unit)
             theirs = _in_unit(row.file_raw, row.file_value, row.unit)
-            print(f"{row.key}  {row.name}: drive {ours} → file {theirs}")
+            print_text("printed.value-differs", key=row.key, name=row.name, drive=ours, file=theirs)
         else:
-            words = f"{row.key}  {row.name}: {row.status.replace('_', ' ')} {row.problem}"
-            print(words.rstrip())
+            status = words_of(_STATUS[row.status])
+            print(f"{row.key}  {row.name}: {status}" + (f" {row.problem}" if row.problem else ""))
 
 
 def chosen(rows: Iterable[Compared], *, yes: bool) -> list[str]:
@@ -210,14 +220,14 @@ def chosen(rows: Iterable[Compared], *, yes: bool) -> list[str]:
     show(rows)
     keys = [row.key for row in rows if row.selected]
     if not keys:
-        print("nothing to write")
-    elif not yes and not typer.confirm(f"Write these {len(keys)} values?"):
+        print_text("printed.nothing-to-write")
+    elif not yes and not typer.confirm(words_of("printed.write-these", count=len(keys))):
         raise NotAllowed("command.nothing-written")
     return keys
 
 
 def loaded(result: Mapping[str, object]) -> bool:
     """Tell what a load did; whether every value was kept."""
-    print(f"written {result['written']}, failed {result['failed']}")
-    print(f"the values before are in {result['backup']}")
+    print_text("printed.set-loaded", written=str(result["written"]), failed=str(result["failed"]))
+    print_text("printed.values-before", file=str(result["backup"]))
     return result["failed"] == 0

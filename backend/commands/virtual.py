@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from backend.commands.printing import print_text
 from backend.commands.session import until_interrupted
 from backend.station.demo import DemoBench
 from drivers.computer.signals import until_asked_to_end
@@ -35,7 +36,9 @@ def virtual(
         try:
             spec = load_mechanics(mechanics) if mechanics else standard_mechanics()
         except (OSError, ValueError) as error:
-            raise NotAllowed(f"{mechanics}: {error}", remedy="correct the file") from error
+            raise NotAllowed(
+                "command.mechanics-file", file=str(mechanics), cause=str(error)
+            ) from error
         with tempfile.TemporaryDirectory(prefix="servodeck-") as folder:
             file = Path(folder) / "bench.json"
             axis = {
@@ -48,7 +51,9 @@ def virtual(
             file.write_text(json.dumps({"axis": [axis]}), "utf-8")
             with _one_drive(file, Path(folder), nvm) as drives:
                 for real in drives.addresses.values():
-                    print(f"{drive} answers at {real} station {station}  (Ctrl+C ends it)")
+                    print_text(
+                        "printed.virtual-answers", drive=drive, url=str(real), station=station
+                    )
                 sys.stdout.flush()
                 await until_asked_to_end()
 

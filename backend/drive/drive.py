@@ -67,7 +67,7 @@ class Drive:
         self.profile = profile
         self.ports = tuple(ports)
         self.found: Found | None = None
-        self.identity_warning = ""
+        self.identity_warning: Text | None = None
         self.readings: dict[str, Reading] = {}
         self._changes = ChangeMarks()
         self.listeners = DriveListeners()
@@ -103,11 +103,11 @@ class Drive:
             if port.carries(parameter):
                 return port
         raise NotAllowed(
-            f"{self.name}: {parameter.key} {parameter.name} cannot be reached: "
-            + self.unreachable_why(parameter),
+            "drive.object-cannot-be-reached",
             drive=self.name,
             parameter=parameter.key,
-            remedy="connect the drive over that port too",
+            name=parameter.name,
+            why=self.unreachable_why(parameter),
         )
 
     def unreachable_why(self, parameter: Parameter) -> str:
@@ -399,7 +399,7 @@ class Drive:
             return
         self.port_for(parameter)
         error = refused(self.name, self.profile, parameter)
-        self.listeners.refused(Refusal(self.id, self.name, parameter.key, value, error.message))
+        self.listeners.refused(Refusal(self.id, self.name, parameter.key, value, error.text))
         raise error
 
     async def _require_harmless(self, parameter: Parameter) -> None:
@@ -438,7 +438,7 @@ class Drive:
             reading = await self._send_and_read(port, parameter, value, permitted)
         except BaseException as error:
             # A cancelled write may have reached the drive as well.
-            problem = error.message if isinstance(error, DriveError) else "interrupted"
+            problem = error.text if isinstance(error, DriveError) else text("drive.interrupted")
             self._tell_write(parameter, before, value, None, problem)
             raise
         self._tell_write(parameter, before, value, reading.raw)
@@ -475,7 +475,7 @@ class Drive:
         before: Raw | None,
         wanted: Raw,
         after: Raw | None,
-        problem: str = "",
+        problem: Text | None = None,
     ) -> None:
         self.pending_restores.sent(parameter.key, wanted, after)
         record = WriteRecord(
@@ -489,7 +489,7 @@ class Drive:
         Raises:
             NotAllowed: another one answers, and nobody has accepted it.
         """
-        if self.identity_warning:
+        if self.identity_warning is not None:
             raise NotAllowed(
                 "drive.nothing-written", drive=self.name, identity_warning=self.identity_warning
             )
@@ -549,14 +549,14 @@ class Drive:
             await port.link.write(port.station, address_of(parameter), encode(parameter.type, raw))
         except BaseException as error:
             # A cancelled command may have reached the drive as well.
-            problem = error.message if isinstance(error, DriveError) else "interrupted"
+            problem = error.text if isinstance(error, DriveError) else text("drive.interrupted")
             self._tell_command(parameter, raw, problem)
             if isinstance(error, DriveError):
                 raise named(self.name, error, parameter, raw) from error
             raise
         self._tell_command(parameter, raw)
 
-    def _tell_command(self, parameter: Parameter, raw: int, problem: str = "") -> None:
+    def _tell_command(self, parameter: Parameter, raw: int, problem: Text | None = None) -> None:
         record = CommandRecord(self.id, self.name, parameter.key, parameter.name, raw, problem)
         self.listeners.commanded(record)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from backend.drive.drive import Drive
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address
+from drivers.texts.message import text
 
 
 async def read_serial(drive: Drive) -> int | None:
@@ -35,8 +36,7 @@ async def confirm_identity(drive: Drive) -> None:
     if known is not None:
         serial = await read_serial(drive)
         if serial is not None and serial != known:
-            drive.identity_warning = (
-                f"{drive.name} had serial number {known}; the drive that answers here now "
-                f"has {serial}"
+            drive.identity_warning = text(
+                "drive.another-serial", drive=drive.name, known=str(known), serial=str(serial)
             )
     drive.require_identity()

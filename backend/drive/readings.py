@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from drivers.texts.message import Text
 from profiles.schema import Raw
 
 
@@ -36,7 +37,7 @@ class WriteRecord:
     before: Raw | None
     wanted: Raw
     after: Raw | None
-    problem: str = ""
+    problem: Text | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +49,7 @@ class CommandRecord:
     key: str
     parameter: str
     raw: int
-    problem: str = ""
+    problem: Text | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,4 +60,4 @@ class Refusal:
     name: str
     key: str
     wanted: Raw
-    why: str
+    why: Text

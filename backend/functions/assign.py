@@ -19,7 +19,7 @@ from backend.motion.doors import door_of
 from backend.motion.grant import NotGranted
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 from profiles.schema import Parameter, Raw
 
 #: For so long the shaft is watched; a drive's own jog turns it at once.
@@ -53,26 +53,26 @@ async def assign(axis: Axis, key: str, raw: Raw, reason: str = "") -> Reading:
         if not await _turns(axis, start):
             return reading
 
-        left: list[str] = []
+        left: list[Text] = []
 
         async def undo() -> None:
             try:
                 if before is not None:
                     await drive.energise(parameter.key, before, grant)
             except DriveError as error:
-                left.append(error.message)
+                left.append(error.text)
             await axis.quick_stop()
 
         await shielded(undo, CLEANUP_TIMEOUT_S, drive.name)
     raise NotAllowed(
-        f"{drive.name}: the axis began to turn with {parameter.key} {parameter.name} = {raw}; "
-        + (f"it could not be put back: {left[0]}" if left else f"it is {before} again")
-        + "; a quick stop was sent",
+        "functions.axis-began-to-turn",
         drive=drive.name,
         parameter=parameter.key,
         value=raw,
-        remedy="use the machine's emergency stop if it still turns; switch the inputs off that "
-        "jog, home or enable before you try again",
+        name=parameter.name,
+        undone=text("functions.could-not-be-restored", cause=left[0])
+        if left
+        else text("functions.is-again", before=before),
     )
 
 

@@ -23,6 +23,7 @@ from backend.people.lease import Leases
 from backend.work.jobs import Job, JobResult, JobRunner, Progress
 from drivers.cia402 import State
 from drivers.errors import NotAllowed, OutOfRange, Rejected
+from drivers.texts import limits
 from drivers.texts.message import Text, text
 from profiles.functions import Forcing, TerminalBits
 
@@ -374,10 +375,16 @@ def require_forcing(drive: Drive, name: str) -> Forcing:
             "functions.no-way-overrule-terminals",
             drive=drive.name,
             value=name,
-            limit=", ".join(each.name for each in found) or "none",
+            limit=limits.one_of(", ".join(each.name for each in found)),
             profile_title=drive.profile.title,
         )
     for place in (spec.enable, spec.value):
         if place is not None and (why := drive.unreachable_why(drive.parameter(place.key))):
-            raise NotAllowed(f"{drive.name}: {place.key}: {why}", drive=drive.name)
+            raise NotAllowed(
+                "drive.object-cannot-be-reached",
+                drive=drive.name,
+                parameter=place.key,
+                name=drive.parameter(place.key).name,
+                why=why,
+            )
     return spec

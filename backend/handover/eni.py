@@ -25,6 +25,7 @@ from backend.handover.esi import SlaveController
 from backend.handover.model import AxisHandover, MappedEntry, MappedPdo
 from backend.handover.xml_lists import child, file_of, init_command, init_commands, note
 from drivers.errors import NotAllowed
+from drivers.texts import limits
 
 #: Datagram commands (ETG.1000.4 clause 5.4).
 _BRD, _BWR, _LRW, _ARMW = 7, 8, 12, 13
@@ -78,7 +79,7 @@ def _places(axes: Sequence[AxisHandover]) -> list[Place]:
     if total > _FRAME - 100:
         raise NotAllowed(
             "handover.process-data-drives-take",
-            limit=f"{_FRAME - 100} bytes",
+            limit=limits.size(_FRAME - 100),
             axes=len(axes),
             total_bytes=total,
             frame=_FRAME - 100,

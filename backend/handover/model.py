@@ -231,9 +231,8 @@ def hand_over(
         writes.append(write_of(parameter, row.raw))
     if not writes:
         raise NotAllowed(
-            "nothing of the set can be handed over"
-            + (f" ({left[0].key}: {left[0].reason})" if left else ""),
-            remedy="choose other rows",
+            "handover.nothing-to-hand-over",
+            why=f" ({left[0].key}: {left[0].reason})" if left else "",
         )
     writes.sort(key=lambda w: (rank(profile, profile.by_key[w.key]), w.index, w.subindex))
     return _axis(content, profile, writes, left)

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
-from scipy.stats import t as student_t
+import scipy
 
 from backend.tools.health.result import HealthRound, HealthValue, Quantity
 
@@ -192,4 +192,4 @@ def _error(before: Sequence[_Sample], now: Sequence[_Sample]) -> float:
 
 @lru_cache(maxsize=512)
 def _quantile(level: float, freedom: int) -> float:
-    return float(student_t.ppf(1.0 - 0.5 * level, freedom))
+    return float(scipy.special.stdtrit(freedom, 1.0 - 0.5 * level))

@@ -14,8 +14,8 @@ from sqlalchemy import Select, func, select
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, selectinload
 
+from backend.audit.facts import Action, Value
 from backend.audit.facts import Fact as AuditFact
-from backend.audit.facts import Value
 from backend.library import rows
 from backend.library.entries import (
     MAX_NOTES,
@@ -32,6 +32,8 @@ from backend.store.database import DatabaseFailed, Store
 from backend.store.library_tables import Content, Item, Tag
 from backend.store.library_tables import Version as VersionRow
 from drivers.errors import NotAllowed
+from drivers.texts import limits
+from drivers.texts.message import text
 
 INLINE = 1_000_000
 #: Longer than any storing takes.
@@ -194,7 +196,7 @@ class Library:
             NotInLibrary: no such entry. NotAllowed: too long or too many.
         """
         if notes is not None and len(notes) > MAX_NOTES:
-            raise NotAllowed("library.notes-too-long", limit=f"{MAX_NOTES} characters")
+            raise NotAllowed("library.notes-too-long", limit=limits.signs(MAX_NOTES))
         if tags is not None:
             tags = _clean(tags)
         with self.store.writing() as session:
@@ -292,7 +294,7 @@ class Library:
             raise NotInLibrary("library.no-entry-library", value=entry_id)
         return item
 
-    def _tell(self, action: str, entry: Entry, **detail: Value) -> None:
+    def _tell(self, action: Action, entry: Entry, **detail: Value) -> None:
         facts: dict[str, Value] = {
             "kind": entry.kind, "version": entry.latest.number, "sha256": entry.latest.sha256,
         }  # fmt: skip
@@ -328,7 +330,10 @@ def _version(item: Item, number: int | None) -> VersionRow:
     row = next((v for v in reversed(item.versions) if number in (None, v.number)), None)
     if row is None:
         raise NotInLibrary(
-            "library.no-version", value=number, limit=f"1 to {len(item.versions)}", item=item.name
+            "library.no-version",
+            value=number,
+            limit=limits.between(1, len(item.versions)),
+            item=item.name,
         )
     return row
 
@@ -347,6 +352,6 @@ def _clean(tags: tuple[str, ...]) -> tuple[str, ...]:
     found.pop("", None)
     if len(found) > MAX_TAGS or any(len(tag) > MAX_TAG for tag in found):
         raise NotAllowed(
-            "library.too-many-tags-too", limit=f"{MAX_TAGS} tags of {MAX_TAG} characters"
+            "library.too-many-tags-too", limit=text("limit.tags", tags=MAX_TAGS, count=MAX_TAG)
         )
     return tuple(found)

@@ -15,6 +15,7 @@ from backend.library.entries import Addition, Entry
 from backend.library.index import Index
 from backend.store.files import StorageFailed, write_atomically
 from drivers.errors import NotAllowed
+from drivers.texts import limits
 
 #: Contents pass through the memory on their way to and from the store.
 MOST_BYTES = 256 << 20
@@ -40,7 +41,7 @@ def share(library: Library, index: Index, entry: Entry) -> Entry:
     size = path.stat().st_size
     if size > MOST_BYTES:
         raise NotAllowed(
-            "library.too-large-library", value=size, limit=f"{MOST_BYTES} bytes", entry=entry.name
+            "library.too-large-library", value=size, limit=limits.size(MOST_BYTES), entry=entry.name
         )
     latest = entry.latest
     facts = {name: value for name, value in latest.facts.items() if name != _STAMP}

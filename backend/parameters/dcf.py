@@ -8,6 +8,7 @@ from datetime import datetime
 from backend.drive.readings import Reading
 from backend.parameters.csv_list import ParameterList
 from backend.parameters.set_file import BadSet, Row
+from drivers.texts.message import reason_of
 from profiles.importer import (
     ImportFailed,
     ImportReport,
@@ -61,7 +62,7 @@ def read_dcf(data: bytes, profile: Profile, name: str = "the file") -> Parameter
             else:
                 readings[key] = Reading(key, raw, parameter.to_value(raw), None)
     except ImportFailed as error:
-        raise BadSet(str(error), remedy="choose a DCF file, or a CSV list") from error
+        raise BadSet(reason_of(error), remedy="sets.choose-dcf-or-csv") from error
     problems += [str(finding) for finding in report.findings]
     if not readings:
         first = f" ({problems[0]})" if problems else ""

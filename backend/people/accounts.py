@@ -25,6 +25,7 @@ from backend.people.records import Account, LoginSession, Token, read
 from backend.people.rights import ACCOUNT_ROLES, RIGHTS, Right, Role
 from backend.store.database import Store
 from drivers.errors import NotAllowed
+from drivers.texts.message import text
 
 LONGEST_TOKEN = timedelta(days=366)
 #: No account is called so: a name has no line break.
@@ -252,7 +253,10 @@ class Accounts:
                 beyond=", ".join(sorted(beyond)) or "no scope",
             )
         if not timedelta(0) < lifetime <= LONGEST_TOKEN:
-            raise NotAllowed("people.token-lives-least-minute", limit=f"{LONGEST_TOKEN.days} days")
+            raise NotAllowed(
+                "people.token-lives-least-minute",
+                limit=text("limit.days", count=LONGEST_TOKEN.days),
+            )
         secret, now = new_secret(TOKEN_PREFIX), self._now()
         token = Token(digest(secret), account_id, name, scopes, now, now + lifetime)
         async with self._changing:

@@ -8,6 +8,7 @@ import secrets
 import unicodedata
 
 from drivers.errors import NotAllowed
+from drivers.texts.message import text
 
 #: Letters and digits that are not taken for one another when read aloud or copied by hand.
 _CLEAR = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"
@@ -63,7 +64,7 @@ def checked_person(name: str) -> str:
     """
     name = unicodedata.normalize("NFC", name).strip()
     if not 1 <= len(name) <= 60 or not name.isprintable():
-        raise NotAllowed("people.not-name", limit="1 to 60 printable signs")
+        raise NotAllowed("people.not-name", limit=text("limit.printable", least=1, most=60))
     return name
 
 

@@ -6,6 +6,7 @@ from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
 
 from drivers.errors import NotAllowed
+from drivers.texts.message import text
 
 MIN_LENGTH = 10
 MAX_LENGTH = 200
@@ -44,7 +45,7 @@ def require_good(password: str, name: str) -> None:
     if not MIN_LENGTH <= len(password) <= MAX_LENGTH:
         raise NotAllowed(
             "people.password-needs-characters",
-            limit=f"{MIN_LENGTH} to {MAX_LENGTH} characters",
+            limit=text("limit.length", least=MIN_LENGTH, most=MAX_LENGTH),
             min_length=MIN_LENGTH,
             max_length=MAX_LENGTH,
         )

@@ -21,6 +21,8 @@ from backend.people.identity import Identity
 from backend.people.rights import GRANTABLE, MOVING, RIGHTS, Right, Role
 from backend.people.throttle import Throttle
 from drivers.errors import NotAllowed
+from drivers.texts import limits
+from drivers.texts.message import text
 
 #: The enabling button counts as released this long after the last sign of life. With the 20 ms
 #: between looks (`backend.api.live.watch`) a silent page stops the motion within 200 ms.
@@ -128,7 +130,7 @@ class Support:
             raise NotAllowed(
                 "people.invitation-lasts-minute-day",
                 value=lifetime_s,
-                limit=f"60 to {LONGEST_INVITATION_S:.0f} s",
+                limit=limits.between(60, LONGEST_INVITATION_S, "s"),
             )
         if beyond := allowed - GRANTABLE:
             raise NotAllowed(
@@ -246,14 +248,14 @@ class Support:
         if beyond := rights - found.allowed:
             raise NotAllowed(
                 "people.invitation-not-allow",
-                limit=", ".join(sorted(found.allowed)) or "look only",
+                limit=", ".join(sorted(found.allowed)) or text("limit.look-only"),
                 beyond=", ".join(sorted(beyond)),
             )
         if not rights or not 10.0 <= time_s <= LONGEST_GRANT_S:
             raise NotAllowed(
                 "people.grant-names-right-lasts",
                 value=time_s,
-                limit=f"10 to {LONGEST_GRANT_S:.0f} s",
+                limit=limits.between(10, LONGEST_GRANT_S, "s"),
             )
         found.grant = Grant(rights, self._ticks() + time_s, drive, by)
         self._changed()
@@ -337,7 +339,7 @@ class Support:
         """
         text = text.strip()
         if not 1 <= len(text) <= CHAT_LENGTH:
-            raise NotAllowed("people.line-500-signs", limit=f"{CHAT_LENGTH} signs")
+            raise NotAllowed("people.line-500-signs", limit=limits.signs(CHAT_LENGTH))
         self._said += 1
         said = Said(self._said, time.time(), identity.person, identity.is_guest, text)
         self._chat.append(said)

@@ -17,6 +17,7 @@ from backend.preflight.findings import Fix
 from drivers.computer.host_facts import HostFacts
 from drivers.computer.host_settings import HostSettings, Setting, affinity, command
 from drivers.errors import NotAllowed
+from drivers.texts.message import text
 
 RESTORE_LIST = "preflight-restore.json"
 _QUICK_IDLE_US = 20
@@ -86,8 +87,9 @@ class Fixes:
             raise NotAllowed(
                 "preflight.cannot-set",
                 value=change.after,
-                remedy="as the administrator of the computer: "
-                + command(change.setting, change.after),
+                remedy=text(
+                    "preflight.as-administrator", command=command(change.setting, change.after)
+                ),
                 setting=change.setting.place,
                 strerror=error.strerror or str(error),
             ) from error

@@ -20,6 +20,7 @@ from backend.store.files import StorageFailed
 from backend.store.free_space import RESERVE_BYTES, free_bytes
 from drivers.computer.files import write_parts
 from drivers.link import ScopeBlock
+from drivers.texts import limits
 
 #: Blocks that may wait for the disk. At 16 channels × 4 kHz it holds two minutes.
 MAX_QUEUED_BYTES = 64 * 1024 * 1024
@@ -256,7 +257,7 @@ class RecordingWriter:
             raise StorageFailed(
                 "recording.disk-nearly-full-mib-left",
                 value=free,
-                limit=f"{self._reserve >> 20} MiB stay free",
+                limit=limits.stays_free(self._reserve),
                 path=self.path.name,
                 free_mib=free >> 20,
             )

@@ -18,8 +18,8 @@ from backend.report.numbers import (
 from backend.report.plot import Curve, Plot
 from backend.report.texts import Words
 from backend.report.tools import kind_title, tool_blocks
-from backend.report.views import StepView, SweepView
-from backend.tools.tool import ToolResult
+from backend.report.views import SweepView
+from backend.tools.step.result import StepAnswer
 
 #: Reported apart in print and by the colour-blind: dark blue, orange.
 _NOW, _EARLIER, _DEMAND = "#1a5c94", "#c2571a", "#5b6770"
@@ -33,12 +33,12 @@ def chapter(measured: Measured, words: Words) -> list[Block]:
     """Everything about one measurement."""
     blocks: list[Block] = [Heading(kind_title(measured.kind, words), 3)]
     view = measured.view
-    if isinstance(view, ToolResult):
-        blocks += tool_blocks(measured.kind, view, words)
+    if isinstance(view, StepAnswer):
+        blocks += _step(measured, view, words)
     elif isinstance(view, SweepView):
         blocks += _sweep(measured, view, words)
     else:
-        blocks += _step(measured, view, words)
+        blocks += tool_blocks(measured.kind, view, words)
     return [*blocks, *_origin(measured, words)]
 
 
@@ -186,9 +186,9 @@ def _compared(
 # --- steps -----------------------------------------------------------------------------
 
 
-def _step(measured: Measured, view: StepView, words: Words) -> list[Block]:
+def _step(measured: Measured, view: StepAnswer, words: Words) -> list[Block]:
     earlier = measured.earlier.view if measured.earlier else None
-    other = earlier if isinstance(earlier, StepView) else None
+    other = earlier if isinstance(earlier, StepAnswer) else None
     ends = (0.0, max(view.time_s[-1], other.time_s[-1] if other else 0.0))
     name = words("speed" if view.kind == "speed" else "position")
     now, before = (words("after"), words("before")) if other else ("", "")
@@ -211,7 +211,7 @@ def _step(measured: Measured, view: StepView, words: Words) -> list[Block]:
     return [figure, _compared(names, column, _numbers(other, words)[1] if other else None, words)]
 
 
-def _numbers(view: StepView, words: Words) -> tuple[list[str], list[str]]:
+def _numbers(view: StepAnswer, words: Words) -> tuple[list[str], list[str]]:
     rows: list[tuple[str, str]] = []
     if view.step is not None:
         rows += [

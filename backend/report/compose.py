@@ -21,7 +21,8 @@ from backend.report.handed_over import handed_over
 from backend.report.numbers import NONE, fixed, hertz, margin, milliseconds, moment, significant
 from backend.report.texts import Words
 from backend.report.tools import kind_title, tool_verdict
-from backend.report.views import StepView, SweepView
+from backend.report.views import SweepView
+from backend.tools.step.result import StepAnswer
 from backend.tools.tool import ToolResult
 
 #: docs/tuning.md: 45° or more is calm, 8 dB or more, Ms below 2; and what is no longer sound.
@@ -100,10 +101,10 @@ def _is_loop(measured: Measured) -> bool:
 
 def _verdict(measured: Measured, words: Words) -> Note:
     view, kind = measured.view, kind_title(measured.kind, words)
+    if isinstance(view, StepAnswer):
+        return _step_verdict(view, kind, words)
     if isinstance(view, ToolResult):
         return tool_verdict(measured.kind, view, words)
-    if isinstance(view, StepView):
-        return _step_verdict(view, kind, words)
     if view.kind == "mechanics":
         peaks = [hertz(r.frequency_hz) for r in view.resonances if r.kind == "resonance"]
         if not view.trusted:
@@ -113,7 +114,7 @@ def _verdict(measured: Measured, words: Words) -> Note:
     return _loop_verdict(view, kind, words)
 
 
-def _step_verdict(view: StepView, kind: str, words: Words) -> Note:
+def _step_verdict(view: StepAnswer, kind: str, words: Words) -> Note:
     numbers = view.step or view.move
     settled = numbers is not None and numbers.settling_s is not None
     settling = milliseconds(numbers.settling_s) if numbers and settled else words("not_reached")
@@ -193,7 +194,7 @@ def _stale(facts: Facts, words: Words) -> list[Note]:
     last = facts.last_change
     if last is None:
         return []
-    shown = [m for m in facts.measured if _is_loop(m) or isinstance(m.view, StepView)]
+    shown = [m for m in facts.measured if _is_loop(m) or isinstance(m.view, StepAnswer)]
     old = [m for m in shown if m.saved < last]
     if not facts.changes and not old:
         # What was tried and taken back needs no proof.

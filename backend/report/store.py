@@ -11,7 +11,6 @@ from backend.report.compose import compose
 from backend.report.document import Language
 from backend.report.facts import Facts
 from backend.report.html import render_html
-from backend.report.pdf import render_pdf
 from backend.store.files import checked_name, write_atomically
 from drivers.errors import NotAllowed
 
@@ -23,7 +22,12 @@ _UNSAFE = re.compile(r"[^\w.\-]+")
 def render(facts: Facts, language: Language, form: Format) -> bytes:
     """A report as a file's contents."""
     document = compose(facts, language)
-    return render_html(document) if form == "html" else render_pdf(document)
+    if form == "html":
+        return render_html(document)
+    # Loaded by the first PDF, or by a server behind its start (`backend.commands.serve`).
+    from backend.report.pdf import render_pdf
+
+    return render_pdf(document)
 
 
 class ReportStore:

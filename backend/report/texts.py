@@ -74,7 +74,6 @@ TEXTS: dict[str, tuple[str, str]] = {
     "when": ("Written", "写入时间"),
     "measurements": ("Measurements", "测量"),
     "measurements.none": ("No measurement is part of this report.", "本报告不含测量。"),
-    "kind.inertia": ("Inertia and friction", "惯量与摩擦"),
     "kind.sweep-mechanics": ("Frequency response of the mechanics", "机械频率响应"),
     "kind.sweep-speed_loop": ("Frequency response of the speed loop", "速度环频率响应"),
     "kind.sweep-position_loop": ("Frequency response of the position loop", "位置环频率响应"),

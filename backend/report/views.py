@@ -55,41 +55,7 @@ class SweepView(View):
         return [each.words(language) for each in messages_in(facts, "warnings", "warning")]
 
 
-class StepNumbers(View):
-    """Read-outs of a step of speed."""
-
-    overshoot_percent: float
-    rise_s: float | None
-    settling_s: float | None
-
-
-class MoveNumbers(View):
-    """Read-outs of a move."""
-
-    following_peak: float
-    following_rms: float
-    overshoot: float
-    settling_s: float | None
-
-
-class StepView(View):
-    """A step or move; lists [n] over ``time_s``."""
-
-    kind: Literal["speed", "move"]
-    unit: str
-    time_s: list[float]
-    demand: list[float]
-    actual: list[float]
-    torque_percent: list[float]
-    step: StepNumbers | None
-    move: MoveNumbers | None
-    torque_peak_percent: float
-    torque_rms_percent: float
-    window: float | None = None
-    widened: bool = False
-
-
-AnyView = SweepView | StepView | ToolResult
+AnyView = SweepView | ToolResult
 
 
 def view_of(tool: object, result: dict[str, object]) -> AnyView:
@@ -99,8 +65,8 @@ def view_of(tool: object, result: dict[str, object]) -> AnyView:
         BadMeasurement: it is not what that tool concludes.
     """
     kinds: dict[object, type[AnyView]] = {
-        "sweep": SweepView, "step": StepView,
-    }  # fmt: skip
+        "sweep": SweepView,
+    }
     known = BY_KIND.get(str(tool))
     kind = known.result if known is not None else kinds.get(tool)
     if kind is None:

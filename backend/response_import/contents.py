@@ -18,6 +18,8 @@ import numpy as np
 from backend.analysis.signals.arrays import FloatArray
 from backend.response_import.errors import BadRecording
 from backend.response_import.matlab import read_matlab
+from drivers.texts import limits
+from drivers.texts.message import text as message
 
 #: Bytes as they come, and unpacked; rows and columns of a table.
 MAX_FILE_BYTES = 64 << 20
@@ -57,7 +59,7 @@ def read_table(data: bytes, name: str) -> Table:
     """
     if len(data) > MAX_FILE_BYTES:
         raise BadRecording(
-            "import.bytes", value=len(data), limit=f"{MAX_FILE_BYTES} bytes", name=name
+            "import.bytes", value=len(data), limit=limits.size(MAX_FILE_BYTES), name=name
         )
     if not data:
         raise BadRecording("import.empty", value=0, name=name)
@@ -82,7 +84,7 @@ def _unpacked(data: bytes, name: str) -> bytes:
         raise BadRecording(
             "import.unpacks-more-bytes",
             value=name,
-            limit=f"{MAX_UNPACKED_BYTES} bytes",
+            limit=limits.size(MAX_UNPACKED_BYTES),
             max_unpacked_bytes=MAX_UNPACKED_BYTES,
         )
     return plain
@@ -209,7 +211,12 @@ def _from_text(text: str, name: str) -> Table:
     # Only line ends: other characters that Python splits at occur inside units.
     lines = re.split(r"\r\n|\n|\r", text)
     if len(lines) > MAX_ROWS + _HEAD_LINES:
-        raise BadRecording("import.lines", value=len(lines), limit=f"{MAX_ROWS} lines", name=name)
+        raise BadRecording(
+            "import.lines",
+            value=len(lines),
+            limit=message("limit.lines", count=MAX_ROWS),
+            name=name,
+        )
     layout = _layout(lines[:_HEAD_LINES], name)
     if layout.width > MAX_COLUMNS:
         raise BadRecording("import.columns", value=layout.width, limit=str(MAX_COLUMNS), name=name)
@@ -239,7 +246,7 @@ def _numbers(rows: list[str], layout: _Layout, name: str) -> tuple[FloatArray, .
             raise BadRecording(
                 "import.line-columns-table",
                 value=line[:80],
-                limit=f"{layout.width} columns",
+                limit=message("limit.columns", count=layout.width),
                 name=name,
                 first=layout.first + 1 + i,
                 cells=len(cells),

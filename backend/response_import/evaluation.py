@@ -25,6 +25,7 @@ from backend.response_import.contents import Table, read_table
 from backend.response_import.errors import BadRecording
 from backend.response_import.signals import Signals, signals_of
 from backend.response_import.units import Scale, scale_of
+from drivers.texts import limits
 from drivers.texts.answers import sentences
 from drivers.texts.message import Text, text
 
@@ -113,18 +114,24 @@ def _check(settings: ImportSettings, scale: Scale) -> None:
         ("current bandwidth", settings.current_bandwidth_hz),
     ):
         if value is not None and not 0.1 <= value <= 1e5:
-            raise BadRecording("import.hz", parameter=what, value=value, limit="0.1 Hz to 100 kHz")
+            raise BadRecording(
+                "import.hz", parameter=what, value=value, limit=limits.between(0.1, 100e3, "Hz")
+            )
     if settings.loop_delay_s is not None and not 0.0 <= settings.loop_delay_s <= 0.1:
         raise BadRecording(
             "import.loop-delay",
             parameter="loop delay",
             value=settings.loop_delay_s,
-            limit="0 to 0.1 s",
+            limit=limits.between(0.0, 0.1, "s"),
         )
     low, high = settings.band_hz or (1.0, 2.0)
     if not 0.0 <= low < high:
         raise BadRecording(
-            "import.band-hz", parameter="band", value=low, limit=f"below {high:g}", high_hz=high
+            "import.band-hz",
+            parameter="band",
+            value=low,
+            limit=limits.below(high, "Hz"),
+            high_hz=high,
         )
 
 
@@ -154,7 +161,7 @@ def _reported(error: NoResponse, name: str, signals: Signals) -> BadRecording:
         return BadRecording(
             "import.samples",
             value=facts["samples"],
-            limit=f"at least {facts['least']:.0f}",
+            limit=limits.at_least(round(facts["least"])),
             name=name,
             facts=facts["samples"],
         )

@@ -12,6 +12,8 @@ import numpy.typing as npt
 
 from backend.analysis.signals.arrays import FloatArray
 from backend.response_import.errors import BadRecording
+from drivers.texts import limits
+from drivers.texts.message import text
 
 _MAX_UNPACKED = 512 << 20
 _MOST = 256
@@ -27,7 +29,7 @@ def read_matlab(data: bytes, name: str) -> tuple[tuple[str, ...], tuple[FloatArr
     """
     if data[:8] == b"\x89HDF\r\n\x1a\n" or data[512:520] == b"\x89HDF\r\n\x1a\n":
         raise BadRecording(
-            "import.matlab-file-version-hdf5", value="7.3", limit="version 7", name=name
+            "import.matlab-file-version-hdf5", value="7.3", limit=text("limit.version-7"), name=name
         )
     five = data[:6] == b"MATLAB" or (len(data) > 128 and data[126:128] in {b"IM", b"MI"})
     if not five:
@@ -76,7 +78,7 @@ def _refuse_bomb(data: bytes, name: str) -> None:
             raise BadRecording(
                 "import.unpacks-more-bytes-save-fewer",
                 value=name,
-                limit=f"{_MAX_UNPACKED} bytes",
+                limit=limits.size(_MAX_UNPACKED),
                 max_unpacked_bytes=_MAX_UNPACKED,
             )
         place += 8 + size

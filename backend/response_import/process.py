@@ -23,7 +23,7 @@ from backend.response_import.evaluation import ImportSettings, evaluate_signals,
 from backend.response_import.preview import preview
 from backend.response_import.stored import pack_import
 from drivers.computer.processes import limit_memory
-from drivers.texts.message import Text, text
+from drivers.texts.message import Text, prose, text
 
 #: An evaluation that takes longer is ended: the largest file takes a fraction of it.
 LIMIT_S = 120.0
@@ -87,10 +87,11 @@ async def import_in_process(task: ImportTask, limit_s: float = LIMIT_S) -> dict[
         ) from None
     if "error" in answer:
         refused = answer["error"]
-        remedy = refused.pop("remedy")
+        remedy, limit = refused.pop("remedy"), refused.pop("limit")
         raise BadRecording(
             Text.from_wire(refused.pop("text")),
             remedy=None if remedy is None else Text.from_wire(remedy),
+            limit=None if limit is None else Text.from_wire(limit),
             **refused,
         )
     result: dict[str, Any] = answer["ok"]
@@ -108,14 +109,14 @@ def main() -> None:
     except BadRecording as error:
         answer = {"error": {
             "text": error.text.to_wire(), "parameter": error.parameter, "value": error.value,
-            "limit": error.limit,
+            "limit": None if error.limit_text is None else error.limit_text.to_wire(),
             "remedy": None if error.own_remedy is None else error.own_remedy.to_wire(),
         }}  # fmt: skip
     except MemoryError:
         most_gib = _MEMORY_BYTES >> 30
         answer = {"error": {
             "text": text("import.too-much-memory", name=task.name, most_gib=most_gib).to_wire(),
-            "value": task.name, "limit": f"{most_gib} GiB", "remedy": None,
+            "value": task.name, "limit": prose(f"{most_gib} GiB").to_wire(), "remedy": None,
         }}  # fmt: skip
     json.dump(answer, sys.stdout, default=float)
 

@@ -11,6 +11,8 @@ from backend.analysis.response.foreign import LEAST_SAMPLES
 from backend.analysis.signals.arrays import FloatArray
 from backend.response_import.contents import Table
 from backend.response_import.errors import BadRecording
+from drivers.texts import limits
+from drivers.texts.message import text
 
 #: Steps of time may differ from their median by this share: a clock that is written in few digits.
 _JITTER = 0.1
@@ -55,7 +57,7 @@ def column_of(table: Table, wanted: str, use: str, name: str) -> int:
                 "import.column-times",
                 parameter=use,
                 value=wanted,
-                limit=f"one of the columns {numbers}",
+                limit=text("limit.one-of-columns", numbers=numbers),
                 name=name,
                 fits=len(fits),
             )
@@ -66,7 +68,7 @@ def column_of(table: Table, wanted: str, use: str, name: str) -> int:
         "import.no-column",
         parameter=use,
         value=wanted,
-        limit=f"1 to {len(table.columns)}",
+        limit=limits.between(1, len(table.columns)),
         name=name,
         listed=listed,
     )
@@ -116,7 +118,9 @@ def signals_of(
                 "import.column-constant-2",
                 parameter=use,
                 value=float(values[0]),
-                remedy=f"give the column of the {'excitation' if use == 'input' else 'motion'}",
+                remedy="import.give-column-of-excitation"
+                if use == "input"
+                else "import.give-column-of-motion",
                 name=name,
                 names=table.names[column],
             )
@@ -154,7 +158,10 @@ def _complete(table: Table, used: list[int], name: str) -> list[FloatArray]:
         raise BadRecording("import.vectors-differ-length", value=sizes, name=name)
     if end < LEAST_SAMPLES:
         raise BadRecording(
-            "import.samples-record-longer", value=end, limit=f"at least {LEAST_SAMPLES}", name=name
+            "import.samples-record-longer",
+            value=end,
+            limit=limits.at_least(LEAST_SAMPLES),
+            name=name,
         )
     for i, values in zip(used, columns, strict=True):
         bad = np.flatnonzero(~np.isfinite(values[:end]))
@@ -178,7 +185,7 @@ def _check_rate(rate: float, name: str, what: str) -> None:
             "import.hz-give-unit",
             parameter="time",
             value=rate,
-            limit=f"{_SLOWEST_HZ:g} Hz to {_FASTEST_HZ:g} Hz",
+            limit=limits.between(_SLOWEST_HZ, _FASTEST_HZ, "Hz"),
             name=name,
             what=what,
         )
@@ -242,7 +249,7 @@ def _clock(
             "import.ms-after-row-before",
             parameter="time",
             value=float(steps[at]),
-            limit=f"within {_JITTER:.0%} of {usual * 1e3:.6g} ms",
+            limit=text("limit.jitter", percent=100 * _JITTER, usual_ms=usual * 1e3),
             name=name,
             place=place(row),
             steps_ms=steps[at] * 1e3,

@@ -7,6 +7,7 @@ from math import pi
 from typing import Literal
 
 from backend.response_import.errors import BadRecording
+from drivers.texts import limits
 
 InputUnit = Literal["Nm", "mNm", "A", "mA", "rated", "percent", "permille", "rad/s", "rpm", "1"]
 OutputUnit = Literal["rad/s", "rpm", "rev/s", "deg/s", "m/s", "rad", "rev", "deg", "1"]
@@ -64,13 +65,15 @@ def scale_of(
         if value is None:
             continue
         if not 0.0 < value < 1e6:
-            raise BadRecording("import.detail", parameter=what, value=value, limit="above 0")
+            raise BadRecording(
+                "import.detail", parameter=what, value=value, limit=limits.above_zero()
+            )
         if kind != needs:
             raise BadRecording(
                 "import.says-nothing-input",
                 parameter=what,
                 value=value,
-                limit="rated, percent or permille" if needs == "rated" else "A or mA",
+                limit="rated, percent, permille" if needs == "rated" else "A, mA",
                 input_unit=input_unit,
             )
         factor, kind = factor * value, "Nm"

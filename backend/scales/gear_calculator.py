@@ -19,6 +19,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from drivers.errors import OutOfRange
+from drivers.texts.message import text
 from profiles.schema import Parameter, Profile
 
 _Length = Annotated[float, Field(gt=1e-6, le=1e6, allow_inf_nan=False)]
@@ -217,7 +218,7 @@ def _fit(profile: Profile, value: Fraction, above: str | None, below: str | None
         raise OutOfRange(
             "scales.ratio-not-fit",
             value=float(value),
-            limit=f"up to {most_above:.0f} over {most_below:.0f}",
+            limit=text("limit.up-to-over", above=most_above, below=most_below),
             profile_title=profile.title,
             above=above,
             below=below,
@@ -271,10 +272,11 @@ def _check_bounds(profile: Profile, ratio: Fraction) -> str:
     if not gear.strict:
         return f"{text}. {gear.notes}"
     raise OutOfRange(
-        f"{profile.title}: {text}",
+        "scales.gear-ratio-outside",
         value=float(ratio),
         limit=limit,
-        remedy="choose a coarser or finer user increment",
+        profile=profile.title,
+        fault=gear.fault,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from drivers.errors import NotAllowed
+from drivers.texts.message import Text, text
 
 
 class Quantity(StrEnum):
@@ -57,17 +58,21 @@ class Uncertainty(StrEnum):
 
 
 _WHY: Mapping[Uncertainty, str] = {
-    Uncertainty.NO_RESOLUTION: "increments per revolution are unknown",
-    Uncertainty.FEED_OF_ONE: "6092h says one unit per revolution beside the encoder of 608Fh, "
-    "as a drive does whose feed constant was never set",
-    Uncertainty.UNIT_AND_FEED: "60A8h and 6092h give different numbers of units for a revolution",
-    Uncertainty.LINEAR: "its unit is a length, and how far a revolution goes is unknown",
-    Uncertainty.NOT_STATED: "neither the drive nor its description says in which unit it is",
-    Uncertainty.UNREADABLE: "the unit that the drive or its description states is not known here",
-    Uncertainty.BEHIND_GEAR: "it counts turns, and 6091h holds a gear: of which shaft is not said",
-    Uncertainty.NEEDS_RESOLUTION: "it counts increments, and increments per revolution are unknown",
-    Uncertainty.FACTOR: "6090h is another resolution than 608Fh, or 6096h or 6097h holds a factor: "
-    "what the drive makes of it is not said",
+    Uncertainty.NO_RESOLUTION: "scales.why-no-resolution",
+    Uncertainty.FEED_OF_ONE: "scales.why-feed-of-one",
+    Uncertainty.UNIT_AND_FEED: "scales.why-unit-and-feed",
+    Uncertainty.LINEAR: "scales.why-linear",
+    Uncertainty.NOT_STATED: "scales.why-not-stated",
+    Uncertainty.UNREADABLE: "scales.why-unreadable",
+    Uncertainty.BEHIND_GEAR: "scales.why-behind-gear",
+    Uncertainty.NEEDS_RESOLUTION: "scales.why-needs-resolution",
+    Uncertainty.FACTOR: "scales.why-factor",
+}
+#: A part of a sentence.
+_NAMES: Mapping[Quantity, str] = {
+    Quantity.POSITION: "scales.of-position",
+    Quantity.VELOCITY: "scales.of-velocity",
+    Quantity.ACCELERATION: "scales.of-acceleration",
 }
 
 
@@ -92,9 +97,9 @@ class Scale:
         return self.raw_per_unit is not None
 
     @property
-    def why(self) -> str:
-        """Why it is not certain, as a part of a sentence; empty where it is."""
-        return "" if self.uncertainty is None else _WHY[self.uncertainty]
+    def why(self) -> Text | None:
+        """Why it is not certain, as a part of a sentence; None where it is."""
+        return None if self.uncertainty is None else text(_WHY[self.uncertainty])
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,21 +124,21 @@ class ScaleUnknown(NotAllowed):
     def __init__(self, drive: str, scale: Scale) -> None:
         self.scale = scale
         super().__init__(
-            f"{drive}: the scale of its {scale.quantity.value} is not certain: {scale.why}. "
-            "Nothing is moved by unit",
+            "scales.not-certain",
             drive=drive,
-            limit="a certain scale",
+            quantity=text(_NAMES[scale.quantity]),
+            why=scale.why,
+            limit=text("limit.certain-scale"),
             remedy=what_to_do(scale),
         )
 
 
-def what_to_do(scale: Scale) -> str:
+def what_to_do(scale: Scale) -> Text:
     """How a scale that is not certain becomes so."""
-    teach = "teach it under “Scales” on the Overview page, or by “servodeck scales teach”"
     if scale.uncertainty in (
         Uncertainty.NO_RESOLUTION,
         Uncertainty.FEED_OF_ONE,
         Uncertainty.UNIT_AND_FEED,
     ):
-        return f"set feed constant and gear ratio on the Parameters page, or {teach}"
-    return f"{teach}, or import the drive's own description"
+        return text("scales.set-feed-or-teach")
+    return text("scales.teach-or-import")

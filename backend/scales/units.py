@@ -15,6 +15,7 @@ from backend.scales.scale import Origin, Quantity, Scale, Scales, ScaleUnknown, 
 from backend.scales.taught import Taught
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.feedback import FeedbackScale
+from drivers.texts import limits
 from profiles.schema import Parameter, UnitSpec
 
 #: Raw units per 1 % of rated torque.
@@ -199,7 +200,7 @@ def ramp_raw(units: AxisUnits, drive: Drive, key: str, rpm_per_s: float) -> int:
         drive=drive.name,
         parameter=key,
         value=rpm_per_s,
-        limit=f"at least {gentlest:g} rpm/s",
+        limit=limits.at_least(gentlest, "rpm/s"),
         longest_ms=longest,
         reference_rpm=reference,
         gentlest=gentlest,

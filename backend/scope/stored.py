@@ -16,6 +16,7 @@ from typing import Any
 from backend.store.files import StorageFailed, checked_name, write_atomically
 from backend.store.free_space import RESERVE_BYTES, free_bytes
 from drivers.errors import NotAllowed
+from drivers.texts import limits
 
 SETUP_SUFFIX, SNAPSHOT_SUFFIX = ".json", ".sdsnap"
 MAGIC = b"SDSNAP1\n"
@@ -186,7 +187,7 @@ def _check_room(path: Path, suffix: str, most: int) -> None:
         raise StorageFailed(
             "scope.not-stored-disk-nearly",
             value=free,
-            limit=f"{RESERVE_BYTES >> 20} MiB stay free",
+            limit=limits.stays_free(RESERVE_BYTES),
             path=path.name,
             free_mib=free >> 20,
         )

@@ -36,8 +36,9 @@ from backend.station.records import Records
 from backend.store.files import StorageFailed
 from backend.work.jobs import Job, JobRunner
 from backend.work.journal import Journal, Level
-from drivers.errors import Busy, DriveError, NotAllowed
+from drivers.errors import Busy, DriveError, NotAllowed, why_of
 from drivers.link import Found, Link
+from drivers.texts.message import Text, prose, text
 from profiles.loader import ProfileError
 
 log = logging.getLogger(__name__)
@@ -189,7 +190,8 @@ class Bench:
             self.motion.require_idle(connected)
         drive.ports = (*drive.ports, port)
         self._remember()
-        self.journal.add(f"{drive.name} is reached over {url} too", drive=drive.id)
+        line = text("journal.reached-over-too", drive=drive.name, url=url)
+        self.journal.add(line, drive=drive.id)
         self.drives_changed()
         return connected
 
@@ -228,7 +230,8 @@ class Bench:
         self.reconnection.begin(axis)
         monitor.start()
         self._remember()
-        self.journal.add(f"connected {drive.name} ({drive.profile.title})", drive=drive_id)
+        line = text("journal.connected", drive=drive.name, profile_title=drive.profile.title)
+        self.journal.add(line, drive=drive_id)
         self.drives_changed()
         return connected
 
@@ -315,9 +318,9 @@ class Bench:
         self.recorder.lease_changed(drive_id, self.leases.holder(drive_id))
         self.drives_changed()
 
-    def tell(self, text: str, connected: ConnectedDrive, level: Level = "info") -> None:
+    def tell(self, line: Text, connected: ConnectedDrive, level: Level = "info") -> None:
         """A line of the journal about a drive; the list of drives may have changed with it."""
-        self.journal.add(text, level=level, drive=connected.drive.id)
+        self.journal.add(line, level=level, drive=connected.drive.id)
         self.drives_changed()
 
     def name_of(self, drive_id: str) -> str:
@@ -336,7 +339,7 @@ class Bench:
         drive = connected.drive
         serial = await read_serial(drive)
         drive.found = replace(drive.found or Found(drive.ports[0].station), serial=serial)
-        drive.identity_warning = ""
+        drive.identity_warning = None
         # What was said of the drive that was here before is no matter of this one.
         connected.axis.teach(None)
         connected.axis.small_moves = None
@@ -344,7 +347,8 @@ class Bench:
         if record.scales is not None:
             self.axis_records.put(drive_id, record.model_copy(update={"scales": None}))
         drive.pending_restores.settle([entry.key for entry in drive.pending_restores.entries])
-        self.journal.add(f"{drive.name}: serial number {serial} accepted", drive=drive.id)
+        line = text("journal.serial-accepted", drive=drive.name, serial=str(serial))
+        self.journal.add(line, drive=drive.id)
         self._remember()
         self.drives_changed()
         return connected
@@ -356,8 +360,8 @@ class Bench:
         try:
             self._save()
         except StorageFailed as error:
-            text = f"the list of drives is not stored, a restart begins with the old one: {error}"
-            self.journal.add(text, level="error")
+            line = text("journal.list-not-stored", cause=error.text)
+            self.journal.add(line, level="error")
 
     def _save(self) -> None:
         self._list.store(
@@ -376,7 +380,7 @@ class Bench:
         await self.records.open()
         saved, problems = self._list.load()
         for problem in problems:
-            self.journal.add(problem, level="error")
+            self.journal.add(prose(problem), level="error")
         for item in saved:
             try:
                 first, *others = item.ports
@@ -385,7 +389,8 @@ class Bench:
                 for other in others:
                     await self.add_port(connected.drive.id, other.url, other.station)
             except (DriveError, ProfileError) as error:
-                self.journal.add(f"{item.name}: not connected: {error}", level="warning")
+                line = text("journal.not-connected", drive=item.name, cause=why_of(error))
+                self.journal.add(line, level="warning")
                 continue
             if item.serial is not None:
                 connected.drive.found = Found(first.station, serial=item.serial)

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 from backend.drive.drive import Drive
 from backend.drive.ports import Port
 from backend.people.identity import by_itself
+from backend.station.box.roles import require_not_office
 from drivers.errors import Busy, NotAllowed
 from drivers.link import Found, Link, LinkEvent
-from drivers.texts.message import Text
+from drivers.texts.message import Text, text
 from drivers.urls import link_for
 
 if TYPE_CHECKING:
@@ -37,17 +38,20 @@ class Buses:
         """The opened bus of this URL; opens it on first use.
 
         Raises:
-            LinkLost: it cannot be opened. NotAllowed: no such kind of bus.
+            LinkLost: it cannot be opened. NotAllowed: no such kind of bus, or EtherCAT on the
+                office's port.
         """
         async with self._opening:
             link = self.opened.get(url)
             if link is None:
                 make = self.wires.get(url)
+                if make is None:
+                    require_not_office(self._bench.state_folder, url)
                 link = make() if make is not None else link_for(url)
                 await link.open()
                 link.listen(lambda event: by_itself().run(self._event, url, event))
                 self.opened[url] = link
-                self._bench.journal.add(f"opened {url}")
+                self._bench.journal.add(text("journal.opened", url=url))
                 self._bench.drives_changed()
             return link
 
@@ -100,9 +104,7 @@ class Buses:
                 self._bench.motion.require_idle(connected)
         with self._bench.exchanges.searching(url):
             found = await link.scan(progress, stations, stop_after=1 if stop_after_first else None)
-        self._bench.journal.add(
-            f"{url}: {len(found)} {'drive' if len(found) == 1 else 'drives'} found"
-        )
+        self._bench.journal.add(text("journal.drives-found", url=url, count=len(found)))
         return found
 
     def _event(self, url: str, event: LinkEvent) -> None:
@@ -116,7 +118,7 @@ class Buses:
             None,
         )
         self._bench.journal.add(
-            f"{url}: {event.text}",
+            text("journal.link-event", url=url, event=event.text),
             level="info" if event.kind in ("boot", "back", "state") else "warning",
             drive=drive.id if drive else None,
         )

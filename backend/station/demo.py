@@ -20,6 +20,7 @@ from drivers.computer.processes import SESSIONS
 from drivers.errors import DriveError, LinkLost, NotAllowed
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Found, Link
+from drivers.texts.message import text
 from drivers.urls import link_for
 from drivers.virtual.bench import STANDARD_BENCH, AxisSpec, BenchSpec, load_bench
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
@@ -257,7 +258,8 @@ async def connect_axes(bench: Bench, spec: BenchSpec) -> list[str]:
         try:
             made.append(await _connect(bench, axis, found.get((axis.on, axis.station))))
         except DriveError as error:
-            bench.journal.add(f"{axis.name}: not connected: {error}", level="error")
+            line = text("journal.not-connected", drive=axis.name, cause=error.text)
+            bench.journal.add(line, level="error")
     return made
 
 
@@ -270,7 +272,8 @@ async def _search(bench: Bench, url: str, stations: list[int]) -> list[Found]:
         try:
             seen = await bench.buses.scan(url, stations, lambda _fraction, _step: None)
         except DriveError as error:
-            bench.journal.add(f"{url}: {error}", level="warning")
+            line = text("journal.bus-trouble", url=url, cause=error.text)
+            bench.journal.add(line, level="warning")
         if {each.station for each in seen} >= set(stations):
             break
     return seen

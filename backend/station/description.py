@@ -69,11 +69,7 @@ async def import_in_process(task: Task, limit_s: float = IMPORT_LIMIT_S) -> dict
             "station.import-failed-exit-code", returncode=process.returncode, last=last[0]
         ) from None
     if "error" in answer:
-        raise BadDescription(
-            str(answer["error"]),
-            remedy="check that it is the maker's ESI, EDS or DCF file for this very drive and was "
-            "copied whole, or ask the maker for it again",
-        )
+        raise BadDescription("station.file-not-imported", cause=str(answer["error"]))
     result: dict[str, Any] = answer["ok"]
     return result
 
@@ -126,7 +122,7 @@ async def _stored_eds(link: Link, found: Found) -> bytes:
     Raises:
         NotAllowed: it carries none, or one that is packed in the maker's own way.
     """
-    remedy = "import the maker's EDS file, or use the generic profile"
+    remedy = "station.import-eds-or-generic"
     try:
         data = await link.read(found.station, _STORED_EDS)
     except Rejected as error:

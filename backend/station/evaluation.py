@@ -6,14 +6,9 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from backend.axis.axis import Envelope
 from backend.library.measurements import BadMeasurement, Measurement
 from backend.response_import import stored as response_import
-from backend.tools.measuring.recording import Recording
 from backend.tools.registry import BY_KIND
-from backend.tools.step import run as step_tool
 from backend.tools.sweep import evaluation as sweep_evaluation
 from drivers.texts.message import cause_of
 
@@ -66,8 +61,6 @@ def recompute(measurement: Measurement) -> dict[str, object]:
                 return sweep_evaluation.as_json(sweep_evaluation.reevaluate(arrays, meta))
             case "response-import":
                 return response_import.reevaluate(arrays, meta)
-            case "step":
-                return _step(measurement)
     except (
         ValueError, KeyError, TypeError, IndexError, AttributeError, ArithmeticError, MemoryError,
     ) as error:  # fmt: skip
@@ -75,22 +68,6 @@ def recompute(measurement: Measurement) -> dict[str, object]:
             "station.measurement-not-complete", value=measurement.kind, cause=cause_of(error)
         ) from error
     raise BadMeasurement("station.measurement-kind-nothing-evaluate", value=measurement.kind)
-
-
-def _step(measurement: Measurement) -> dict[str, object]:
-    given, reported = measurement.meta["settings"], measurement.meta["facts"]
-    if not isinstance(given, dict) or not isinstance(reported, dict):
-        raise TypeError("settings or facts")
-    settings = step_tool.StepSettings(**{**given, "envelope": Envelope(**given["envelope"])})
-    arrays = {name: np.asarray(values) for name, values in measurement.arrays.items()}
-    demand = np.asarray(arrays.pop("demand"), np.float64)
-    valid = np.asarray(arrays.pop("valid"), np.bool_)
-    columns = {name: np.asarray(values, np.float64) for name, values in arrays.items()}
-    rate = float(str(measurement.meta["sample_rate_hz"]))
-    recording = Recording(rate, **columns, valid=valid)
-    return step_tool.as_json(
-        step_tool.evaluate(recording, demand, settings, float(reported["rated_torque_nm"]))
-    )
 
 
 def _differences(then: object, now: object, path: str) -> Iterator[str]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from backend.axis.cyclic import CyclicSession
 from drivers.errors import Busy, DriveError, NotAllowed
+from drivers.texts.message import text
 
 if TYPE_CHECKING:
     from backend.station.bench import Bench
@@ -61,7 +62,7 @@ class Exchanges:
             self.running[url] = session
             for connected in users:
                 connected.axis.session = session
-        bench.journal.add(f"{url}: cyclic exchange every {cycle_s * 1e3:g} ms")
+        bench.journal.add(text("journal.exchange-begun", url=url, cycle_ms=f"{cycle_s * 1e3:g}"))
         bench.drives_changed()
         return session
 
@@ -91,7 +92,7 @@ class Exchanges:
             await self.stop(url)
             return
         names = ", ".join(m.drive.name for m in movers)
-        self._bench.journal.add(f"{url}: the cyclic exchange stays until {names} stands")
+        self._bench.journal.add(text("journal.exchange-stays", url=url, names=names))
         task = asyncio.create_task(self._stop_later(url, session), name=f"end-exchange-{url}")
         self._later.add(task)
         task.add_done_callback(self._later.discard)
@@ -162,11 +163,10 @@ class Exchanges:
             Busy: one of its buses is being changed or searched.
         """
         for url in urls:
-            why = _CHANGING if url in self._changing else _SEARCHED if self._searched[url] else ""
-            if why:
-                raise Busy(
-                    f"{name}: {url}: {why}", drive=name, remedy="try again when that has ended"
-                )
+            if url in self._changing:
+                raise Busy("station.exchange-being-changed", drive=name, url=url)
+            if self._searched[url]:
+                raise Busy("station.drives-being-searched", drive=name, url=url)
 
     def _require_settled(self, url: str) -> None:
         if url in self._changing:
@@ -180,5 +180,5 @@ class Exchanges:
             if connected.axis.session is session:
                 connected.axis.session = None
         await session.stop()
-        self._bench.journal.add(f"{url}: cyclic exchange ended")
+        self._bench.journal.add(text("journal.exchange-ended", url=url))
         self._bench.drives_changed()

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from backend.station.bench import Bench
 from drivers.errors import Busy, NotAllowed
 from drivers.modbus.search import LineFound, search_line_settings
-from drivers.texts.message import Text
+from drivers.texts.message import Text, text
 from drivers.urls import bus_kind, parse_url
 
 
@@ -34,5 +34,10 @@ async def search_line(
     for known in same:
         await bench.buses.close(known)
     found = await search_line_settings(wanted, progress, stations=stations)
-    bench.journal.add(f"{wanted.place}: line settings {found.url if found else 'not found'}")
+    line = (
+        text("journal.line-settings", place=wanted.place, url=found.url)
+        if found
+        else text("journal.line-settings-not-found", place=wanted.place)
+    )
+    bench.journal.add(line)
     return found

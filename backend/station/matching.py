@@ -8,6 +8,7 @@ from typing import Literal
 
 from drivers.errors import NotAllowed
 from drivers.link import Found
+from drivers.texts.message import reason_of
 from profiles import load_all, load_profile
 from profiles.loader import ProfileError
 from profiles.schema import LinkSpec, Profile
@@ -59,7 +60,7 @@ def profile_for(kind: str, name: str) -> tuple[Profile, LinkSpec]:
         profile = load_profile(name)
     except ProfileError as error:
         raise NotAllowed(
-            str(error), value=name, remedy="choose one of the listed profiles"
+            reason_of(error), value=name, remedy="station.choose-listed-profile"
         ) from error
     spec = profile.link(kind)
     if spec is None:

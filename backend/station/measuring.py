@@ -13,6 +13,7 @@ from backend.station.connected_drive import ConnectedDrive
 from backend.tools.sweep import profile_speed
 from backend.work.jobs import Job
 from drivers.errors import DriveError, LinkTimeout
+from drivers.texts.message import text
 
 #: Ending an exchange, and starting the one that had to give way.
 EXCHANGE_ENDS_S = 60.0
@@ -62,7 +63,7 @@ class Exchange:
             await self.bench.start_cyclic(self.url, self.before_s, in_job_of=self.drive)
         except DriveError as error:
             self.bench.journal.add(
-                f"{self.url}: the cyclic exchange was not started again: {error.message}",
+                text("journal.exchange-not-again", url=self.url, cause=error.text),
                 level="warning", drive=self.drive,
             )  # fmt: skip
 

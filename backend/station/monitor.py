@@ -281,7 +281,8 @@ class Monitor:
     def _record(self, before: Snapshot, now: Snapshot) -> None:
         drive = self.axis.drive
         if before.fresh and not now.fresh:
-            self._journal.add(now.problem or "", level="error", drive=drive.id)
+            lost = now.problem or text("station.not-read-yet")
+            self._journal.add(lost, level="error", drive=drive.id)
         if now.fresh and not before.fresh:
             self._journal.add(text("station.answers", drive=drive.name), drive=drive.id)
             if before.status_word is not None or drive.pending_restores:

@@ -47,12 +47,12 @@ class Reconnection:
         if pending.moved:
             axis.stop_pending = True
         if pending.held_by:
-            text = f"{drive.name}: {pending.held_by} moves this drive now and restores it itself"
-            journal.add(text, level="warning", drive=drive.id)
+            line = text("journal.held-by-another", drive=drive.name, holder=pending.held_by)
+            journal.add(line, level="warning", drive=drive.id)
 
         def failed(error: StorageFailed) -> None:
-            text = f"a server that is killed in a motion will not know what to restore: {error}"
-            journal.add(text, level="warning", drive=drive.id)
+            line = text("journal.restore-list-not-kept", cause=error.text)
+            journal.add(line, level="warning", drive=drive.id)
 
         # A stop that did not reach the drive stays pending for the next server, too.
         keep_list(
@@ -92,8 +92,8 @@ class Reconnection:
             return True
         try:
             await confirm_identity(drive)
-        except NotAllowed:
-            self._bench.tell(drive.identity_warning, connected, "error")
+        except NotAllowed as error:
+            self._bench.tell(drive.identity_warning or error.text, connected, "error")
             return False
         return True
 
@@ -140,11 +140,16 @@ class Reconnection:
 
         async def work(_progress: Progress) -> JobResult:
             found = await settle(connected.axis, asked=asked)
-            for what, how in (("back", "put back"), ("left", "not put back")):
+            for what in ("back", "left"):
                 values = found[what]
                 if isinstance(values, dict) and values:
                     words = ", ".join(f"{key} = {value}" for key, value in values.items())
-                    bench.tell(f"{drive.name}: {how}: {words}", connected, "warning")
+                    restored = what == "back"
+                    line = text(
+                        "journal.restored" if restored else "journal.not-restored",
+                        drive=drive.name, values=words,
+                    )  # fmt: skip
+                    bench.tell(line, connected, "warning")
             return found
 
         return bench.jobs.start(

@@ -18,7 +18,8 @@ from backend.store.database import DatabaseFailed, Store
 from backend.store.files import StorageFailed
 from backend.store.lock import FolderLock
 from backend.work.journal import Journal
-from drivers.errors import Busy
+from drivers.errors import Busy, with_remedy
+from drivers.texts.message import Text, text
 
 #: How long a start waits for a database on a server.
 REMOTE_S = 1.0
@@ -66,9 +67,9 @@ class Records:
             )
         try:
             if state_version.bring_up_to_date(self.store.folder):
-                self._journal.add("the state folder of an older servodeck was migrated")
+                self._journal.add(text("journal.migrated"))
         except StorageFailed as error:
-            self._journal.add(f"{error.message}; {error.remedy}", level="error")
+            self._journal.add(with_remedy(error), level="error")
         except BaseException:
             self._lock.give()
             raise
@@ -84,7 +85,7 @@ class Records:
         self._loop = asyncio.get_running_loop()
         if not self._lock.take():
             self._journal.add(
-                f"another servodeck uses the folder {self.store.folder} too: end one of them",
+                text("journal.folder-used-twice", folder=str(self.store.folder)),
                 level="error",
             )
         self.audit.start()
@@ -101,10 +102,10 @@ class Records:
             await self.store.call(self.store.open)
             await self.store.call(self.sets.take_in)
         except DatabaseFailed as error:
-            text = f"{error.message}; {error.remedy}. Until it answers, drives can be used"
-            self._journal.add(f"{text}, the library cannot, and the audit waits", level="error")
+            line = text("journal.database-failed", cause=with_remedy(error))
+            self._journal.add(line, level="error")
         except StorageFailed as error:
-            self._journal.add(f"{error.message}; {error.remedy}", level="error")
+            self._journal.add(with_remedy(error), level="error")
 
     async def close(self) -> None:
         """Write down what is left."""
@@ -115,11 +116,15 @@ class Records:
         await asyncio.to_thread(self.store.close)
         self._lock.give()
 
-    def _audit_changed(self, problem: str) -> None:
+    def _audit_changed(self, problem: Text | None) -> None:
         """Called on the audit's thread."""
         loop = self._loop
         if loop is not None and not loop.is_closed():
-            text = f"the audit waits: {problem}" if problem else "the audit is up to date again"
+            line = (
+                text("journal.audit-up-to-date")
+                if problem is None
+                else text("journal.audit-waits", cause=problem)
+            )
             loop.call_soon_threadsafe(
-                lambda: self._journal.add(text, level="error" if problem else "info")
+                lambda: self._journal.add(line, level="error" if problem else "info")
             )

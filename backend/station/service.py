@@ -15,6 +15,8 @@ User=servodeck
 ExecStart=/opt/servodeck/bin/servodeck serve --bind 0.0.0.0 --port 8420 --config /var/lib/servodeck
 Restart=on-failure
 RestartSec=2
+# The one-time code of the set-up stands on the screen of the computer as well.
+StandardOutput=journal+console
 # For EtherCAT: raw frames, promiscuous mode, real-time priority, locked memory. Leave both lines
 # out where only serial lines are used.
 AmbientCapabilities={capabilities}

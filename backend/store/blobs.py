@@ -17,6 +17,7 @@ import fsspec
 from fsspec.implementations.local import LocalFileSystem
 
 from backend.store.files import StorageFailed, write_atomically
+from drivers.texts.message import text
 
 _NAME = re.compile(r"^[0-9a-f]{64}$")
 
@@ -39,7 +40,7 @@ class Blobs:
             raise BlobFailed(
                 "store.cannot-used-contents",
                 value=place,
-                limit="a folder, or s3:// with the extra servodeck[s3] installed",
+                limit=text("limit.place-of-contents"),
                 split=place.split("://", 1)[0],
                 cause=str(error),
             ) from error

@@ -27,6 +27,8 @@ from sqlalchemy.pool import ConnectionPoolEntry
 
 from backend.store import migrate
 from backend.store.files import StorageFailed
+from drivers.texts.message import Text
+from drivers.texts.message import text as message
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -108,21 +110,21 @@ class Store:
                 self._engine.dispose()
                 self._engine = None
 
-    def missing(self) -> str:
-        """Why nothing that is written now would be found later; empty where it would be.
+    def missing(self) -> Text | None:
+        """Why nothing that is written now would be found later; None where it would be.
 
         A file that was removed or replaced while it is open still takes everything, and then is
         gone with the process.
         """
         if self._engine is None:
-            return ""
+            return None
         if self.folder.is_dir():
             self._had_folder = True
         elif self._had_folder:
-            return f"the state folder {self.folder} is gone"
+            return message("store.folder-gone", folder=str(self.folder))
         if self._identity is not None and self._identify() != self._identity:
-            return f"the database {self.shown} was removed or replaced while servodeck runs"
-        return ""
+            return message("store.database-replaced", database=self.shown)
+        return None
 
     def _identify(self) -> tuple[int, int] | None:
         file = self.sqlite_file
@@ -161,7 +163,7 @@ class Store:
             raise DatabaseFailed(
                 missing,
                 value=str(self.folder),
-                remedy="put it back as it was, or end servodeck and restore a backup",
+                remedy="store.put-database-back",
             )
         with (
             self._alone(),

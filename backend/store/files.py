@@ -9,6 +9,7 @@ import tempfile
 from pathlib import Path
 
 from drivers.errors import NotAllowed
+from drivers.texts.message import text
 
 _NAME = re.compile(r"^\w[\w .\-]{0,100}$")
 
@@ -27,9 +28,7 @@ def checked_name(name: str, suffix: str) -> str:
     """
     stem = name.removesuffix(suffix)
     if not _NAME.match(stem) or ".." in stem:
-        raise NotAllowed(
-            "store.not-file-name", value=name, limit="letters, digits, spaces, . - _, at most 100"
-        )
+        raise NotAllowed("store.not-file-name", value=name, limit=text("limit.file-name"))
     return stem + suffix
 
 

@@ -1,4 +1,4 @@
-"""Results of all tools that have a descriptor, distinguished by their field ``tool``.
+"""Results of all tools, distinguished by their field ``tool``.
 
 Apart from the tools themselves, so that who only reads results imports no analysis.
 """
@@ -9,13 +9,23 @@ from typing import Annotated, TypeAlias
 
 from pydantic import Field
 
+from backend.tools.autotune.result import AutotuneAnswer
 from backend.tools.brake.result import BrakeResult
 from backend.tools.first_power.result import FirstPowerResult
 from backend.tools.friction.result import FrictionResult
 from backend.tools.health.result import HealthResult
 from backend.tools.inertia.result import InertiaAnswer
+from backend.tools.step.result import StepAnswer
+from backend.tools.sweep.result import SweepAnswer
 
 ToolOutcome: TypeAlias = Annotated[
-    FrictionResult | InertiaAnswer | BrakeResult | HealthResult | FirstPowerResult,
+    FrictionResult
+    | InertiaAnswer
+    | StepAnswer
+    | BrakeResult
+    | HealthResult
+    | FirstPowerResult
+    | SweepAnswer
+    | AutotuneAnswer,
     Field(discriminator="tool"),
 ]

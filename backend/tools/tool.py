@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from backend.people.rights import Right
 from backend.tools.measuring.repeats import Repeats
 from backend.work.jobs import Progress
-from drivers.texts.message import Language
+from drivers.texts.message import Language, Text
 
 if TYPE_CHECKING:  # who only reads results or settings imports no analysis
     import numpy as np
@@ -176,15 +176,17 @@ R = TypeVar("R", bound=ToolResult)
 class Tool(Generic[S, R]):
     """One measuring tool.
 
-    ``kind`` names it in routes, jobs, commands, files and results. ``texts`` hold at least
-    "title", "help" and "field.<name>" of every setting of its own. ``reevaluate`` makes the
-    result again from arrays and meta data as ``run`` kept them and raises ValueError where they
-    are not of this tool. ``right`` is what a person needs to start it; ``motion``: it moves.
+    ``kind`` names it in routes, jobs, commands, files and results; ``title`` is a message of the
+    catalogue, since jobs and log lines name the tool to readers of both languages. ``texts`` hold
+    at least "help" and "field.<name>" of every setting of its own. ``reevaluate`` makes the result
+    again from arrays and meta data as ``run`` kept them and raises ValueError where they are not
+    of this tool. ``right`` is what a person needs to start it; ``motion``: it moves.
     ``closes_loops`` False: it runs before anybody knows whether a loop may be closed, so that no
     speed is tried and no ramp is prepared before it.
     """
 
     kind: str
+    title: Text
     settings: type[S]
     result: type[R]
     run: Callable[[Run, S], Awaitable[R]]
@@ -200,6 +202,8 @@ class Tool(Generic[S, R]):
         values: Mapping[str, str] | None = None,
     ) -> str:  # fmt: skip
         """A text of this tool with its places filled in."""
+        if name == "title":
+            return self.title.words(language)
         found = self.texts[name][1 if language == "zh" else 0]
         return found.format(**values) if values else found
 

@@ -9,25 +9,20 @@ from dataclasses import dataclass
 from typing import Literal
 
 from backend.people.identity import acting_person
-from drivers.texts.message import Text, prose
+from drivers.texts.message import Text
 
 Level = Literal["info", "warning", "error"]
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One line; ``time`` in epoch seconds, ``said`` a message or words that others made."""
+    """One line; ``time`` in epoch seconds, ``message`` is what happened, as code and facts."""
 
     time: float
     level: Level
     drive: str | None
     person: str
-    said: str | Text
-
-    @property
-    def message(self) -> Text:
-        """What happened, as code and facts."""
-        return self.said if isinstance(self.said, Text) else prose(self.said)
+    message: Text
 
     @property
     def text(self) -> str:
@@ -50,14 +45,14 @@ class Journal:
 
     def add(
         self,
-        said: str | Text,
+        line: Text,
         *,
         level: Level = "info",
         drive: str | None = None,
         person: str = "",
     ) -> None:
         """Write an entry with the present time; without ``person`` it is of whoever acts."""
-        entry = Entry(time.time(), level, drive, person or acting_person(), said)
+        entry = Entry(time.time(), level, drive, person or acting_person(), line)
         self._entries.append(entry)
         for listener in self._listeners:
             listener(entry)

@@ -7,6 +7,7 @@ from urllib.parse import unquote
 from drivers.adapters import CAN_INTERFACES, require_channel
 from drivers.bus import BusKind, BusUrl
 from drivers.link import Link, LinkTraits
+from drivers.texts.message import text
 
 
 def _require_place(place: str) -> None:
@@ -27,7 +28,7 @@ BUS = BusKind(
     traits=LinkTraits(
         synchronous=True,
         description="stored_eds",
-        silent="power, cable, both terminating resistors, bit rate and node number",
+        silent=text("canopen.check-when-silent"),
     ),
     require_place=_require_place,
     link=_link,

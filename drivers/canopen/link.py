@@ -60,6 +60,11 @@ _STORE_INDICES = (0x1010, 0x1011)
 _WORKERS = 128
 
 
+def _heard(future: asyncio.Future[T]) -> None:
+    if not future.cancelled():
+        future.exception()
+
+
 class CanopenLink:
     """One CAN bus with CANopen nodes; stations are node numbers 1 to 127.
 
@@ -335,6 +340,8 @@ class CanopenLink:
             # The thread cannot be interrupted; whoever comes next must not overtake it.
             if cancelled is not None:
                 cancelled.set()
+            # Nobody is left who would hear that it failed: asyncio would log that as a defect.
+            future.add_done_callback(_heard)
             await asyncio.wait([future])
             raise
 

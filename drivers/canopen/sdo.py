@@ -15,6 +15,7 @@ from typing import NamedTuple, TypeVar
 
 from drivers.errors import ProtocolError, Rejected
 from drivers.sdo_abort import rejected
+from drivers.texts.message import Text, text
 
 T = TypeVar("T")
 
@@ -74,13 +75,13 @@ def upload(index: int, subindex: int, block_above: int | None = None) -> Transfe
     _raise_abort(answer, mux, writing=False)
     command = answer[0]
     if command & 0xE0 != 0x40:
-        yield from _give_up(mux, ABORT_COMMAND, f"unexpected answer {command:#04x} to a read")
+        yield from _give_up(mux, ABORT_COMMAND, _unexpected(command))
     if command & 0x02:
         size = 4 - (command >> 2 & 3) if command & 0x01 else 4
         return answer[4 : 4 + size]
     announced: int | None = struct.unpack("<I", answer[4:8])[0] if command & 0x01 else None
     if announced is not None and announced > _MAX_BYTES:
-        yield from _give_up(mux, ABORT_MEMORY, f"the drive announced {announced} bytes")
+        yield from _give_up(mux, ABORT_MEMORY, text("sdo.announced-too-much", announced=announced))
     if block_above is None or announced is None or announced <= block_above:
         return (yield from _upload_segments(mux, announced))
     yield Exchange((abort_frame(mux, ABORT_GENERAL),), mux, answered=False)
@@ -100,13 +101,13 @@ def _upload_segments(mux: bytes, announced: int | None) -> Transfer[bytes]:
         _raise_abort(answer, mux, writing=False)
         command = answer[0]
         if command & 0xE0:
-            yield from _give_up(mux, ABORT_COMMAND, f"unexpected answer {command:#04x}")
+            yield from _give_up(mux, ABORT_COMMAND, _unexpected(command))
         if command & 0x10 != toggle:
-            yield from _give_up(mux, ABORT_TOGGLE, "a segment came twice or was lost")
+            yield from _give_up(mux, ABORT_TOGGLE, text("sdo.segment-twice-or-lost"))
         data += answer[1 : 8 - (command >> 1 & 7)]
         if len(data) > (_MAX_BYTES if announced is None else announced):
             yield from _give_up(
-                mux, ABORT_LENGTH, f"the drive sent more than the {announced} bytes it announced"
+                mux, ABORT_LENGTH, text("sdo.more-than-announced", announced=announced)
             )
         if command & 0x01:
             break
@@ -140,7 +141,7 @@ def download(index: int, subindex: int, data: bytes) -> Transfer[None]:
     answer = yield Exchange((first,), mux)
     _raise_abort(answer, mux, writing=True)
     if answer[0] & 0xE0 != 0x60:
-        yield from _give_up(mux, ABORT_COMMAND, f"unexpected answer {answer[0]:#04x} to a write")
+        yield from _give_up(mux, ABORT_COMMAND, _unexpected(answer[0]))
     if 1 <= len(data) <= 4:
         return
     toggle = 0
@@ -151,9 +152,9 @@ def download(index: int, subindex: int, data: bytes) -> Transfer[None]:
         answer = yield Exchange((bytes([command]) + part.ljust(7, b"\0"),), None)
         _raise_abort(answer, mux, writing=True)
         if answer[0] & 0xE0 != 0x20:
-            yield from _give_up(mux, ABORT_COMMAND, f"unexpected answer {answer[0]:#04x}")
+            yield from _give_up(mux, ABORT_COMMAND, _unexpected(answer[0]))
         if answer[0] & 0x10 != toggle:
-            yield from _give_up(mux, ABORT_TOGGLE, "a segment was acknowledged out of turn")
+            yield from _give_up(mux, ABORT_TOGGLE, text("sdo.segment-out-of-turn"))
         toggle ^= 0x10
 
 
@@ -168,7 +169,7 @@ def block_upload(index: int, subindex: int) -> Transfer[bytes]:
     answer = yield Exchange((b"\xa4" + mux + bytes([_BLOCK, 0, 0, 0]),), mux)
     _raise_abort(answer, mux, writing=False)
     if answer[0] & 0xE1 != 0xC0:
-        yield from _give_up(mux, ABORT_COMMAND, f"unexpected answer {answer[0]:#04x}")
+        yield from _give_up(mux, ABORT_COMMAND, _unexpected(answer[0]))
     with_crc = bool(answer[0] & 0x04)
     announced: int | None = struct.unpack("<I", answer[4:8])[0] if answer[0] & 0x02 else None
     data = bytearray()
@@ -182,7 +183,7 @@ def block_upload(index: int, subindex: int) -> Transfer[bytes]:
             send = ()
             budget -= 1
             if budget < 0:
-                yield from _give_up(mux, ABORT_SEQUENCE, "the same segments come again and again")
+                yield from _give_up(mux, ABORT_SEQUENCE, text("sdo.same-segments"))
             _raise_abort(segment, mux, writing=False)
             number, last = segment[0] & 0x7F, bool(segment[0] & 0x80)
             if number == good + 1:
@@ -192,18 +193,18 @@ def block_upload(index: int, subindex: int) -> Transfer[bytes]:
             if number == _BLOCK or last:
                 break
         if len(data) > _MAX_BYTES:
-            yield from _give_up(mux, ABORT_MEMORY, "the drive does not end its block transfer")
+            yield from _give_up(mux, ABORT_MEMORY, text("sdo.block-does-not-end"))
         send = (bytes([0xA2, good, _BLOCK]) + bytes(5),)
     answer = yield Exchange(send, None)
     _raise_abort(answer, mux, writing=False)
     if answer[0] & 0xE3 != 0xC1:
-        yield from _give_up(mux, ABORT_COMMAND, f"unexpected answer {answer[0]:#04x}")
+        yield from _give_up(mux, ABORT_COMMAND, _unexpected(answer[0]))
     result = bytes(data[: len(data) - (answer[0] >> 2 & 7)])
     if with_crc and crc_hqx(result, 0) != int.from_bytes(answer[1:3], "little"):
-        yield from _give_up(mux, ABORT_CRC, "the checksum of a block transfer is wrong")
+        yield from _give_up(mux, ABORT_CRC, text("sdo.block-checksum"))
     if announced is not None and announced != len(result):
         yield from _give_up(
-            mux, ABORT_LENGTH, f"the drive announced {announced} bytes and sent {len(result)}"
+            mux, ABORT_LENGTH, text("sdo.announced-and-sent", announced=announced, sent=len(result))
         )
     yield Exchange((b"\xa1" + bytes(7),), None, answered=False)
     return result
@@ -220,14 +221,14 @@ def block_download(index: int, subindex: int, data: bytes) -> Transfer[None]:
     answer = yield Exchange((b"\xc6" + mux + struct.pack("<I", len(data)),), mux)
     _raise_abort(answer, mux, writing=True)
     if answer[0] & 0xE3 != 0xA0:
-        yield from _give_up(mux, ABORT_COMMAND, f"unexpected answer {answer[0]:#04x}")
+        yield from _give_up(mux, ABORT_COMMAND, _unexpected(answer[0]))
     with_crc = bool(answer[0] & 0x04)
     block = answer[4]
     sent = 0
     refusals = 0
     while sent < max(len(data), 1):
         if not 1 <= block <= 127:
-            yield from _give_up(mux, ABORT_SEQUENCE, f"the drive asked for blocks of {block}")
+            yield from _give_up(mux, ABORT_SEQUENCE, text("sdo.block-size", block=block))
         frames = []
         for number in range(1, block + 1):
             part = data[sent + 7 * (number - 1) : sent + 7 * number]
@@ -238,10 +239,10 @@ def block_download(index: int, subindex: int, data: bytes) -> Transfer[None]:
         answer = yield Exchange(tuple(frames), None)
         _raise_abort(answer, mux, writing=True)
         if answer[0] & 0xE3 != 0xA2 or answer[1] > len(frames):
-            yield from _give_up(mux, ABORT_SEQUENCE, "a block was acknowledged wrongly")
+            yield from _give_up(mux, ABORT_SEQUENCE, text("sdo.block-acknowledged"))
         refusals += answer[1] == 0
         if refusals > 3:
-            yield from _give_up(mux, ABORT_SEQUENCE, "the drive takes no segment of a block")
+            yield from _give_up(mux, ABORT_SEQUENCE, text("sdo.block-not-taken"))
         sent += 7 * answer[1]
         block = answer[2]
     empty = (7 - len(data) % 7) % 7 if data else 7
@@ -251,7 +252,7 @@ def block_download(index: int, subindex: int, data: bytes) -> Transfer[None]:
     )
     _raise_abort(answer, mux, writing=True)
     if answer[0] & 0xE3 != 0xA1:
-        yield from _give_up(mux, ABORT_COMMAND, f"unexpected answer {answer[0]:#04x}")
+        yield from _give_up(mux, ABORT_COMMAND, _unexpected(answer[0]))
 
 
 def answers(frame: bytes, exchange: Exchange) -> bool:
@@ -276,11 +277,11 @@ def _raise_abort(answer: bytes, mux: bytes, *, writing: bool) -> None:
         )
 
 
-def _give_up(mux: bytes, code: int, why: str) -> Generator[Exchange, bytes, None]:
+def _unexpected(answer: int) -> Text:
+    return text("sdo.unexpected-answer", answer=f"{answer:#04x}")
+
+
+def _give_up(mux: bytes, code: int, why: Text) -> Generator[Exchange, bytes, None]:
     yield Exchange((abort_frame(mux, code),), mux, answered=False)
     index, subindex = struct.unpack("<HB", mux)
-    raise ProtocolError(
-        f"{why} ({index:04X}:{subindex:02X})",
-        parameter=f"{index:04X}:{subindex:02X}",
-        remedy="check for a second node with the same number or a second master on the bus",
-    )
+    raise ProtocolError("sdo.transfer-given-up", parameter=f"{index:04X}:{subindex:02X}", why=why)

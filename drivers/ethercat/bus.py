@@ -5,6 +5,7 @@ from __future__ import annotations
 from drivers.adapters import require_interface
 from drivers.bus import BusKind, BusUrl
 from drivers.link import Link, LinkTraits
+from drivers.texts.message import text
 
 
 def _link(url: BusUrl) -> Link:
@@ -18,10 +19,11 @@ BUS = BusKind(
     # The link parts a batch by itself, and reads whole objects: one that is cut between two
     # batches would be read entry by entry.
     traits=LinkTraits(
+        fills_network=True,
         batch=128,
         whole_objects=True,
         description="dictionary",
-        silent="power, cable (computer to IN of the first drive) and the interface's name",
+        silent=text("ethercat.check-when-silent"),
     ),
     require_place=require_interface,
     link=_link,

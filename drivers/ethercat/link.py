@@ -25,6 +25,7 @@ from drivers.ethercat.exchange.segmentcyclic import EthercatCyclic
 from drivers.ethercat.process import firmware
 from drivers.ethercat.process.hostprocess import HostProcess
 from drivers.ethercat.process.protocol import Message
+from drivers.ethercat.process.requested import AlRequests
 from drivers.ethercat.process.survey import ExchangeFigures, Survey, exchange_from, survey_from
 from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.listing import Item, fitted, object_of, read_list
@@ -79,6 +80,7 @@ class EthercatLink:
         )
         self.cyclic: Cyclic | None = self.process_data
         self.eeprom = EepromAccess(self._call, self.read)
+        self.al_states = AlRequests(self._call)
 
     # Link ----------------------------------------------------------------------------------
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from drivers.adapters import require_serial_form
 from drivers.bus import BusKind, BusUrl, SerialLine
 from drivers.link import Link, LinkTraits
+from drivers.texts.message import text
 
-SERIAL_SILENT = "power, cable, baud rate, parity and address"
+SERIAL_SILENT = text("modbus.check-when-silent")
 
 
 def _link(url: BusUrl) -> Link:

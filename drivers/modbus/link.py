@@ -409,7 +409,9 @@ def _again(error: DriveError) -> DriveError:
     """The same error as a new object: callers fill in which parameter it was about."""
     if isinstance(error, Rejected):
         return Rejected(error.text, abort_code=error.abort_code, remedy=error.remedy_text)
-    return type(error)(error.message, value=error.value, limit=error.limit, remedy=error.remedy)
+    return type(error)(
+        error.text, value=error.value, limit=error.limit_text, remedy=error.remedy_text
+    )
 
 
 def _decided(result: bytes | DriveError | None) -> bytes | DriveError:

@@ -11,6 +11,7 @@ from typing import Any
 from drivers import cia402
 from drivers.errors import NotAllowed
 from drivers.feedback import FeedbackScale
+from drivers.texts.message import text
 
 #: The objects of CiA 402-2 that a motion commands and watches.
 CONTROL, MODE, POSITION, VELOCITY, TORQUE = 0x6040, 0x6060, 0x607A, 0x60FF, 0x6071
@@ -107,7 +108,7 @@ class Motion:
             raise NotAllowed(
                 "cyclic.trajectory-begins-axis-held",
                 value=first,
-                limit=f"{longest} per cycle",
+                limit=text("limit.per-cycle", longest=longest),
                 where=where,
                 now=now,
             )

@@ -61,6 +61,14 @@ def language_of(tag: str | None) -> Language:
     return "en"
 
 
+#: Codes of files that earlier versions wrote, by what the same message is called now. The page has
+#: the same list (`webui/src/i18n/message.ts`).
+RENAMED = {
+    "autotune.no-candidate-kept-promise": "autotune.no-candidate-verified",
+    "autotune.promise-not-kept": "autotune.prediction-not-confirmed",
+}
+
+
 @dataclass(frozen=True)
 class Text:
     """A message of the catalogue, or (``code`` empty) words that came from elsewhere as they are.
@@ -102,7 +110,9 @@ class Text:
         params = wire["params"]
         if not isinstance(params, Mapping):
             raise TypeError("params of a message are a map")
-        return cls(str(wire["code"]), {str(k): _from_plain(v) for k, v in params.items()})
+        code, mark, attribute = str(wire["code"]).partition("/")
+        code = RENAMED.get(code, code) + mark + attribute
+        return cls(code, {str(k): _from_plain(v) for k, v in params.items()})
 
 
 def text(code: str, /, **params: Param) -> Text:
@@ -156,6 +166,11 @@ def as_text(words: str | Text, params: Mapping[str, Param] | None = None) -> Tex
     if isinstance(words, Text):
         return words
     return Text(words, params or {}) if is_code(words) else prose(words)
+
+
+def reason_of(error: Exception) -> Text:
+    """Why something failed: the message that the error carries, else the words of a library."""
+    return error.why if isinstance(error, Unsuitable) else prose(str(error))
 
 
 def plain(value: Param) -> object:

@@ -40,6 +40,10 @@ End = Literal["stated", "measured", "predicted"]
 #: as a factor of the sensitivity.
 WORST_DEG, WORST_DB = 5.0, 1.0
 _WORST_RATIO = 10 ** (WORST_DB / 20.0)
+#: A logarithm of a size in dB.
+_IN_DB = 20.0 / float(np.log(10.0))
+#: So many sizes and delays are looked at between the ends of their intervals.
+_SIZES, _DELAYS = 3, 5
 
 
 @dataclass(frozen=True)
@@ -214,8 +218,7 @@ def judge(
 
 
 def _in_db(size: Interval) -> Interval:
-    factor = 20.0 / np.log(10.0)
-    return Interval(factor * size.value, factor * size.low, factor * size.high)
+    return Interval(_IN_DB * size.value, _IN_DB * size.low, _IN_DB * size.high)
 
 
 def _measured(lines: Lines) -> BandVerdict:
@@ -278,14 +281,40 @@ def _known(found: tuple[float, float] | None, least: float, unseen: float) -> In
 def _moved(
     frequency_hz: FloatArray, loops: ComplexArray, size: Interval, late_s: Interval
 ) -> ComplexArray:
-    """Every loop with every size and delay at the ends of what they may be."""
+    """Every loop with sizes and delays from end to end of what they may be.
+
+    Those between the ends count where a raised gain excludes the ends.
+    """
     turn = -2j * np.pi * frequency_hz
     rows = [
         loops * np.exp(a + turn * d)
-        for a in (size.low, size.high)
-        for d in (late_s.low, late_s.high)
+        for a in np.linspace(size.low, size.high, _SIZES)
+        for d in np.linspace(late_s.low, late_s.high, _DELAYS)
     ]
     return np.concatenate(rows)
+
+
+def excluding_db(
+    verdict: LoopVerdict, frequency_hz: FloatArray, loops: ComplexArray, promised: Goals
+) -> float:
+    """The gain that no loop is stable with that misses the promise; 0 where none misses it.
+
+    ``loops`` as in `judge`. A loop misses it by more than the worst end of an interval may. A loop
+    that is stable with more gain than that, in dB, is none of them.
+    """
+    size = Interval(*(getattr(verdict.gain_db, e) / _IN_DB for e in ("value", "low", "high")))
+    least = 0.0
+    for row in _moved(frequency_hz, loops, size, verdict.delay_s):
+        worst = worst_of(row[None, :])
+        if not worst.stable:
+            continue
+        misses = (
+            worst.phase_margin_deg < promised.phase_margin_deg - WORST_DEG
+            or worst.gain_margin_db < promised.gain_margin_db - WORST_DB
+            or worst.ms > promised.ms * _WORST_RATIO
+        )
+        least = max(least, worst.gain_margin_db if misses else 0.0)
+    return least
 
 
 def _moved_once(

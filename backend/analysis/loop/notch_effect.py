@@ -16,7 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from backend.analysis.loop.notch import Notch
 from backend.analysis.response.sampled_model import LoopModel
@@ -193,7 +193,7 @@ def _fitted(seen: _Seen, path: SignalPath) -> NotchEffect:
     low = np.log([0.7 * centre, 0.01 * centre, 0.3])
     high = np.log([1.4 * centre, 4.0 * centre, -_DEEPEST_DB])
     fits = [
-        least_squares(
+        scipy.optimize.least_squares(
             rest, np.log([centre, share * centre, depth]), bounds=(low, high), loss="soft_l1",
             f_scale=0.1, max_nfev=60,
         )

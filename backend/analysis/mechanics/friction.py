@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+import scipy
 
 from backend.analysis.response.sampling import SignalPath
 from backend.analysis.signals.arrays import ComplexArray, FloatArray, neighbour_mean
@@ -93,7 +93,7 @@ def _least(
     limit: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Friction up to ``limit`` that leaves the least scatter, and the share that it leaves."""
-    found = minimize_scalar(
+    found = scipy.optimize.minimize_scalar(
         _scatter, bounds=(0.0, limit), method="bounded", args=(s, plain, turned, weight)
     )
     before = max(_scatter(0.0, s, plain, turned, weight), 1e-300)

@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.ndimage import convolve1d
-from scipy.stats import t as student_t
+import scipy
 
 from backend.analysis.mechanics.load_swing import find_swings, lag_of_load, lag_slopes
 from backend.analysis.mechanics.load_terms import (
@@ -219,7 +218,9 @@ def _machine(
 
 
 def _smooth(x: FloatArray, kernel: FloatArray) -> FloatArray:
-    return np.asarray(convolve1d(np.asarray(x, dtype=np.float64), kernel, mode="nearest"))
+    return np.asarray(
+        scipy.ndimage.convolve1d(np.asarray(x, dtype=np.float64), kernel, mode="nearest")
+    )
 
 
 def _columns(
@@ -270,10 +271,10 @@ def _intervals(
     normal = np.linalg.pinv((whole * weight[:, None]).T @ whole)
     # Sum of squares over the independent share of samples, variance inflated accordingly.
     variance = float(np.sum(weight * residual**2)) / max(count - 4.0, 1.0) / share
-    plain = np.diag(normal) * variance * float(student_t.ppf(0.975, freedom)) ** 2
+    plain = np.diag(normal) * variance * float(scipy.special.stdtrit(freedom, 0.975)) ** 2
     blocks = max(float(np.count_nonzero(keep)) / block - 1.0, 1.0)
     swinging = _swinging_variance(whole, residual, weight, keep, block)
-    swinging = swinging * float(student_t.ppf(0.975, blocks)) ** 2
+    swinging = swinging * float(scipy.special.stdtrit(blocks, 0.975)) ** 2
     uncertainty = np.sqrt(np.maximum(np.maximum(plain, swinging), 0.0)) / scale
     half = np.hypot(uncertainty[:4], SYSTEMATIC_SHARE * np.abs(x[:4]))
     # What reversals bend of Coulomb friction, viscous friction makes up for at the speeds moved at.

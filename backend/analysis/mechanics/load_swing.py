@@ -18,8 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.signal import cont2discrete, lfilter, ss2tf
+import scipy
 
 from backend.analysis.signals.arrays import BoolArray, FloatArray, IntArray
 
@@ -54,9 +53,9 @@ def lag_of_load(acceleration: FloatArray, swing: Swing, sample_rate_hz: float) -
     # As states: the load's way and speed against the motor's way, driven by the acceleration.
     states = np.array([[0.0, 1.0], [-w * w, -damped]]), np.array([[0.0], [1.0]])
     reported = np.array([[w * w, damped]]), np.array([[0.0]])
-    a, b, c, d, _ = cont2discrete((*states, *reported), 1.0 / sample_rate_hz, "foh")
-    numerator, denominator = ss2tf(a, b, c, d)
-    return np.asarray(lfilter(numerator[0], denominator, acceleration)) - acceleration
+    a, b, c, d, _ = scipy.signal.cont2discrete((*states, *reported), 1.0 / sample_rate_hz, "foh")
+    numerator, denominator = scipy.signal.ss2tf(a, b, c, d)
+    return np.asarray(scipy.signal.lfilter(numerator[0], denominator, acceleration)) - acceleration
 
 
 def lag_slopes(
@@ -158,7 +157,7 @@ class _Problem:
         def left(q: FloatArray) -> FloatArray:
             return np.asarray(self.residual(of(q)) / size)
 
-        best = least_squares(left, inside, bounds=(low, high), max_nfev=60)
+        best = scipy.optimize.least_squares(left, inside, bounds=(low, high), max_nfev=60)
         return of(best.x)
 
     def is_physical(self, swings: tuple[Swing, ...]) -> bool:

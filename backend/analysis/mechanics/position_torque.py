@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+import scipy
 
 from backend.analysis.signals.arrays import BoolArray, FloatArray
 
@@ -86,5 +86,5 @@ def find_period(
     count = int(np.log(longest / shortest) / np.log(_STEP)) + 2
     best = min(np.linspace(np.log(shortest), np.log(longest), count), key=left)
     near = (float(best - np.log(_STEP)), float(best + np.log(_STEP)))
-    slow = float(minimize_scalar(left, bounds=near, method="bounded").x)
+    slow = float(scipy.optimize.minimize_scalar(left, bounds=near, method="bounded").x)
     return float(np.exp(min(slow, repeated, key=left)))

@@ -13,8 +13,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.fft import next_fast_len
-from scipy.signal import lfilter
+import scipy
 
 from backend.analysis.response.sampled_model import SampledFit
 from backend.analysis.response.sampling import STEP_LEAD_S, SignalPath, delay_response, lag_response
@@ -93,7 +92,7 @@ def _between(off: FloatArray, known: BoolArray, wanted: BoolArray) -> tuple[Floa
     frequency (mechanics that the fit has not quite right) goes on through a reversal.
     """
     count = known.astype(np.float64)
-    size = next_fast_len(off.size + 2 * _SLOW, real=True)
+    size = scipy.fft.next_fast_len(off.size + 2 * _SLOW, real=True)
     power = np.abs(np.fft.rfft(off * count, size)) ** 2
     pairs = np.fft.irfft(np.abs(np.fft.rfft(count, size)) ** 2, size)[: 4 * _SLOW]
     alike = np.fft.irfft(power, size)[: 4 * _SLOW] / np.maximum(pairs, 1.0)
@@ -124,7 +123,7 @@ def _motion(
     That is what hangs on the motor draws, less what the drive's own loop makes.
     """
     n, rate = record.response.size, fit.path.sample_rate_hz
-    size = next_fast_len(2 * n, real=True)
+    size = scipy.fft.next_fast_len(2 * n, real=True)
     f = np.fft.rfftfreq(size, 1.0 / rate)
     f[0] = 0.5 * f[1]
     inside, folded = _bands(record, fit, f, size)
@@ -195,5 +194,5 @@ def _mean_injected(record: Record, path: SignalPath) -> FloatArray:
     steps = (1.0 - part_late) * held[1:][: steps.size] + part_late * held[: steps.size]
     if path.current_bandwidth_hz is not None:
         a = float(np.exp(-2 * np.pi * path.current_bandwidth_hz * period_s / fine))
-        steps = np.asarray(lfilter([1.0 - a], [1.0, -a], steps))
+        steps = np.asarray(scipy.signal.lfilter([1.0 - a], [1.0, -a], steps))
     return np.asarray(path.direct_gain * steps.reshape(-1, fine).mean(axis=1))

@@ -11,8 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f as f_distribution
-from scipy.stats import t as student_t
+import scipy
 
 from backend.analysis.signals.arrays import FloatArray
 
@@ -40,6 +39,11 @@ class Fit:
     def at(self, speed: FloatArray) -> FloatArray:
         """Torque [n] at signed speeds."""
         return np.asarray(_columns(speed, self.speed, self.exponent) @ self.values)
+
+    def slope(self, speed: float) -> float:
+        """Torque per speed at a signed speed that is not 0, over 2 % of it."""
+        near = self.at(speed * np.array([0.99, 1.01]))
+        return float((near[1] - near[0]) / (0.02 * speed))
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,7 @@ class SpeedModel:
     def value(self, index: int) -> tuple[float, float, float]:
         """Load, Coulomb, viscous or Stribeck torque (0 to 3) with its 95 % interval."""
         freedom = max(self.speed.size - self.best.values.size, 1)
-        times = float(student_t.ppf(0.975, freedom))
+        times = float(scipy.special.stdtrit(freedom, 0.975))
         values = np.array([each.values[index] for each in self.alike])
         spread = times * np.array([each.deviations[index] for each in self.alike])
         return (
@@ -135,7 +139,7 @@ def speed_model(speed: FloatArray, torque: FloatArray, half: FloatArray) -> Spee
         return without
     best = min(fits, key=lambda each: each.squares)
     gained = (plain.squares - best.squares) / 3.0 / max(best.squares / freedom, 1e-12)
-    if gained < float(f_distribution.ppf(0.99, 3, freedom)):
+    if gained < float(scipy.special.fdtri(3, freedom, 0.99)):
         return without
     limit = best.squares + _ALIKE * max(1.0, best.squares / freedom)
     alike = tuple(each for each in fits if each.squares <= limit)

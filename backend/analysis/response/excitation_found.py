@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.signal import stft
+import scipy
 
 from backend.analysis.signals.arrays import BoolArray, FloatArray, IntArray
 
@@ -93,7 +93,7 @@ def _period(u: FloatArray) -> int:
 def _is_chirp(u: FloatArray) -> bool:
     """One tone at a time whose frequency moves one way, perhaps several times."""
     width = max(u.size // 64, 64)
-    _f, _t, parts = stft(u, nperseg=width, noverlap=width // 2, boundary=None)
+    _f, _t, parts = scipy.signal.stft(u, nperseg=width, noverlap=width // 2, boundary=None)
     power = np.abs(parts) ** 2
     total = np.sum(power, axis=0)
     loud = total > 0.05 * np.max(total)

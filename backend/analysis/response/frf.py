@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from scipy.stats import t as student_t
+import scipy
 
 from backend.analysis.mechanics.friction import estimate_coulomb, scatter_left
 from backend.analysis.response.sampling import DIRECT_SHARE, MODEL_SHARE, SignalPath
@@ -146,7 +146,9 @@ def estimate_periodic(
     power = np.asarray(sum(np.abs(r.mean(axis=0)) ** 2 for r in s.sent))
     noise_var, total_var, freedom = _variances(s, inputs, g, smooth_lines)
     relative = total_var * power / np.abs(g * s_ur) ** 2
-    spread = float(student_t.ppf(0.975, max(freedom, 1)) / 1.96) if freedom else float("nan")
+    spread = (
+        float(scipy.special.stdtrit(max(freedom, 1), 0.975) / 1.96) if freedom else float("nan")
+    )
     one_sided = np.sqrt(relative / 2.0) * spread
     raw_power = np.asarray(sum(np.sum(np.abs(r) ** 2, axis=0) for r in s.sent))
     raw_response = np.asarray(sum(np.sum(np.abs(y) ** 2, axis=0) for y in s.response))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import t as student_t
+import scipy
 
 from backend.analysis.response.frf import Frf, valid_band_hz
 from backend.analysis.response.sampling import SignalPath
@@ -35,7 +35,7 @@ def estimate_stepped(record: Record, path: SignalPath, quantity: Quantity) -> Fr
     u = continuous_input(spectra, path, quantity)[0]
     g = np.asarray(y.sum(axis=0) / u.sum(axis=0))
     relative = np.abs(y[0] / u[0] - y[1] / u[1]) / (2 * np.abs(g))
-    spread = float(student_t.ppf(0.975, 2) / 1.96) / np.sqrt(2)
+    spread = float(scipy.special.stdtrit(2, 0.975) / 1.96) / np.sqrt(2)
     cross = np.abs(np.sum(y * r.conj(), axis=0)) ** 2
     powers = np.sum(np.abs(y) ** 2, axis=0) * np.sum(np.abs(r) ** 2, axis=0)
     return Frf(

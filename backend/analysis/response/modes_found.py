@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import find_peaks
+import scipy
 
 from backend.analysis.mechanics.resonance import Resonance
 from backend.analysis.response.product_model import ProductFit
@@ -41,7 +41,7 @@ def modes_of(fit: ProductFit, f: FloatArray) -> tuple[FoundMode, ...]:
     first = 2 + len(model.poles_hz)
     found: list[FoundMode] = []
     for kind, curve in (("resonance", flat), ("antiresonance", -flat)):
-        places, facts = find_peaks(curve, prominence=_LEAST_DB)
+        places, facts = scipy.signal.find_peaks(curve, prominence=_LEAST_DB)
         for place, height in zip(places, facts["prominences"], strict=True):
             near = [
                 (abs(np.log(p.frequency_hz / dense[place])) + 0.1 * p.damping, i)

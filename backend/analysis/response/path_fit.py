@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares, minimize_scalar
+import scipy
 
 from backend.analysis.response.sampled_model import LoopModel, SampledFit
 from backend.analysis.response.sampling import (
@@ -207,7 +207,7 @@ class PathFit:
         cost, x = min(tried, key=lambda t: t[0])
         if x.size == 1:
             return self._path_of(x, hold), cost
-        end = minimize_scalar(
+        end = scipy.optimize.minimize_scalar(
             lambda corner: float(np.sum(self._rows(np.array([x[0], corner]), hold) ** 2)),
             bounds=(x[1] - 0.5, x[1] + 0.5), method="bounded", options={"maxiter": 12},
         )  # fmt: skip
@@ -222,7 +222,7 @@ class PathFit:
             # The solver takes small numbers for zero.
             return self._rows(x, hold) * _SCALE
 
-        end = least_squares(rows, x0, bounds=(low, high), x_scale=scale, max_nfev=30)
+        end = scipy.optimize.least_squares(rows, x0, bounds=(low, high), x_scale=scale, max_nfev=30)
         return end.x, 2.0 * float(end.cost) / _SCALE**2
 
     def _path_of(self, x: FloatArray, hold: Hold) -> SignalPath:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
@@ -235,7 +235,7 @@ def _refined(
         return np.vstack([change.real, change.imag])
 
     x0 = np.clip(vector_of(model), low + span, high - span)
-    found = least_squares(
+    found = scipy.optimize.least_squares(
         error,
         x0,
         slopes,

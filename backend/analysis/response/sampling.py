@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
@@ -116,7 +116,7 @@ def sampled_command(sent: FloatArray, path: SignalPath) -> FloatArray:
     zero-order hold it is u[k] = a·u[k-1] + (1-a)·r[k-1], a = exp(-2π·f_c·T).
     """
     numerator, a, whole = _difference_equation(path)
-    filtered = np.asarray(lfilter(numerator, [1.0, -a], sent)) * path.direct_gain
+    filtered = np.asarray(scipy.signal.lfilter(numerator, [1.0, -a], sent)) * path.direct_gain
     return np.concatenate([np.zeros(whole), filtered])[: filtered.size]
 
 
@@ -138,7 +138,7 @@ def rising_command(sent: FloatArray, path: SignalPath) -> FloatArray:
     if path.hold == "linear":
         return np.zeros_like(sent)
     numerator, a, whole = _sawtooth(path)
-    filtered = np.asarray(lfilter(numerator, [1.0, -a], sent)) * path.direct_gain
+    filtered = np.asarray(scipy.signal.lfilter(numerator, [1.0, -a], sent)) * path.direct_gain
     return np.concatenate([np.zeros(whole), filtered])[: filtered.size]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import median_filter
+import scipy
 
 from backend.analysis.mechanics.model_fit import Solution
 from backend.analysis.response.frf import Frf, valid_band_hz
@@ -61,7 +61,7 @@ def ended_where_unknown(frf: Frf) -> Frf:
     if not np.any(above):
         return frf
     rough = np.maximum(frf.std_db / _KNOWN_DB, frf.std_deg / _KNOWN_DEG)[above] * _CI95
-    known = f[above][median_filter(rough, 2 * _AROUND + 1, mode="nearest") <= 1.0]
+    known = f[above][scipy.ndimage.median_filter(rough, 2 * _AROUND + 1, mode="nearest") <= 1.0]
     if known.size and known[-1] == f[above][-1]:
         return frf
     return replace(frf, valid_band_hz=(low, float(np.max(known, initial=direct_hz))))

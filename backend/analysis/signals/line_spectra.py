@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from scipy.signal import resample_poly
+import scipy
 
 from backend.analysis.response.sampling import (
     SignalPath,
@@ -289,7 +289,7 @@ def _direction(velocity: FloatArray, lag_s: float, rate_hz: float) -> FloatArray
     lag is taken out of it before (as of a first-order filter). What swings near half the sample
     rate is no straight line from sample to sample; it is interpolated as the band allows.
     """
-    fine = resample_poly(velocity, _FINER, 1, window=("kaiser", 8.0))
+    fine = scipy.signal.resample_poly(velocity, _FINER, 1, window=("kaiser", 8.0))
     fine = fine + lag_s * rate_hz * _FINER * np.gradient(fine)
     after = np.append(fine[1:], fine[-1])
     rise = after - fine

@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import minimize
+import scipy
 
 from backend.analysis.signals.arrays import FloatArray, IntArray
 
@@ -53,7 +53,7 @@ def _optimised_period(
 
     best = rng.uniform(0, 2 * np.pi, lines.size)
     for power in (4, 8, 16, 40):
-        best = minimize(
+        best = scipy.optimize.minimize(
             norm, best, (power,), "L-BFGS-B", jac=True, options={"maxiter": iterations // 4}
         ).x
     signal = signal_of(best)

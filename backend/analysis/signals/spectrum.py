@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal as dsp
+import scipy
 
 from backend.analysis.signals.arrays import FloatArray
 
@@ -23,5 +23,5 @@ def power_density(
 ) -> Spectrum:
     """Welch's power spectral density, Hann windows with half overlap."""
     length = min(samples.size, segment_samples or max(256, samples.size // 8))
-    f, value = dsp.welch(samples, sample_rate_hz, nperseg=length)
+    f, value = scipy.signal.welch(samples, sample_rate_hz, nperseg=length)
     return Spectrum(np.asarray(f), np.asarray(value))

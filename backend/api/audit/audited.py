@@ -15,13 +15,15 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from backend.api.security.rights import API, Matched, Policy
 from backend.audit import AuditLog, Fact
 from backend.audit.asked import MOST_BYTES, Asked, asked, fields_of
-from backend.audit.facts import Kind
+from backend.audit.facts import Action, Kind
 from backend.people.rights import Right
 from backend.tools.registry import TOOLS
 
 #: Longest that an answer waits. The change itself never does.
 WAIT_S = 1.0
-_ACTIONS = {"POST": "made", "PUT": "changed", "PATCH": "changed", "DELETE": "deleted"}
+_ACTIONS: dict[str, Action] = {
+    "POST": "made", "PUT": "changed", "PATCH": "changed", "DELETE": "deleted",
+}  # fmt: skip
 _DRIVE = "/drives/{drive_id}"
 #: Routes whose changes are recorded where they happen: value by value, as jobs, or as what people
 #: do. `tests/security/test_every_change_is_told.py` asks each of them.
@@ -36,7 +38,7 @@ REPORTED_THERE = frozenset(
             f"{_DRIVE}/procedures/{{name}}", f"{_DRIVE}/jobs/load_set", f"{_DRIVE}/jobs/move",
             f"{_DRIVE}/jobs/sequence", f"{_DRIVE}/jobs/generate", f"{_DRIVE}/jobs/home",
             f"{_DRIVE}/jobs/identify", f"{_DRIVE}/jobs/sweep",
-            f"{_DRIVE}/jobs/step", f"{_DRIVE}/jobs/autotune", f"{_DRIVE}/jobs/firmware",
+            f"{_DRIVE}/jobs/autotune", f"{_DRIVE}/jobs/firmware",
             f"{_DRIVE}/jobs/put-back",
             f"{_DRIVE}/io/forcing/{{name}}", f"{_DRIVE}/tune/undo",
             *(f"{_DRIVE}/jobs/{tool.kind}" for tool in TOOLS),

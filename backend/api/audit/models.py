@@ -8,6 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from backend.api.models import Message
+from backend.tools.wire_message import MessageInfo
 
 AuditKind = Literal[
     "write", "procedure", "motion", "job", "stop", "lease", "login", "account", "invitation",
@@ -30,6 +31,8 @@ class AuditEvent(Message):
     old: AuditValue = Field(description="raw value before, where it was known")
     new: AuditValue = Field(description="raw value read back")
     outcome: str = Field(description="what went wrong; empty for success")
+    outcome_message: MessageInfo | None = Field(description="the same as code and facts")
+    title_message: MessageInfo | None = Field(description="what a job is called")
     detail: dict[str, AuditValue]
     hash: str
 
@@ -54,6 +57,7 @@ class AuditStatus(Message):
     """Whether events reach the database."""
 
     problem: str = Field(description="why they do not; empty while they do")
+    problem_message: MessageInfo | None = Field(description="the same as code and facts")
     pending: int = Field(description="events that wait")
     database: str = Field(description="its address, without a password")
 
@@ -66,3 +70,4 @@ class AuditVerdict(Message):
     head: str = Field(description="number:hash of the last good entry; note it as an anchor")
     broken: int | None = Field(description="number of the first entry that is wrong")
     why: str
+    why_message: MessageInfo | None = Field(description="the same as code and facts")

@@ -18,11 +18,13 @@ from backend.api.audit.models import (
     AuditVerdict,
 )
 from backend.api.context import TheBench
+from backend.api.errors import message_or_none, words_of
 from backend.api.times import in_utc
 from backend.audit.chain import Anchor
 from backend.audit.facts import KINDS
 from backend.audit.trail import Event, Filter
 from drivers.errors import OutOfRange
+from drivers.texts.message import language
 
 router = APIRouter(prefix="/audit")
 
@@ -45,7 +47,9 @@ def _message(event: Event) -> AuditEvent:
     return AuditEvent(
         number=event.number, time=event.time, station=event.station, person=event.person,
         kind=event.kind, action=event.action, axis=event.axis, target=event.target,
-        old=event.old, new=event.new, outcome=event.outcome, detail=event.detail,
+        old=event.old, new=event.new, outcome=words_of(event.outcome),
+        outcome_message=message_or_none(event.outcome),
+        title_message=message_or_none(event.title), detail=event.detail_in(language()),
         hash=event.hash,
     )  # fmt: skip
 
@@ -83,9 +87,11 @@ async def audit_names(bench: TheBench) -> AuditNames:
 @router.get("/status")
 async def audit_status(bench: TheBench) -> AuditStatus:
     """Whether events reach the database."""
+    # What is written into a file that is gone is lost, and no event may have come to report it.
+    problem = bench.audit.problem or bench.records.store.missing()
     return AuditStatus(
-        # What is written into a file that is gone is lost, and no event may have come to tell so.
-        problem=bench.audit.problem or bench.records.store.missing(),
+        problem=words_of(problem),
+        problem_message=message_or_none(problem),
         pending=bench.audit.pending,
         database=bench.records.store.shown,
     )
@@ -104,7 +110,7 @@ async def verify_audit(
     verdict = await bench.records.store.call(bench.records.trail.verify, known)
     return AuditVerdict(
         ok=verdict.ok, entries=verdict.entries, head=str(verdict.head), broken=verdict.broken,
-        why=verdict.why,
+        why=words_of(verdict.why), why_message=message_or_none(verdict.why),
     )  # fmt: skip
 
 
@@ -124,7 +130,7 @@ async def export_audit(
     wanted = _filter(kind, person, axis, station, words, since, until)
     if wanted.since and wanted.until and wanted.since >= wanted.until:
         raise OutOfRange("api-audit.since-must-before-until")
-    lines = bench.records.trail.export(wanted, form)
+    lines = bench.records.trail.export(wanted, form, language())
     store = bench.records.store
 
     def some() -> str:

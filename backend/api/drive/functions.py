@@ -80,7 +80,9 @@ async def fault_history(connected: TheDrive) -> FaultHistoryInfo:
 async def read_fault_history(bench: TheBench, connected: Controlled) -> FaultHistoryInfo:
     """The drive's own record, read now; a selector is written and put back where it takes one."""
     entries = await read_history(connected.axis)
-    bench.journal.add(f"{connected.drive.name}: fault history read", drive=connected.drive.id)
+    bench.journal.add(
+        text("journal.fault-history-read", drive=connected.drive.name), drive=connected.drive.id
+    )
     return _history(connected.drive, history_of(connected.drive), entries)
 
 
@@ -147,7 +149,8 @@ async def start_identification(
         motion=True,
     )
     bench.journal.add(
-        f"{connected.drive.name}: identification by the drive", drive=connected.drive.id
+        text("journal.identification-by-drive", drive=connected.drive.name),
+        drive=connected.drive.id,
     )
     return convert.job(job)
 
@@ -282,8 +285,14 @@ async def write_gear(
         key = value.parameter.key
         if key in change.before:
             bench.journal.add(
-                f"{connected.drive.name}: {key} {value.parameter.name}: "
-                f"{change.before[key]} → {value.raw}",
+                text(
+                    "journal.parameter-written",
+                    drive=connected.drive.name,
+                    key=key,
+                    name=value.parameter.name,
+                    before=str(change.before[key]),
+                    after=str(value.raw),
+                ),
                 drive=connected.drive.id,
             )
     return GearWritten(before=change.before, waits=change.waits)

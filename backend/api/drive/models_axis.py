@@ -7,7 +7,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from backend.api.models import Message, MessageInfo
+from backend.api.models import Message
+from backend.tools.wire_message import MessageInfo
 
 
 class ActiveFault(Message):

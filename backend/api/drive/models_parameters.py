@@ -7,7 +7,8 @@ from typing import Literal
 
 from pydantic import ConfigDict, Field, field_validator
 
-from backend.api.models import Message, MessageInfo, Problem, Raw
+from backend.api.models import Message, Problem, Raw
+from backend.tools.wire_message import MessageInfo
 
 
 class ParameterInfo(Message):

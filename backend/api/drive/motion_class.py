@@ -13,6 +13,7 @@ from backend.api.station.models_description import PROFILE_NAME, MotionClass, Mo
 from backend.audit.asked import note_before
 from backend.station.bench import Bench
 from drivers.errors import NotAllowed
+from drivers.texts.message import reason_of, text
 from profiles import load_profile
 from profiles.loader import ProfileError
 from profiles.motion.decisions import CannotClassify, classify, forget, why_fixed
@@ -29,7 +30,9 @@ def _known(profile: str, key: str) -> tuple[Profile, Parameter]:
     try:
         known = load_profile(profile)
     except ProfileError as error:
-        raise NotFound(str(error), value=profile, remedy="see the list of profiles") from error
+        raise NotFound(
+            reason_of(error), value=profile, remedy="api-station.see-profiles"
+        ) from error
     parameter = known.parameter(key)
     if parameter is None:
         raise NotFound("api-drive.no-parameter-see-list", parameter=key, known_title=known.title)
@@ -93,10 +96,10 @@ def _note(profile: str, key: str) -> None:
 
 def _refused(key: str, error: CannotClassify) -> NotAllowed:
     return NotAllowed(
-        str(error),
+        reason_of(error),
         parameter=key,
-        limit="objects of imported profiles that no standard describes",
-        remedy="use the page of the function that the object belongs to",
+        limit=text("limit.imported-objects"),
+        remedy="api-drive.use-page-of-function",
     )
 
 
@@ -106,5 +109,10 @@ async def _changed(bench: Bench, profile: str, parameter: Parameter) -> MotionCl
     for connected in bench.connected_drives.values():
         if connected.drive.profile.drive == profile:
             connected.drive.profile = known
-    bench.journal.add(f"{known.title}: {parameter.key} {parameter.name}: {parameter.motion}")
+    bench.journal.add(
+        text(
+            "journal.motion-class", title=known.title, key=parameter.key, name=parameter.name,
+            motion=parameter.motion,
+        )
+    )  # fmt: skip
     return _answer(profile, parameter.key)

@@ -12,6 +12,7 @@ from backend.api.station.models import DriveSummary
 from backend.motion.classes import motion_of
 from backend.people.rights import Right
 from drivers.errors import NotAllowed
+from drivers.texts.message import text
 
 router = APIRouter(prefix="/drives/{drive_id}")
 
@@ -39,6 +40,12 @@ async def keep_as_it_is(bench: TheBench, connected: Controlled) -> DriveSummary:
     connected.drive.pending_restores.settle([entry.key for entry in entries])
     for entry in entries:
         bench.tell(
-            f"{connected.drive.name}: {entry.key} (was {entry.raw}) stays as it is", connected
+            text(
+                "journal.stays-as-it-is",
+                drive=connected.drive.name,
+                key=entry.key,
+                before=str(entry.raw),
+            ),
+            connected,
         )
     return convert.drive_summary(bench, connected)

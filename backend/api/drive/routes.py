@@ -74,7 +74,10 @@ async def transition(
     goal = State(request.goal)
     mode = None if request.mode is None else _mode(connected, request.mode)
     await _alone(bench, connected, goal.value, lambda: connected.axis.transition(goal, mode))
-    bench.journal.add(f"{connected.drive.name}: {goal.value}", drive=connected.drive.id)
+    bench.journal.add(
+        text("journal.power-state", drive=connected.drive.name, state=goal.value),
+        drive=connected.drive.id,
+    )
     return convert.axis_state(bench, connected, await connected.monitor.refresh())
 
 
@@ -124,7 +127,9 @@ def _mode(connected: ConnectedDrive, number: int) -> Mode:
 async def fault_reset(bench: TheBench, connected: Controlled) -> AxisState:
     """Reset faults whose cause is gone."""
     await _alone(bench, connected, "Fault reset", connected.axis.reset_fault)
-    bench.journal.add(f"{connected.drive.name}: fault reset", drive=connected.drive.id)
+    bench.journal.add(
+        text("journal.fault-reset", drive=connected.drive.name), drive=connected.drive.id
+    )
     return convert.axis_state(bench, connected, await connected.monitor.refresh())
 
 
@@ -208,8 +213,14 @@ async def _write(
             await _require_disabled(connected, parameter.key)
         reading = await drive.write(key, 0 if value is None else value, raw=raw)
     bench.journal.add(
-        f"{drive.name}: {parameter.key} {parameter.name}: "
-        f"{old.value if old else 'not read'} → {reading.value} {parameter.unit}".rstrip(),
+        text(
+            "journal.parameter-written",
+            drive=drive.name,
+            key=parameter.key,
+            name=parameter.name,
+            before=str(old.value) if old else text("journal.not-read"),
+            after=f"{reading.value} {parameter.unit}".rstrip(),
+        ),
         drive=drive.id,
     )
     if parameter.key in drive.profile.unit_keys:
@@ -237,9 +248,15 @@ async def write_motion_setting(
     with bench.motion.keeping_still(connected):
         reading = await assign(connected.axis, parameter.key, raw, reason)
     bench.journal.add(
-        f"{drive.name}: {parameter.key} {parameter.name}: "
-        f"{old.value if old else 'not read'} → {reading.value}"
-        + (f" ({reason})" if reason else ""),
+        text(
+            "journal.parameter-written-because" if reason else "journal.parameter-written",
+            drive=drive.name,
+            key=parameter.key,
+            name=parameter.name,
+            before=str(old.value) if old else text("journal.not-read"),
+            after=str(reading.value),
+            reason=reason,
+        ),
         level="warning",
         drive=drive.id,
     )
@@ -307,7 +324,7 @@ async def run_procedure(
         drive=connected.drive.id,
         motion=True,
     )
-    bench.journal.add(f"{connected.drive.name}: {known.title}", drive=connected.drive.id)
+    bench.journal.add(job.title_text, drive=connected.drive.id)
     return convert.job(job)
 
 
@@ -346,10 +363,13 @@ async def load_set(bench: TheBench, connected: Controlled, request: LoadSetReque
         motion=True,
         stoppable=False,
     )
-    which = f" version {request.version}" if request.version else ""
     bench.journal.add(
-        f"{connected.drive.name}: load {request.file}{which}", drive=connected.drive.id
-    )
+        text(
+            "journal.load-set-version" if request.version else "journal.load-set",
+            drive=connected.drive.name, file=request.file, version=request.version,
+        ),
+        drive=connected.drive.id,
+    )  # fmt: skip
     return convert.job(job)
 
 

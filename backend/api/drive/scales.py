@@ -14,11 +14,12 @@ from backend.api.drive.models_scales import (
     SmallMovesInfo,
     TurnedUpdate,
 )
+from backend.api.errors import words_of
 from backend.api.models import JobInfo
 from backend.audit.asked import note_before
 from backend.axis import teaching
 from backend.axis.restoring import shielded
-from backend.scales.scale import Scale, what_to_do
+from backend.scales.scale import Origin, Quantity, Scale, what_to_do
 from backend.scales.taught import Taught
 from backend.scales.units import AxisUnits
 from backend.station.bench import Bench
@@ -27,9 +28,21 @@ from backend.station.measuring import EXCHANGE_ENDS_S, exchange_for
 from backend.tools.moves.small_move import SmallMoveSettings, longest_allowed, small_move
 from backend.work.jobs import JobResult, Progress
 from drivers.errors import DriveError
-from drivers.texts.message import text
+from drivers.texts.message import Text, joined, text
 
 router = APIRouter(prefix="/drives/{drive_id}")
+_QUANTITIES = {
+    Quantity.POSITION: text("journal.position"), Quantity.VELOCITY: text("journal.velocity"),
+    Quantity.ACCELERATION: text("journal.acceleration"),
+}  # fmt: skip
+_ORIGINS = {
+    Origin.MANUAL: text("journal.origin-manual"),
+    Origin.MAKERS_FILE: text("journal.origin-makers-file"),
+    Origin.DRIVE: text("journal.origin-drive"),
+    Origin.USER: text("journal.origin-user"),
+    Origin.MEASURED: text("journal.origin-measured"),
+    Origin.UNKNOWN: text("journal.origin-unknown"),
+}  # fmt: skip
 _UNITS = {"position": "rev", "velocity": "rpm", "acceleration": "rpm/s"}
 
 
@@ -93,8 +106,10 @@ async def start_small_move(
         await exchange.end()
         raise
     exchange.ends_with(job)
-    said = f"{connected.drive.name}: small move by {request.increments} increments"
-    bench.journal.add(said, drive=connected.drive.id)
+    line = text(
+        "journal.small-move", drive=connected.drive.name, increments=str(request.increments)
+    )
+    bench.journal.add(line, drive=connected.drive.id)
     return convert.job(job)
 
 
@@ -106,15 +121,20 @@ async def _keep(bench: Bench, connected: ConnectedDrive, taught: Taught | None) 
         store.put(drive.id, old.model_copy(update={"scales": taught}))
         connected.axis.teach(taught)
         units = await connected.axis.units()
-    said = "; ".join(_said(scale) for scale in units.scales.all)
-    bench.journal.add(f"{drive.name}: scales: {said}", drive=drive.id)
+    scales = joined(_line(scale) for scale in units.scales.all)
+    bench.journal.add(text("journal.scales", drive=drive.name, scales=scales), drive=drive.id)
     bench.drives_changed()
     return _info(connected, units)
 
 
-def _said(scale: Scale) -> str:
-    factor = "not certain" if scale.raw_per_unit is None else f"{scale.raw_per_unit:.6g} raw"
-    return f"{scale.quantity.value} {factor} per {_UNITS[scale.quantity]} ({scale.origin.value})"
+def _line(scale: Scale) -> Text:
+    known = scale.raw_per_unit is not None
+    return text(
+        "journal.scale" if known else "journal.scale-not-certain",
+        quantity=_QUANTITIES[scale.quantity],
+        raw=f"{scale.raw_per_unit:.6g}" if known else "", unit=_UNITS[scale.quantity],
+        origin=_ORIGINS[scale.origin],
+    )  # fmt: skip
 
 
 def _info(connected: ConnectedDrive, units: AxisUnits) -> ScalesInfo:
@@ -145,6 +165,6 @@ def _one(scale: Scale, units: AxisUnits) -> ScaleInfo:
         origin=scale.origin,
         source=scale.source,
         uncertainty=scale.uncertainty,
-        why=scale.why,
-        remedy="" if scale.certain else what_to_do(scale),
+        why=words_of(scale.why),
+        remedy=words_of(None if scale.certain else what_to_do(scale)),
     )

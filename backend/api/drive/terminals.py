@@ -25,6 +25,7 @@ from backend.drive.catalog import functions_of
 from backend.drive.terminals import ProbeSettings, TerminalState
 from backend.functions.forcing import ForcingSession, ForcingSessions
 from backend.station.connected_drive import ConnectedDrive
+from drivers.texts.message import Text, joined, text
 from profiles.functions import Forcing, TerminalFacts
 
 router = APIRouter(prefix="/drives/{drive_id}/io")
@@ -111,7 +112,7 @@ async def start_forcing(
         connected.axis, name, confirmed=request.confirmed, connection=connection
     )
     bench.journal.add(
-        f"{connected.drive.name}: {session.spec.title}: begun",
+        text("journal.forcing-begun", drive=connected.drive.name, title=session.spec.title),
         level="warning",
         drive=connected.drive.id,
     )
@@ -132,12 +133,14 @@ async def overrule(
     if request.values:
         await session.set(request.values)
         session.renew()
-        reported = ", ".join(
-            f"{n} {'released' if v is None else 'on' if v else 'off'}"
-            for n, v in request.values.items()
-        )
+        reported = joined((_line(n, v) for n, v in request.values.items()), ", ")
         bench.journal.add(
-            f"{connected.drive.name}: {session.spec.title}: {reported}",
+            text(
+                "journal.forced",
+                drive=connected.drive.name,
+                title=session.spec.title,
+                terminals=reported,
+            ),
             level="warning",
             drive=connected.drive.id,
         )
@@ -152,9 +155,16 @@ async def end_forcing(
     session = _running(connected, sessions, name)
     await sessions.end(connected.drive.id, name)
     bench.journal.add(
-        f"{connected.drive.name}: {session.spec.title}: ended", drive=connected.drive.id
+        text("journal.forcing-ended", drive=connected.drive.name, title=session.spec.title),
+        drive=connected.drive.id,
     )
     return _forcing(session.spec, None)
+
+
+def _line(terminal: str, value: bool | None) -> Text:
+    if value is None:
+        return text("journal.terminal-released", terminal=terminal)
+    return text("journal.terminal-on" if value else "journal.terminal-off", terminal=terminal)
 
 
 def _running(connected: ConnectedDrive, sessions: ForcingSessions, name: str) -> ForcingSession:
@@ -179,7 +189,11 @@ async def set_probe(
         ),
     )
     bench.journal.add(
-        f"{connected.drive.name}: touch probe {number} {'on' if request.on else 'off'}",
+        text(
+            "journal.touch-probe-on" if request.on else "journal.touch-probe-off",
+            drive=connected.drive.name,
+            number=number,
+        ),
         drive=connected.drive.id,
     )
     return convert.reading(connected.drive, reading.key)

@@ -38,6 +38,7 @@ from backend.parameters.set_file import BadSet, ParameterSet
 from backend.people.identity import acting_person
 from backend.station.bench import Bench
 from drivers.errors import NotAllowed
+from drivers.texts.message import text
 from profiles.schema import Profile, Raw
 
 router = APIRouter()
@@ -110,7 +111,14 @@ async def _export(
         )  # fmt: skip
         await asyncio.to_thread(handover_log(bench).add, drive.id, made)
         bench.journal.add(
-            f"{drive.name}: handed over {each.set_file} as {request.format}, {name}", drive=drive.id
+            text(
+                "journal.handed-over",
+                drive=drive.name,
+                file=each.set_file,
+                format=request.format,
+                name=name,
+            ),
+            drive=drive.id,
         )
     several = len(axes) > 1
     return HandoverResult(

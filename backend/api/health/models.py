@@ -6,9 +6,10 @@ from datetime import datetime
 
 from pydantic import BaseModel, Field
 
-from backend.api.models import Message, MessageInfo
+from backend.api.models import Message
 from backend.health.compare import Code, Direction
 from backend.tools.health.result import HealthValue, Quantity
+from backend.tools.wire_message import MessageInfo
 
 
 class HealthFinding(BaseModel):

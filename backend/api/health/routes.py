@@ -22,6 +22,7 @@ from backend.health.compare import Finding
 from backend.health.records import Baseline, Condition, HealthRow, axis_of
 from backend.health.words import message_of
 from backend.tools.health.result import UNITS
+from drivers.texts.message import text
 
 router = APIRouter()
 _TREND = TypeAdapter(list[AxisHealth])
@@ -67,8 +68,13 @@ async def sign_baseline(
         records.sign, axis.key, request.runs, person, request.notes
     )
     bench.journal.add(
-        f"{connected.drive.name}: health baseline {signed.id} signed by {signed.person}, "
-        f"SHA-256 {signed.sha256}",
+        text(
+            "journal.baseline-signed",
+            drive=connected.drive.name,
+            id=str(signed.id),
+            person=signed.person,
+            sha256=signed.sha256,
+        ),
         drive=connected.drive.id,
     )
     return info_of(await bench.records.store.call(records.condition, axis))

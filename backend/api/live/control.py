@@ -13,6 +13,7 @@ from backend.api.live.people_messages import (
     LeaseOverride,
 )
 from backend.api.people.record import PeopleRecord
+from backend.audit.facts import Action
 from backend.people.errors import Forbidden
 from backend.people.identity import Identity
 from backend.people.lease import Notice
@@ -20,7 +21,7 @@ from backend.people.rights import GRANTABLE, Right
 from backend.people.station import People
 from backend.station.bench import Bench
 from drivers.errors import NotAllowed
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 
 
 class PeopleControl:
@@ -47,15 +48,18 @@ class PeopleControl:
         match request:
             case LeaseAsk():
                 leases.ask(drive, page.id, identity.person)
-                self._log(drive, identity, "asks for control")
+                line = text("journal.asks-control", person=identity.person)
+                self._log(drive, "asks", line, identity)
             case LeaseAnswer(give=True):
                 if leases.asked(drive) is not None:
                     page.release(drive, "control was handed over")
                     leases.give(drive, page.id)
-                    self._log(drive, identity, "gives control")
+                    line = text("journal.gives-control", person=identity.person)
+                    self._log(drive, "gives", line, identity)
             case LeaseAnswer():
                 leases.refuse(drive, page.id)
-                self._log(drive, identity, "keeps control")
+                line = text("journal.keeps-control", person=identity.person)
+                self._log(drive, "keeps", line, identity)
             case LeaseHand():
                 to = self._pages.get(request.to)
                 if to is None:
@@ -63,7 +67,10 @@ class PeopleControl:
                 require_control(self._people, to.identity, drive)
                 page.release(drive, "control was handed over")
                 leases.hand(drive, page.id, to.id, to.identity.person, request.time_s)
-                self._log(drive, identity, f"hands control to {to.identity.person}")
+                line = text(
+                    "journal.hands-control", person=identity.person, other=to.identity.person
+                )
+                self._log(drive, "hands over", line, identity)
             case LeaseOverride():
                 await self._override(page, identity, drive)
 
@@ -79,11 +86,11 @@ class PeopleControl:
                 # Who watched this motion does not control it any more.
                 await self._bench.motion.stop([drive])
         self._bench.leases.override(drive, page.id, identity.person)
-        self._log(drive, identity, "takes control by override")
+        line = text("journal.overrides-control", person=identity.person)
+        self._log(drive, "overrides", line, identity)
 
-    def _log(self, drive: str, identity: Identity, what: str) -> None:
-        text = f"{identity.person} {what}"
-        self._record.note("lease", what, text, drive=drive, person=identity.person)
+    def _log(self, drive: str, action: Action, line: Text, identity: Identity) -> None:
+        self._record.note("lease", action, line, drive=drive, person=identity.person)
 
     def _notice(self, notice: Notice) -> None:
         page = self._pages.get(notice.connection)

@@ -36,7 +36,7 @@ from backend.people.identity import Identity
 from backend.people.station import People
 from backend.people.throttle import Bucket
 from backend.station.bench import Bench
-from drivers.texts.message import text
+from drivers.texts.message import prose, text
 
 #: Lines of a page's chat at once, and a second: nobody talks the log full.
 _TALK = (10.0, 1.0)
@@ -135,7 +135,7 @@ class PeopleLive:
         if not self._talk.setdefault(page.id, Bucket(*_TALK)).take():
             raise TooOften("api-live.too-many-lines-once", 1.0)
         line = self._support.say(identity, text)
-        self._bench.journal.add(f"“{line.text}”", person=identity.person)
+        self._bench.journal.add(prose(f"“{line.text}”"), person=identity.person)
         shared = only(chat_line(line))
         for each in list(self._pages.values()):
             each.send(shared)
@@ -151,7 +151,7 @@ class PeopleLive:
         self._record.note(
             "invitation",
             "motion enabled",
-            f"enabling button held for {guest}",
+            text("journal.enabling-held", guest=guest),
             target=guest,
             person=identity.person,
         )

@@ -12,7 +12,7 @@ from backend.people.support import Invitation
 from backend.station.bench import Bench
 from backend.work.jobs import Job
 from drivers.cia402 import State
-from drivers.texts.message import Text, text
+from drivers.texts.message import Text, as_text, text
 
 
 class PeopleMotions:
@@ -71,9 +71,9 @@ class PeopleMotions:
         self._record.note(
             "invitation",
             "motion ended",
-            f"{invitation.guest} may not move anything now: {why}",
+            text("journal.guest-may-not-move", guest=invitation.guest, why=why),
             target=invitation.guest,
-            outcome=why,
+            outcome=as_text(why),
         )
         guests = [p for p in self._pages.values() if session and p.identity.session == session]
         for page in guests:

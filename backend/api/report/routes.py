@@ -31,6 +31,7 @@ from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.store.database import DatabaseFailed
 from drivers.errors import NotAllowed
+from drivers.texts.message import text
 
 router = APIRouter()
 _TYPES: dict[Format, str] = {"html": "text/html; charset=utf-8", "pdf": "application/pdf"}
@@ -62,7 +63,8 @@ async def make_report(bench: TheBench, connected: TheDrive, request: ReportReque
         whole = replace(whole, trouble=(*whole.trouble, error.message))
     data = await asyncio.to_thread(render, whole, request.language, request.format)
     file = await asyncio.to_thread(_store(bench).save, connected.drive.name, request.format, data)
-    bench.journal.add(f"{connected.drive.name}: report {file}", drive=connected.drive.id)
+    line = text("journal.report", drive=connected.drive.name, file=file)
+    bench.journal.add(line, drive=connected.drive.id)
     return _info(bench, file)
 
 

@@ -13,6 +13,7 @@ from backend.api.station.models_description import ImportedList
 from backend.parameters.lists import export_list, import_list
 from backend.parameters.set_file import MAX_BYTES, BadSet
 from drivers.errors import NotAllowed
+from drivers.texts.message import reason_of, text
 from profiles import load_profile
 from profiles.loader import ProfileError
 from profiles.schema import Profile
@@ -24,7 +25,7 @@ def _family(name: str) -> Profile:
     try:
         return load_profile(name)
     except ProfileError as error:
-        raise NotFound(str(error), value=name) from error
+        raise NotFound(reason_of(error), value=name) from error
 
 
 _MEDIA = {"csv": "text/csv; charset=utf-8", "dcf": "application/octet-stream"}
@@ -84,9 +85,10 @@ async def store_list(
         data += chunk
         if len(data) > MAX_BYTES:
             raise BadSet("api-sets.larger-bytes", file=file, max_bytes=MAX_BYTES)
-    text, found = import_list(bytes(data), _family(profile), file, datetime.now(UTC))
-    stored = await bench.records.store.call(bench.sets.store, file, text, overwrite=overwrite)
-    bench.journal.add(f"imported {stored}: {len(found.readings)} parameters")
+    content, found = import_list(bytes(data), _family(profile), file, datetime.now(UTC))
+    stored = await bench.records.store.call(bench.sets.store, file, content, overwrite=overwrite)
+    line = text("journal.set-imported", file=stored, count=len(found.readings))
+    bench.journal.add(line)
     return ImportedList(
         file=stored, parameters=len(found.readings), problems=list(found.problems[:200])
     )

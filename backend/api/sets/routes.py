@@ -23,6 +23,7 @@ from backend.people.identity import acting_person
 from backend.station.bench import Bench
 from backend.tools import parameters
 from drivers.errors import NotAllowed, OutOfRange
+from drivers.texts.message import text
 
 router = APIRouter()
 
@@ -59,7 +60,7 @@ async def save_set(bench: TheBench, connected: Controlled, request: SaveSetReque
     )
     missing = parameters.without((await _parsed(bench, name, None)).not_read)
     bench.journal.add(
-        f"{connected.drive.name}: saved {name}{missing}",
+        text("journal.set-saved", drive=connected.drive.name, file=name, missing=missing),
         level="warning" if missing else "info",
         drive=connected.drive.id,
     )

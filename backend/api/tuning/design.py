@@ -47,7 +47,7 @@ from backend.tools.notch import filters as notch
 from backend.tools.notch.meaning import meaning_of
 from backend.tools.sweep import evaluation as sweep_evaluation
 from drivers.errors import NotAllowed, OutOfRange
-from drivers.texts.message import joined, text
+from drivers.texts.message import joined, reason_of, text
 
 router = APIRouter()
 
@@ -123,7 +123,9 @@ async def write_notches(bench: TheBench, connected: Controlled, request: NotchWr
             connected.axis, _notches(request.notches), meaning_of(connected.drive)
         )
     undo = await _note(bench, connected, "notches", before)
-    bench.journal.add(f"{connected.drive.name}: notches written", drive=connected.drive.id)
+    bench.journal.add(
+        text("journal.notches-written", drive=connected.drive.name), drive=connected.drive.id
+    )
     return undo
 
 
@@ -159,7 +161,9 @@ async def write_gains(bench: TheBench, connected: Controlled, request: GainWrite
     with bench.motion.keeping_still(connected):
         before = await write_settings(connected.axis, raw)
     undo = await _note(bench, connected, "gains", before)
-    bench.journal.add(f"{connected.drive.name}: gains written", drive=connected.drive.id)
+    bench.journal.add(
+        text("journal.gains-written", drive=connected.drive.name), drive=connected.drive.id
+    )
     return undo
 
 
@@ -178,7 +182,9 @@ async def undo_tuning(bench: TheBench, connected: Controlled, request: Undo) -> 
         _require_untouched(connected.drive, request, now)
         await put_back(connected.axis, request.before)
     undo = await _note(bench, connected, "undo", now)
-    bench.journal.add(f"{connected.drive.name}: tuning taken back", drive=connected.drive.id)
+    bench.journal.add(
+        text("journal.tuning-undone", drive=connected.drive.name), drive=connected.drive.id
+    )
     return undo
 
 
@@ -206,7 +212,9 @@ def _evaluated(file: Path, _changed_ns: int) -> sweep_evaluation.SweepResult:
     try:
         return sweep_evaluation.reevaluate(measurement.arrays, measurement.meta)
     except ValueError as error:
-        raise BadMeasurement(f"{file.name}: {error}", value=file.name) from error
+        raise BadMeasurement(
+            "api-tuning.cannot-be-evaluated", value=file.name, cause=reason_of(error)
+        ) from error
 
 
 #: Evaluations that run now, each on its event loop.
@@ -266,7 +274,9 @@ async def predict(bench: TheBench, connected: TheDrive, request: PredictRequest)
     try:
         filters = notch.combined(connected.drive.profile, wanted, f, meaning_of(connected.drive))
     except ValueError as error:
-        raise OutOfRange(f"{connected.drive.name}: {error}", drive=connected.drive.name) from error
+        raise OutOfRange(
+            "api-tuning.notch-out-of-range", drive=connected.drive.name, cause=reason_of(error)
+        ) from error
     fixed = gains.loops_of(connected.drive, facts).response(f) * filters
     opened = speed_loop(
         f, plant.response(), np.asarray(fixed),

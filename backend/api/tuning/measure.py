@@ -22,7 +22,6 @@ from backend.api.tuning.measurements import change_log
 from backend.api.tuning.models import (
     AutotuneRequest,
     ExcitationInfo,
-    StepRequest,
     SweepRequest,
     ToolInfo,
 )
@@ -38,7 +37,6 @@ from backend.tools.autotune import run as autotune
 from backend.tools.autotune.apply import take_back
 from backend.tools.health.settings import HealthSettings
 from backend.tools.registry import TOOLS
-from backend.tools.step import run as step_response
 from backend.tools.sweep import evaluation as sweep_evaluation
 from backend.tools.sweep import profile_speed
 from backend.tools.sweep import run as sweep
@@ -46,7 +44,7 @@ from backend.tools.sweep.preview import preview
 from backend.tools.tool import AnyTool, Keep, Run, ToolSettings
 from backend.work.jobs import JobResult, Progress
 from drivers.errors import DriveError
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 
 router = APIRouter()
 for part in (routes_design, routes_measurements, routes_report, routes_response_import):
@@ -60,7 +58,7 @@ async def _start(
     connected: ConnectedDrive,
     request: ToolSettings,
     kind: str,
-    title: str,
+    title: Text,
     tool: Measure,
     *,
     closes_loops: bool = True,
@@ -101,7 +99,7 @@ async def _start(
             profile_speed.require_consent(session, connected.drive, request.consent)
         job = bench.jobs.start(
             kind,
-            text("work.of-drive", title=text(title), drive=connected.drive.name),
+            text("work.of-drive", title=title, drive=connected.drive.name),
             work,
             drive=connected.drive.id,
             motion=True,
@@ -111,7 +109,7 @@ async def _start(
         await exchange.end()
         raise
     exchange.ends_with(job)
-    bench.journal.add(f"{connected.drive.name}: {text(title)}", drive=connected.drive.id)
+    bench.journal.add(job.title_text, drive=connected.drive.id)
     return convert.job(job)
 
 
@@ -171,23 +169,9 @@ async def start_sweep(bench: TheBench, connected: Controlled, request: SweepRequ
             await sweep.sweep(connected.axis, session, settings, progress, keep)
         )
 
-    return await _start(bench, connected, request, "sweep", "api-tuning.frequency-response", tool)
-
-
-@router.post("/drives/{drive_id}/jobs/step", status_code=202)
-async def start_step(bench: TheBench, connected: Controlled, request: StepRequest) -> JobInfo:
-    """Step of speed, or a move, with its numbers."""
-    settings = step_response.StepSettings(
-        request.envelope, request.kind, request.size, request.hold_s, request.speed,
-        request.acceleration, request.window, request.rated_torque_nm,
-    )  # fmt: skip
-
-    async def tool(session: CyclicSession, progress: Progress, keep: Keep) -> JobResult:
-        return step_response.as_json(
-            await step_response.step_response(connected.axis, session, settings, progress, keep)
-        )
-
-    return await _start(bench, connected, request, "step", "api-tuning.step-response", tool)
+    return await _start(
+        bench, connected, request, "sweep", text("api-tuning.frequency-response"), tool
+    )
 
 
 @router.post("/drives/{drive_id}/jobs/autotune", status_code=202)
@@ -215,7 +199,7 @@ async def start_autotune(
             )
         return autotune.as_json(found) | {"after": after}
 
-    return await _start(bench, connected, request, "autotune", "api-tuning.tune", tool)
+    return await _start(bench, connected, request, "autotune", text("api-tuning.tune"), tool)
 
 
 # --- tools with a descriptor ---------------------------------------------------------------
@@ -226,7 +210,11 @@ async def list_tools() -> list[ToolInfo]:
     """Every tool that has a descriptor: its words, and the form of its settings."""
     return [
         ToolInfo(
-            kind=tool.kind, texts={name: list(both) for name, both in tool.texts.items()},
+            kind=tool.kind,
+            texts={
+                name: [tool.text(name, "en"), tool.text(name, "zh")]
+                for name in ("title", *tool.texts)
+            },
             settings=tool.settings.model_json_schema(),
         )
         for tool in TOOLS
@@ -242,7 +230,7 @@ def _add(tool: AnyTool) -> None:
             return dict(found.model_dump(mode="json"))
 
         return await _start(
-            bench, connected, request, tool.kind, tool.text("title"), measure,
+            bench, connected, request, tool.kind, tool.title, measure,
             closes_loops=tool.closes_loops,
         )  # fmt: skip
 

@@ -18,6 +18,7 @@ from backend.station.bench import Bench
 from backend.station.evaluation import evaluate
 from backend.tools.spoken import result_in_language
 from drivers.errors import NotAllowed, OutOfRange
+from drivers.texts import limits
 from drivers.texts.message import language
 
 router = APIRouter()
@@ -127,7 +128,7 @@ async def upload_measurement(
     data = await request.body()
     if len(data) > _MAX_BYTES:
         raise OutOfRange(
-            "api-tuning.too-large", value=len(data), limit=f"{_MAX_BYTES} bytes", name=name
+            "api-tuning.too-large", value=len(data), limit=limits.size(_MAX_BYTES), name=name
         )
     whole = name.removesuffix(SUFFIX) + SUFFIX
     stored = await asyncio.to_thread(bench.measurements.store, whole, data)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
-from backend.api.models import Message, MessageInfo
+from backend.api.models import Message
+from backend.tools.results import ToolOutcome
 from backend.tools.tool import ToolSettings
+from backend.tools.wire_message import MessageInfo
 
 
 class TuneLimits(ToolSettings):
@@ -53,17 +55,6 @@ class ExcitationInfo(Message):
     duration_s: float = Field(description="of all realisations together")
     realisations: int
     inertia_kgm2: float = Field(description="that was assumed")
-
-
-class StepRequest(TuneLimits):
-    """A step of speed (rpm) or a move (rev)."""
-
-    kind: Literal["speed", "move"] = "speed"
-    size: float = 100.0
-    hold_s: float = Field(default=0.25, gt=0, le=5)
-    speed: float = Field(default=300.0, gt=0)
-    acceleration: float = Field(default=6000.0, gt=0)
-    window: float | None = Field(default=None, gt=0)
 
 
 class AutotuneRequest(TuneLimits):
@@ -190,7 +181,9 @@ class MeasurementContent(Message):
 
     info: MeasurementInfo
     settings: dict[str, object]
-    result: dict[str, object]
+    result: Annotated[ToolOutcome | dict[str, object], Field(union_mode="left_to_right")] = Field(
+        description="of a tool: its result, which its field tool names"
+    )
     agrees: bool | None = Field(
         description="whether the result is the one that was concluded at the time; null: unknown"
     )

@@ -26,8 +26,10 @@ from backend.station.recording import facts
 from backend.station.recording.streams import describe_streams
 from backend.store.files import StorageFailed, checked_name
 from backend.store.free_space import RESERVE_BYTES, free_bytes
-from drivers.errors import DriveError, NotAllowed
+from drivers.errors import DriveError, NotAllowed, why_of
 from drivers.link import ScopeBlock
+from drivers.texts import limits
+from drivers.texts.message import text
 
 SUFFIX = ".zip"
 #: Seconds before and after the fault.
@@ -185,10 +187,12 @@ class FaultCapture:
         try:
             name = await self._write(evidence)
         except (DriveError, OSError) as error:
-            self._bench.journal.add(f"no support bundle for {reason}: {error}", level="error")
+            line = text("journal.no-bundle", reason=reason, cause=why_of(error))
+            self._bench.journal.add(line, level="error")
             self._hold(evidence)
             return
-        self._bench.journal.add(f"{reason}: the last seconds are kept in {name}", level="warning")
+        line = text("journal.seconds-kept", reason=reason, name=name)
+        self._bench.journal.add(line, level="warning")
 
     def _hold(self, evidence: Evidence) -> None:
         """Keep what could not be written until it can be. The first cause stays, later ones go:
@@ -197,7 +201,7 @@ class FaultCapture:
         if self._held is not None and not self._held.done():
             return
         self._bench.journal.add(
-            f"{evidence.reason}: the last seconds are held in memory until the disk takes them",
+            text("journal.seconds-in-memory", reason=evidence.reason),
             level="warning",
         )
         self._held = asyncio.create_task(self._until_written(evidence), name="fault-held")
@@ -207,8 +211,8 @@ class FaultCapture:
             await asyncio.sleep(AGAIN_S)
             with contextlib.suppress(DriveError, OSError):
                 name = await self._write(evidence)
-                text = f"{evidence.reason}: what was held in memory is kept in {name}"
-                self._bench.journal.add(text, level="warning")
+                line = text("journal.memory-kept", reason=evidence.reason, name=name)
+                self._bench.journal.add(line, level="warning")
                 return
 
     # --- bundles ----------------------------------------------------------------------
@@ -228,7 +232,7 @@ class FaultCapture:
             raise StorageFailed(
                 "recording.disk-nearly-full-mib",
                 value=free,
-                limit=f"{RESERVE_BYTES >> 20} MiB stay free",
+                limit=limits.stays_free(RESERVE_BYTES),
                 free_mib=free >> 20,
             )
         path = self._path_for(evidence.reason, evidence.time)

@@ -22,8 +22,9 @@ from backend.station.bench import Bench
 from backend.station.recording import facts
 from backend.station.recording.streams import describe_streams
 from backend.store.files import StorageFailed
-from drivers.errors import NotAllowed, OutOfRange
+from drivers.errors import NotAllowed, OutOfRange, with_remedy
 from drivers.link import ScopeBlock
+from drivers.texts.message import text
 
 FORMAT = 1
 #: Reading the settings of a slow drive must not keep a recording from beginning.
@@ -62,6 +63,10 @@ class Settings:
     person: str = ""
 
 
+EndReason = Literal["stopped", "its time is over", "failed", "servodeck was ended"]
+"""Why a recording ended; its file keeps this word."""
+
+
 @dataclass(eq=False, slots=True)
 class _Stream:
     number: int
@@ -88,7 +93,7 @@ class Recorder:
         self.settings = settings
         self.phase: Phase = "preparing"
         self.problem = ""
-        self.reason = ""
+        self.ended_by: EndReason = "stopped"
         self.began = time.time()
         self._bench = bench
         self._ended = ended
@@ -304,13 +309,13 @@ class Recorder:
 
     # --- end --------------------------------------------------------------------------
 
-    async def stop(self, reason: str) -> None:
+    async def stop(self, reason: EndReason) -> None:
         """End it. Calling again does nothing; a failure is reported in ``problem``."""
         if self.phase == "ended":
             return
         empty = self.phase != "recording"
         self.phase = "ended"
-        self.reason = reason
+        self.ended_by = reason
         if self._timer is not None:
             self._timer.cancel()
         await self._leave()
@@ -341,7 +346,8 @@ class Recorder:
     def _failed(self, error: StorageFailed) -> None:
         self.problem = error.message
         self._bench.journal.add(
-            f"recording {self.name} ended: {error.message}; {error.remedy}", level="error"
+            text("journal.recording-failed", name=self.name, cause=with_remedy(error)),
+            level="error",
         )
         self._spawn(self.stop("failed"))
 
@@ -354,9 +360,9 @@ class Recorder:
             if not stream.silent and now - stream.heard > quiet:
                 stream.silent = True
                 drive = stream.channels[0][0]
-                text = f"{drive} delivers no samples for the recording {self.name}"
-                self.event("silent", text, "warning", drive=drive)
-                self._bench.journal.add(text, level="warning", drive=drive)
+                line = text("journal.no-samples", drive=drive, name=self.name)
+                self.event("silent", line.words(), "warning", drive=drive)
+                self._bench.journal.add(line, level="warning", drive=drive)
         asyncio.get_running_loop().call_later(0.5, self._watch)
 
     def _spawn(self, work: Any) -> None:

@@ -23,6 +23,7 @@ from backend.station.recording.streams import describe_streams
 from backend.work.journal import Entry
 from drivers.errors import DriveError
 from drivers.link import ScopeBlock
+from drivers.texts.message import prose
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -144,8 +145,8 @@ class RerunFeed:
         if not self.clients:
             self._settings.forget()
             return
-        for _, text in self._settings.among(drive, readings):
-            self._events.append(Entry(time.time(), "info", drive, "", text))
+        for _, changed in self._settings.among(drive, readings):
+            self._events.append(Entry(time.time(), "info", drive, "", prose(changed)))
 
     # --- the feed ---------------------------------------------------------------------
 

@@ -14,16 +14,20 @@ from backend.recording.library import RecordingLibrary
 from backend.station.bench import Bench
 from backend.station.recording.capture import FaultCapture
 from backend.station.recording.changed_settings import ChangedSettings
-from backend.station.recording.recorder import Recorder, Settings
+from backend.station.recording.recorder import EndReason, Recorder, Settings
 from backend.store.files import StorageFailed
 from backend.store.free_space import free_bytes
 from backend.work.jobs import Job, JobResult, Progress
 from backend.work.journal import Entry
 from drivers.errors import Busy, NotAllowed
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 
 #: Running at once; each has a file and a thread.
 MAX_RUNNING = 8
+_ENDS: dict[EndReason, Text] = {
+    "stopped": text("journal.stopped"), "its time is over": text("journal.time-is-over"),
+    "failed": text("journal.failed"), "servodeck was ended": text("journal.servodeck-ended"),
+}  # fmt: skip
 
 
 class Recordings:
@@ -76,8 +80,11 @@ class Recordings:
         except BaseException:
             self.running.pop(name, None)
             raise
-        what = "waits for its trigger" if recorder.phase == "waiting" else "started"
-        self.bench.journal.add(f"recording {name} {what}", person=settings.person)
+        waiting = recorder.phase == "waiting"
+        line = text(
+            "journal.recording-waits" if waiting else "journal.recording-started", name=name
+        )
+        self.bench.journal.add(line, person=settings.person)
         return recorder
 
     def _canonical(self, settings: Settings) -> Settings:
@@ -94,7 +101,7 @@ class Recordings:
         channels = tuple((drive, key(drive, given)) for drive, given in settings.channels)
         return replace(settings, channels=channels, trigger=trigger)
 
-    async def stop(self, name: str, reason: str = "stopped") -> Recorder:
+    async def stop(self, name: str, reason: EndReason = "stopped") -> Recorder:
         """End a recording.
 
         Raises:
@@ -122,15 +129,17 @@ class Recordings:
         while len(self.ended) > 20:
             del self.ended[next(iter(self.ended))]
         written = recorder.written()
-        ended = f"recording {recorder.name} ended: {recorder.reason}, {written.samples} samples"
-        if recorder.lost:
-            ended += f"; {recorder.lost} samples were lost before they came to it"
-        self.bench.journal.add(ended, level="warning" if recorder.lost else "info")
+        line = text(
+            "journal.recording-ended-lost" if recorder.lost else "journal.recording-ended",
+            name=recorder.name, reason=_ENDS[recorder.ended_by],
+            samples=written.samples, lost=recorder.lost,
+        )  # fmt: skip
+        self.bench.journal.add(line, level="warning" if recorder.lost else "info")
 
     async def _prune(self) -> None:
         gone = await asyncio.to_thread(self.library.prune, list(self.running))
         for name in gone:
-            self.bench.journal.add(f"recording {name} was deleted to keep within the bounds")
+            self.bench.journal.add(text("journal.recording-pruned", name=name))
 
     # --- what is written down beside the samples ----------------------------------------
 
@@ -179,7 +188,7 @@ class Recordings:
         ):
             raise Busy("recording.being-exported", value=path.name)
         await asyncio.to_thread(self.library.delete, name)
-        self.bench.journal.add(f"recording {path.name} was deleted")
+        self.bench.journal.add(text("journal.recording-deleted", name=path.name))
 
     def export(self, name: str, kind: str) -> Job:
         """Export a recording in a process of its own; the job's result names the file.

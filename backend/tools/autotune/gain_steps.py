@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from backend.axis.axis import Axis
 from backend.axis.cyclic import CyclicSession
@@ -19,7 +20,8 @@ from backend.tools.autotune import gains as gain_tool
 from backend.tools.autotune.axis_facts import si_value
 from backend.tools.measuring.interrupted import ends_all
 from backend.tools.measuring.temporary import temporary
-from backend.tools.step.run import LEAD_S, StepResult, StepSettings, step_response
+from backend.tools.step.evaluate import LEAD_S, StepResult, StepSettings
+from backend.tools.step.run import step_response
 from backend.work.jobs import Progress
 from drivers.errors import DriveError
 from drivers.texts.message import text
@@ -32,6 +34,16 @@ _STEP_DB = 2.5
 _QUIET_PERCENT, _NOISE = 1.5, 2.5
 #: An oscillation that grows by this from one half of a steady part to the other is an onset.
 _GROWS = 1.5
+#: A steady part is seen in so many pieces; a band whose power falls by this from each one to the
+#: next decays, as what a step leaves does in a loop that is stable (3 dB over the whole part).
+_PIECES, _DECAYS = 3, 0.5**0.5
+#: Fewer samples than this in a piece show no bands.
+_FEW = 8
+#: Noise passes for growth in one of so many steps at most, over all bands of a spectrum together.
+_FALSE_ALARM = 1e-3
+#: Real degrees of freedom of a band of three lines in one piece, and of the noise beside it in all
+#: pieces of the step with the gain as it is: each line of a Hann window shares with its neighbours.
+_DEGREES, _DEGREES_BEFORE = 3.0, 9.0
 
 
 @dataclass(frozen=True)
@@ -110,20 +122,65 @@ def judged(
     ``present`` is the same step with the gain as it is. A torque that goes with the place (cogging,
     a load off its axis, an inertia by place) is the same in both, and may well be larger in the
     second half: an oscillation is in the step and in what it differs from ``present`` by.
+
+    An oscillation is narrow, and persists or grows. What decays in its own band is what the step
+    leaves, such as the swing of the load; it counts with what is left of it at the end.
+    What persists may rise with the gain and by what a sensitivity with 1 dB left makes of noise
+    (`_NOISE` over all frequencies). A band grows where it is above what noise of the present step
+    reaches there by chance (`_FALSE_ALARM`, F distribution) and larger at the end than before.
     """
     before = _steady(present, settings)
     after = _steady(step, settings)
     count = min(before.size, after.size)
     parts = (after, after[:count] - before[:count])
-    size = min(float(np.std(part)) for part in parts)
-    allowed = max(_QUIET_PERCENT, _NOISE * 10 ** (gain_db / 20.0) * float(np.std(before)))
-    grows = all(_grows(part) for part in parts)
+    size = min(_persistent(part) for part in parts)
+    factor = _NOISE * 10 ** (gain_db / 20.0)
+    allowed = max(_QUIET_PERCENT, factor * float(np.std(before)))
+    grows = all(_grows(part, before, factor) for part in parts)
     return GainStep(gain_db, size, size <= allowed and not grows)
 
 
-def _grows(torque: npt.NDArray[np.float64]) -> bool:
-    first, second = (float(np.std(part)) for part in np.array_split(torque, 2))
-    return second > _GROWS * first and second > _QUIET_PERCENT
+def _powers(torque: npt.NDArray[np.float64]) -> npt.NDArray[np.float64] | None:
+    """Power [piece, line] of a steady part by the time; None where there are too few samples.
+
+    The lines of one piece add up to its mean square (Parseval).
+    """
+    samples = torque.size // _PIECES
+    if samples < _FEW:
+        return None
+    pieces = torque[-samples * _PIECES :].reshape(_PIECES, samples)
+    window = np.hanning(samples + 2)[1:-1]
+    lines = np.abs(np.fft.rfft(pieces * window, axis=1)) ** 2
+    lines[:, 1 : (samples + 1) // 2] *= 2.0
+    return np.asarray(lines / (samples * np.sum(window**2)))
+
+
+def _persistent(torque: npt.NDArray[np.float64]) -> float:
+    """Root mean square over time, of a band that decays over the last piece.
+
+    What persists in a band that decays is no larger than what is there at the end.
+    """
+    powers = _powers(torque)
+    if powers is None:
+        return float(np.std(torque))
+    decays = np.all(powers[1:] < _DECAYS * powers[:-1], axis=0)
+    usual = np.mean(powers, axis=0)
+    total, left = np.sum(usual), np.sum(np.where(decays, powers[-1], usual))
+    return float(np.std(torque) * np.sqrt(left / total)) if total > 0 else 0.0
+
+
+def _grows(torque: npt.NDArray[np.float64], before: npt.NDArray[np.float64], factor: float) -> bool:
+    """Whether a band grows beyond what ``factor`` makes of the noise ``before``."""
+    powers, noise = _powers(torque), _powers(before)
+    if powers is None or noise is None:
+        first, second = (float(np.std(part)) for part in np.array_split(torque, 2))
+        return second > _GROWS * first and second > _QUIET_PERCENT
+    bands = np.array([np.convolve(row, np.ones(3), "same") for row in powers])
+    usual = np.convolve(np.mean(noise, axis=0), np.ones(3), "same")
+    chance = _FALSE_ALARM / bands.shape[1]
+    beyond = float(scipy.special.fdtri(_DEGREES, _DEGREES_BEFORE, 1.0 - chance))
+    least = np.maximum(_QUIET_PERCENT**2, factor**2 * beyond * usual)
+    return bool(np.any((bands[-1] > least) & (bands[-1] > _GROWS**2 * bands[0])))
 
 
 def oscillation_percent(step: StepResult, settings: StepSettings) -> float:

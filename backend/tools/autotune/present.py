@@ -66,7 +66,7 @@ class Present:
         if self.candidate is not None:
             why = text("autotune.too-little-margin")
         if tried:
-            why = text("autotune.promise-not-kept")
+            why = text("autotune.prediction-not-confirmed")
         return text("autotune.slower-than-it-was", share=share, why=why)
 
 

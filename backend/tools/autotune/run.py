@@ -30,6 +30,7 @@ from backend.tools.autotune.candidates import (
 )
 from backend.tools.autotune.notches import Learning, learn_notches, learning_s
 from backend.tools.autotune.present import Trials
+from backend.tools.autotune.result import AutotuneAnswer, finite
 from backend.tools.autotune.time_budget import NOT_AGAIN, TimeLeft
 from backend.tools.autotune.verdict import as_json as verdict_json
 from backend.tools.autotune.verify import Check, Keep, Verified, otherwise, unseen
@@ -41,7 +42,7 @@ from backend.tools.measuring.interrupted import ends_all
 from backend.tools.measuring.recording import cycle_s, quiet
 from backend.tools.measuring.temporary import stopping_hard, temporary
 from backend.tools.moves.go_back import go_back
-from backend.tools.step import run as step_tool
+from backend.tools.step import evaluate as step_evaluation
 from backend.tools.sweep import evaluation as sweep_evaluation
 from backend.tools.sweep import run as sweep_tool
 from backend.work.jobs import Progress
@@ -100,7 +101,7 @@ class AutotuneResult:
     candidates: tuple[Candidate, ...]
     applied: Candidate | None
     verified: Verified | None
-    step: step_tool.StepResult | None
+    step: step_evaluation.StepResult | None
     before: dict[str, int]
     tried: tuple[Text, ...]
     notes: tuple[Text, ...]
@@ -354,7 +355,7 @@ async def apply_and_verify(
         applied, again = await first_that_holds(trials, _order(found, "robust"), how)
     if applied is None:
         raise NotAllowed(
-            "autotune.no-candidate-kept-promise",
+            "autotune.no-candidate-verified",
             drive=axis.drive.name,
             detail=joined([each for each in (*trials.tried, clock.reported()) if each is not None]),
         )
@@ -402,9 +403,9 @@ def _order(found: AutotuneResult, mark: Mark) -> list[Candidate]:
 
 
 def as_json(result: AutotuneResult) -> dict[str, object]:
-    """For files and pages."""
+    """For files and pages, in the form of `AutotuneAnswer`."""
     verified = result.verified
-    return {
+    found = {
         "inertia": inertia_evaluation.answer_of(result.inertia).model_dump(mode="json"),
         "mechanics": sweep_evaluation.as_json(result.mechanics),
         "load": result.load,
@@ -421,9 +422,12 @@ def as_json(result: AutotuneResult) -> dict[str, object]:
             "expected": asdict(result.expected) if result.expected else None,
         },
         "again": again_json(result.again) if result.again else None,
-        "step": step_tool.as_json(result.step) if result.step else None,
+        "step": step_evaluation.answer_of(result.step).model_dump(mode="json")
+        if result.step
+        else None,
         "before": result.before,
         **sentences("tried", result.tried),
         **sentences("notes", result.notes, "note"),
         "cautious": result.cautious,
     }
+    return AutotuneAnswer.model_validate(finite(found)).model_dump(mode="json")

@@ -87,6 +87,18 @@ def telling_lines(frf: Frf) -> Lines | None:
     return Lines(f[:end], closed[:end], np.asarray(deviation)[:end])
 
 
+def loops_of(
+    axis: Axis, facts: AxisFacts, candidate: Candidate, f: FloatArray, plants: ComplexArray
+) -> ComplexArray:
+    """The speed loops of this design with each of these plants.
+
+    Raises:
+        NotAllowed, ValueError: a part of the loop has no known meaning.
+    """
+    fixed = fixed_of(axis, facts, candidate.notches, candidate.filters, f)
+    return speed_loop(f, plants, fixed, candidate.gains)
+
+
 def verdict_of(
     axis: Axis, facts: AxisFacts, plant: MeasuredPlant, candidate: Candidate, frf: Frf,
     hold: Hold | None, shown_gain_db: float | None = None,
@@ -98,8 +110,7 @@ def verdict_of(
     """
 
     def loops(f: FloatArray, plants: ComplexArray) -> ComplexArray:
-        fixed = fixed_of(axis, facts, candidate.notches, candidate.filters, f)
-        return speed_loop(f, plants, fixed, candidate.gains)
+        return loops_of(axis, facts, candidate, f, plants)
 
     dense = plant.frequency_hz
     every, nominal = loops(dense, plant.shifted()), loops(dense, plant.response())

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from backend.analysis.loop.design import Candidate
 from backend.analysis.loop.loop_goals import Goals
-from backend.analysis.loop.loop_verdict import WORST_DB, LoopVerdict, Missed
+from backend.analysis.loop.loop_verdict import LoopVerdict, Missed
 from backend.analysis.loop.margins import bandwidth, open_from_closed
 from backend.analysis.loop.measured_plant import MeasuredPlant
 from backend.analysis.response.frf import Frf
@@ -20,6 +20,7 @@ from backend.axis.axis import Axis, Envelope
 from backend.axis.cyclic import CyclicSession
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.autotune.gain_steps import GainSteps, gain_steps, steps_to
+from backend.tools.autotune.raising import by_raised_gain, not_shown, raised_to
 from backend.tools.autotune.time_budget import NOT_AGAIN, TimeLeft
 from backend.tools.autotune.verdict import (
     BLURRED_DEG,
@@ -37,7 +38,8 @@ from backend.tools.autotune.verdict import (
 from backend.tools.inertia.probe import holding_torque
 from backend.tools.measuring.recording import quiet
 from backend.tools.moves.go_back import go_back
-from backend.tools.step import run as step_tool
+from backend.tools.step import evaluate as step_evaluation
+from backend.tools.step.run import step_response
 from backend.tools.sweep import evaluation as sweep_evaluation
 from backend.tools.sweep import run as sweep_tool
 from backend.work.jobs import Progress
@@ -54,9 +56,6 @@ MOST_PAIRS = 4
 #: A loop that contradicts its prediction is verified once more where there is time for so many:
 #: that one, and a more careful design.
 LOOKS = 2
-#: So much of a promised gain margin is shown by raising the gain, where the last crossover is above
-#: what was measured: all but this, and no more than that.
-_NOT_SHOWN_DB, _MOST_SHOWN_DB = 1.5, 7.0
 #: A step, unless noise asks for a larger one, which is made where it is this much larger.
 _USUAL_STEP_RPM, _WORTH_A_STEP = 100.0, 1.2
 #: Where there are fewer, a step may overshoot by this.
@@ -76,7 +75,7 @@ class Verified:
     """
 
     sweep: sweep_evaluation.SweepResult
-    step: step_tool.StepResult | None
+    step: step_evaluation.StepResult | None
     promised: Goals
     predicted_bandwidth_hz: float | None
     measured_bandwidth_hz: float | None
@@ -148,11 +147,13 @@ async def verify(
     looks = LOOKS - bool(check.pairs_before) if read else 0
     took_s = time.monotonic() - begun_s
     verdict = _verdict(axis, check, candidate, swept, None)
-    above = tuple(each for each in _misses(verdict, promised) if _by_raised_gain(each))
-    clock.require_raising(steps_to(_wanted_db(above, promised)) if above else 0)
+    above = tuple(each for each in _misses(verdict, promised) if by_raised_gain(each))
+    known = (axis, check.facts, check.plant, candidate)
+    clock.require_raising(steps_to(raised_to(*known, verdict, promised, above)) if above else 0)
     pairs = clock.pairs(took_s, MOST_PAIRS, looks)
     missed = worse_than(promised, read)
     blurred = any(each.end == "measured" for each in _misses(verdict, promised))
+    blurred = blurred or (verdict is not None and verdict.measured is None)
     as_predicted = _as_predicted(candidate.bandwidth_hz, _width_of(read), _DOUBTED)
     every: Frf | None = None
     if (not read or blurred or not as_predicted) and pairs > 1 and not missed:
@@ -168,27 +169,27 @@ async def verify(
         clock.give_up(NOT_AGAIN)
     measured = _width_of(read)
     beyond = _misses(verdict, promised)
-    open_above = tuple(each for each in beyond if _by_raised_gain(each))
+    open_above = tuple(each for each in beyond if by_raised_gain(each))
     missed = missed or in_words(tuple(each for each in beyond if each not in open_above))
     why = _named(candidate, missed)
     shown: GainSteps | None = None
-    step: step_tool.StepResult | None = None
+    step: step_evaluation.StepResult | None = None
     only_hums = False
     if why is None:
         settings_of_step = _step_settings(check, candidate)
-        step = await step_tool.step_response(axis, session, settings_of_step, stepping, keep)
-        larger = min(step_tool.significant_size(step), _largest_step(check, candidate))
+        step = await step_response(axis, session, settings_of_step, stepping, keep)
+        larger = min(step_evaluation.significant_size(step), _largest_step(check, candidate))
         if step.widened and larger > _WORTH_A_STEP * settings_of_step.size:
             settings_of_step = replace(settings_of_step, size=larger)
-            step = await step_tool.step_response(axis, session, settings_of_step, stepping, keep)
+            step = await step_response(axis, session, settings_of_step, stepping, keep)
         hums, restless_why = hum(step), None if read else restless(step)
         why = _named(candidate, [each for each in (hums, restless_why) if each is not None])
         only_hums = hums is not None and restless_why is None
         if why is None and open_above:
-            wanted_db = _wanted_db(open_above, promised)
-            shown = await gain_steps(axis, session, settings_of_step, step, wanted_db, stepping)
+            most_db = raised_to(*known, verdict, promised, open_above)
+            shown = await gain_steps(axis, session, settings_of_step, step, most_db, stepping)
             verdict = _verdict(axis, check, candidate, swept, shown.shown_db)
-            why = _named(candidate, _not_shown(verdict, promised, shown, wanted_db))
+            why = _named(candidate, not_shown(verdict, promised, shown, open_above))
     swept = replace(swept, margins=read)
     return Verified(
         swept, step, promised, candidate.bandwidth_hz, measured, why is None, why,
@@ -208,36 +209,6 @@ def _verdict(
 
 def _misses(verdict: LoopVerdict | None, promised: Goals) -> tuple[Missed, ...]:
     return () if verdict is None else misses(verdict, promised)
-
-
-def _by_raised_gain(missed: Missed) -> bool:
-    """Whether a raised gain can still show it: what is possible above the measured band."""
-    return missed.what == "coverage" or missed.end == "predicted"
-
-
-def _wanted_db(missed: tuple[Missed, ...], promised: Goals) -> float:
-    """How much more gain is tried; where uncertain, the required margin less its tolerance."""
-    if any(each.what != "coverage" for each in missed):
-        return promised.gain_margin_db - WORST_DB
-    return min(promised.gain_margin_db - _NOT_SHOWN_DB, _MOST_SHOWN_DB)
-
-
-def _not_shown(
-    verdict: LoopVerdict | None, promised: Goals, shown: GainSteps, wanted_db: float
-) -> list[Text]:
-    """What raising the gain leaves open above the measured band; empty where nothing."""
-    if verdict is None:
-        return []
-    said = in_words(misses(verdict, promised))
-    if shown.shown_db < wanted_db - MARGIN_DB:
-        top = 0.0 if verdict.measured is None else verdict.measured.high_hz
-        said.append(
-            text(
-                "autotune.crossover-not-shown", crossover_hz=verdict.last_crossover_hz,
-                measured_hz=top, shown_db=shown.shown_db, wanted_db=wanted_db,
-            )
-        )  # fmt: skip
-    return said
 
 
 def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool | None]:
@@ -270,7 +241,7 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
     }
 
 
-def restless(step: step_tool.StepResult) -> Text | None:
+def restless(step: step_evaluation.StepResult) -> Text | None:
     """What a step shows of a loop that answers too few lines, such as a slow one; else None."""
     found = step.step
     if found is not None and found.overshoot_percent <= _OVERSHOOT_PERCENT:
@@ -359,7 +330,7 @@ def unseen(last_hz: float | None, verified: Verified) -> Text | None:
     return text("autotune.margins-unseen", crossover_hz=last_hz, measured_hz=top)
 
 
-def hum(step: step_tool.StepResult) -> Text | None:
+def hum(step: step_evaluation.StepResult) -> Text | None:
     """That the torque is not quiet before the step; None where it is.
 
     A sensor's noise comes back as torque, the more the higher the gain and the wider the filters.
@@ -370,9 +341,9 @@ def hum(step: step_tool.StepResult) -> Text | None:
     return text("autotune.hums", rms_percent=rms)
 
 
-def hum_percent_of(step: step_tool.StepResult) -> float:
+def hum_percent_of(step: step_evaluation.StepResult) -> float:
     """Root mean square of the torque before the step, less its mean, in % of the rated."""
-    before = step.torque_percent[step.time_s < 0.8 * step_tool.LEAD_S]
+    before = step.torque_percent[step.time_s < 0.8 * step_evaluation.LEAD_S]
     return float(np.std(before))
 
 
@@ -394,7 +365,9 @@ def _largest_step(check: Check, candidate: Candidate) -> float:
     return float(min(0.3 * envelope.speed_rpm, 120.0 * envelope.travel_rev, gentle))
 
 
-def _step_settings(check: Check, candidate: Candidate) -> step_tool.StepSettings:
+def _step_settings(check: Check, candidate: Candidate) -> step_evaluation.StepSettings:
     """The usual step of speed, or what the axis may do."""
     size = min(_USUAL_STEP_RPM, _largest_step(check, candidate))
-    return step_tool.StepSettings(check.envelope, size=size, rated_torque_nm=check.rated_torque_nm)
+    return step_evaluation.StepSettings(
+        check.envelope, size=size, rated_torque_nm=check.rated_torque_nm
+    )

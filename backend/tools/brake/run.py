@@ -286,6 +286,7 @@ def _placed(
 
 TOOL = Tool(
     kind="brake-test",
+    title=text("brake.title"),
     settings=BrakeSettings,
     result=BrakeResult,
     run=run,

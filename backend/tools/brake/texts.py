@@ -12,7 +12,6 @@ from backend.tools.brake.result import BrakeResult, BrakeWay, Verdict
 from backend.tools.tool import Chart, Line, Note, Row, Section
 
 TEXTS: dict[str, tuple[str, str]] = {
-    "title": ("Brake test", "抱闸测试"),
     "help": (
         "Torque against the closed holding brake, both directions, until the test torque or slip. "
         "The axis is energised.",

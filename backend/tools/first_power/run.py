@@ -351,6 +351,7 @@ class _Test:
 
 TOOL = Tool(
     kind="first-power",
+    title=text("first-power.title"),
     settings=FirstPowerSettings,
     result=FirstPowerResult,
     run=run,

@@ -12,7 +12,6 @@ from backend.tools.first_power.result import Check, FirstPowerResult, Status, Ve
 from backend.tools.tool import Chart, Line, Note, Row, Section
 
 TEXTS: dict[str, tuple[str, str]] = {
-    "title": ("First power", "首次通电"),
     "help": (
         "Before the first closed loop: supply, counts, direction, switches, brake and phase order. "
         "The axis is energised: at most 10 % of torque and 0.1 rev.",

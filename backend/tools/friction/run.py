@@ -278,6 +278,7 @@ def _require_torque(run: Run, first: Recording, facts: AxisFacts, units: AxisUni
 
 TOOL = Tool(
     kind="friction",
+    title=text("friction.title"),
     settings=FrictionSettings,
     result=FrictionResult,
     run=run,

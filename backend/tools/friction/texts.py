@@ -8,7 +8,6 @@ from backend.tools.friction.result import Code, Estimate, Finding, FrictionResul
 from backend.tools.tool import Chart, Interval, Line, Note, Row, Section
 
 TEXTS: dict[str, tuple[str, str]] = {
-    "title": ("Friction map", "摩擦图谱"),
     "help": (
         "Map friction over speed and torque over position, both directions. The axis moves.",
         "测绘双向的摩擦-速度与转矩-位置曲线。轴会运动。",

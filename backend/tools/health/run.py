@@ -12,11 +12,13 @@ from backend.tools.health.texts import TEXTS, report
 from backend.tools.inertia.result import InertiaAnswer
 from backend.tools.inertia.run import TOOL as INERTIA
 from backend.tools.inertia.settings import InertiaRequest
-from backend.tools.step.run import StepSettings, step_response
+from backend.tools.step.evaluate import StepSettings
+from backend.tools.step.run import step_response
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.run import sweep
 from backend.tools.tool import Run, Tool
 from backend.work.jobs import Progress
+from drivers.texts.message import text
 
 
 async def run(run: Run, settings: HealthSettings) -> HealthResult:
@@ -134,6 +136,7 @@ def _envelope(settings: HealthSettings) -> dict[str, float | None]:
 
 TOOL = Tool(
     kind="health",
+    title=text("health.title"),
     settings=HealthSettings,
     result=HealthResult,
     run=run,

@@ -6,7 +6,6 @@ from backend.tools.health.result import UNITS, HealthResult, HealthValue
 from backend.tools.tool import Note, Row, Section
 
 TEXTS: dict[str, tuple[str, str]] = {
-    "title": ("Health check", "健康检查"),
     "help": (
         "Measure what the condition of an axis is followed by: resonances, friction, inertia. "
         "The axis moves.",

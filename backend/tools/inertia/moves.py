@@ -51,6 +51,9 @@ _SHARES = (1.0, 0.8, _WEAKER, 0.45, _WEAKER**2)
 _FRICTION_RAD_S = 0.5
 #: An axis that moved less than this under too much torque stood: a brake opens within this time.
 _STOOD_REV, _STOOD_SHARE, BRAKE_WAIT_S = 0.005, 0.02, 1.0
+#: Share of the first way at which a free axis has begun to move. A brake that opens later than that
+#: spoils the move, and the loop winds up against it at the beginning of every later one.
+_BEGUN = 0.1
 
 
 @dataclass(frozen=True)
@@ -212,11 +215,15 @@ async def _first_move(
 
 
 def _stood(recording: Recording, speed_rpm: npt.NDArray[np.float64]) -> bool:
-    """Whether the axis had not begun to move when a third of its way was demanded."""
+    """Whether the axis had not begun to move when a tenth of its way was demanded.
+
+    A loop that is too soft to follow may look like it: the move is made again after a wait then,
+    shows the same, and no later motion waits.
+    """
     demanded = np.abs(np.cumsum(speed_rpm)) / 60.0 / recording.sample_rate_hz
-    third = int(np.argmax(demanded >= np.max(demanded) / 3.0))
+    begun = int(np.argmax(demanded >= _BEGUN * np.max(demanded)))
     position = recording.position_rad / _TURN
-    return bool(abs(position[third] - position[0]) < _STOOD_SHARE * demanded[third])
+    return bool(abs(position[begun] - position[0]) < _STOOD_SHARE * demanded[begun])
 
 
 def _too_heavy(axis: Axis, error: EnvelopeExceeded) -> EnvelopeExceeded:

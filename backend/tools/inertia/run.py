@@ -162,6 +162,7 @@ async def run(run: Run, request: InertiaRequest) -> InertiaAnswer:
 
 TOOL = Tool(
     kind="inertia",
+    title=text("inertia.title"),
     settings=InertiaRequest,
     result=InertiaAnswer,
     run=run,

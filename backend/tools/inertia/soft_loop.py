@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import bilinear, lfilter
+import scipy
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -37,8 +37,8 @@ class SoftLoop:
         """
         above = [self.proportional, self.integral]
         below = [inertia_kgm2, self.proportional, self.integral]
-        b, a = bilinear(above, below, rate_hz)
-        own = lfilter(b, a, needed_nm - ahead_nm)
+        b, a = scipy.signal.bilinear(above, below, rate_hz)
+        own = scipy.signal.lfilter(b, a, needed_nm - ahead_nm)
         return float(np.max(np.abs(own + ahead_nm)))
 
 

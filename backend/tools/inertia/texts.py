@@ -6,7 +6,6 @@ from backend.tools.inertia.result import InertiaAnswer
 from backend.tools.tool import Note, Row, Section
 
 TEXTS: dict[str, tuple[str, str]] = {
-    "title": ("Inertia and friction", "惯量与摩擦"),
     "help": (
         "Measure inertia and friction and write them as JSON. The axis moves.",
         "测量惯量与摩擦并写为 JSON。轴会运动。",

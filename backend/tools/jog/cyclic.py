@@ -31,6 +31,7 @@ from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange, motion_halted
 from drivers.motion.setpoint_plan import Phase
+from drivers.texts import limits
 from drivers.texts.message import text
 
 _RENEW_S, _LOOK_S = 0.05, 0.02
@@ -75,7 +76,7 @@ def signal(settings: GeneratorSettings, cycle_s: float) -> Signal:
         raise OutOfRange(
             "jog.hz-cannot-played-cycle",
             value=highest,
-            limit=f"below {nyquist / 2:g} Hz",
+            limit=limits.below(nyquist / 2, "Hz"),
             cycle_ms=cycle_s * 1e3,
         )
     count = max(2, round(settings.duration_s / cycle_s))

@@ -21,6 +21,7 @@ from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
+from drivers.texts import limits
 from drivers.texts.message import text
 
 #: Period of target renewals to the drive (20 Hz or faster).
@@ -173,5 +174,5 @@ def _inside(axis: Axis, settings: JogSettings, moved_rev: float) -> None:
             "jog.left-travel-limit-jog",
             drive=axis.drive.name,
             value=settings.shown.travel(moved_rev),
-            limit=f"{settings.shown.say(settings.travel_rev)} from the start",
+            limit=limits.from_start(settings.shown.say(settings.travel_rev)),
         )

@@ -34,7 +34,7 @@ def interrupted(error: NotAllowed) -> Interrupted:
         drive=error.drive,
         parameter=error.parameter,
         value=error.value,
-        limit=error.limit,
+        limit=error.limit_text,
         remedy=error.remedy_text,
     )
 

@@ -18,6 +18,7 @@ from backend.tools.measuring.recording import cycle_s
 from backend.tools.measuring.temporary import temporary
 from backend.work.jobs import Progress
 from drivers.errors import NotAllowed, OutOfRange
+from drivers.texts import limits as limit_texts
 from drivers.texts.message import text
 
 _TURN = 2 * np.pi
@@ -42,7 +43,7 @@ async def find_ends(
         raise OutOfRange(
             "moves.torque-cannot-move-axis",
             value=settings.search_torque_percent,
-            limit=f"at least {percent:.3g} %",
+            limit=limit_texts.at_least(float(f"{percent:.3g}"), "%"),
             drive_name=drive.name,
         )
     wanted = units.torque_raw(settings.search_torque_percent)

@@ -127,7 +127,7 @@ async def _attained(axis: Axis, settings: HomingSettings, progress: Progress) ->
             raise NotAllowed(
                 "moves.travelled-without-finding-home",
                 drive=drive.name,
-                limit=f"{shown.say(settings.envelope.travel_rev)} each way",
+                limit=text("limit.each-way", distance=shown.say(settings.envelope.travel_rev)),
                 say=shown.say(units.position(travelled)),
             )
         if elapsed > settings.envelope.time_s:

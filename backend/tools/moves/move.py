@@ -16,6 +16,7 @@ from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
+from drivers.texts import limits
 from drivers.texts.message import text
 
 _POLL_S = 0.02
@@ -202,7 +203,7 @@ def _require_reachable(
             "moves.target-start-point-outside",
             drive=drive.name,
             value=shown.travel(units.position(target)),
-            limit=f"{shown.say(envelope.travel_rev)} from the start",
+            limit=limits.from_start(shown.say(envelope.travel_rev)),
             away=away,
             say=shown.say(envelope.travel_rev),
         )

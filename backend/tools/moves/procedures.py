@@ -167,7 +167,7 @@ async def _poll(axis: Axis, step: PollStep) -> None:
                 drive=drive.name,
                 parameter=step.key,
                 value=raw,
-                limit=f"{step.equals} within {step.timeout_s:g} s",
+                limit=text("limit.within-time", wanted=str(step.equals), timeout_s=step.timeout_s),
                 timeout_s=step.timeout_s,
             )
         await asyncio.sleep(_POLL_S)

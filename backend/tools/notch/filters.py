@@ -163,7 +163,7 @@ def _require_meant(
     if got is None or abs(got.center_hz / notch.center_hz - 1.0) > _ELSEWHERE:
         raise OutOfRange(
             "notch.read-back-other", drive=drive, value=f"{notch.center_hz:g} Hz",
-            limit="a notch at that frequency", number=number + 1,
+            limit=text("limit.notch-there"), number=number + 1,
             read_hz=0.0 if got is None else got.center_hz,
         )  # fmt: skip
 

@@ -38,6 +38,7 @@ from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
 from backend.tools.measuring.recording import Recording
 from backend.tools.measuring.waveform import Waveform
+from backend.tools.sweep.result import SweepAnswer
 from backend.tools.sweep.speed_injection import speed_gain
 from drivers.texts.answers import sentences
 from drivers.texts.message import Text, Unsuitable, text
@@ -160,67 +161,83 @@ def evaluate(
         found, taken = _by_reference(records, path, integral_hz, inertia, hold_known=known)
     else:
         found = identify_with_path(taken, path, quantity, hold_known=known, inertia=inertia)
-    path = found.fit.path
     limit = settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm
-    saturated = _saturated(taken, path, quantity, limit, as_reported=not found.torque_dropped)
+    saturated = _saturated(
+        taken, found.fit.path, quantity, limit, as_reported=not found.torque_dropped
+    )
     warnings = _warnings(found, saturated, facts)
+    found, widened = _widened(found, facts, quantity, by_speed=by_speed)
+    return _mechanics(
+        found, quantity, loop, saturated, _motion_s(records), facts, warnings + widened
+    )
+
+
+def _widened(
+    found: Identification, facts: AxisFacts, quantity: Quantity, *, by_speed: bool
+) -> tuple[Identification, tuple[Text, ...]]:
+    """Bands with what the drive does not tell of its torque, and what is said of that."""
+    path, lines = found.fit.path, found.direct.frequency_hz
+    said: list[Text] = []
     if facts.current_bandwidth_hz is None and commanded(path):
-        lines = found.direct.frequency_hz
-        uncertainty = current_uncertainty(lines)
-        direct, corrected = (
-            charged(x, lines, uncertainty) for x in (found.direct, found.corrected)
-        )
-        found = replace(found, direct=direct, corrected=corrected)
-        warnings += (_COMMANDED,)
+        found = _charged(found, current_uncertainty(lines))
+        said.append(_COMMANDED)
     corner = path.current_bandwidth_hz
     slow = corner is not None and _slow(corner, facts)
     # Where the torque was dropped it is another one, and an ordinary path explains the motion.
     if slow or (found.torque_unexplained and not found.torque_dropped):
-        lines = found.direct.frequency_hz
-        uncertainty = path_uncertainty(lines) if corner is None else slow_uncertainty(lines, corner)
-        uncertainty = np.hypot(uncertainty.real, path_uncertainty(lines).real) + 1j * np.hypot(
-            uncertainty.imag, path_uncertainty(lines).imag
+        ordinary = path_uncertainty(lines)
+        uncertainty = ordinary if corner is None else slow_uncertainty(lines, corner)
+        found = _charged(
+            found,
+            np.hypot(uncertainty.real, ordinary.real)
+            + 1j * np.hypot(uncertainty.imag, ordinary.imag),
         )
-        direct, corrected = (
-            charged(x, lines, uncertainty) for x in (found.direct, found.corrected)
-        )
-        found = replace(found, direct=direct, corrected=corrected)
-        warnings += (_SLOW,)
+        said.append(_SLOW)
     if slow and quantity == "torque_injection" and facts.torque_filter_hz is None:
         # Beside a loop the motion alone does not tell which of the two it is.
-        lines = found.direct.frequency_hz
-        uncertainty = np.log(lag_response(lines, corner))
-        direct = charged(found.direct, lines, uncertainty)
+        direct = charged(found.direct, lines, np.log(lag_response(lines, corner)))
         found = replace(found, direct=direct, corrected=direct, trusted=False)
-        warnings += (_SLOW_OR_FILTERED,)
+        said.append(_SLOW_OR_FILTERED)
     if by_speed:
-        lines = found.direct.frequency_hz
-        late = 2j * np.pi * lines * _BY_REFERENCE_S
-        direct, corrected = (charged(x, lines, late) for x in (found.direct, found.corrected))
-        found = replace(found, direct=direct, corrected=corrected)
+        found = _charged(found, 2j * np.pi * lines * _BY_REFERENCE_S)
+    return found, tuple(said)
+
+
+def _charged(found: Identification, uncertainty: ComplexArray) -> Identification:
+    """Both responses with a band that is wider by this, [lines of the direct one]."""
+    lines = found.direct.frequency_hz
+    direct, corrected = (charged(x, lines, uncertainty) for x in (found.direct, found.corrected))
+    return replace(found, direct=direct, corrected=corrected)
+
+
+def _mechanics(
+    found: Identification, quantity: Quantity, loop: Literal["none", "speed", "position"],
+    saturated: float, motion_s: float, facts: AxisFacts, warnings: tuple[Text, ...],
+) -> SweepResult:  # fmt: skip
+    """The answer of mechanics; without a model where none is trusted."""
+    path, model = found.fit.path, found.fit.model
+    resonances: tuple[Resonance, ...] = ()
+    if found.trusted:
+        highest_hz = found.corrected.valid_band_hz[1]
+        resonances = resonance_table(
+            model, found.corrected.frequency_hz, highest_hz, found.modes
+        )  # fmt: skip
     return SweepResult(
         kind="mechanics",
         loop=loop,
         frf=found.corrected,
         direct=found.direct,
-        model=found.fit.model if found.trusted else None,
+        model=model if found.trusted else None,
         trusted=found.trusted,
         unit="(rad/s)/Nm" if facts.torque_known else "(rad/s)/rated torque",
-        resonances=resonance_table(
-            found.fit.model,
-            found.corrected.frequency_hz,
-            found.corrected.valid_band_hz[1],
-            found.modes,
-        )
-        if found.trusted
-        else (),
+        resonances=resonances,
         margins=_injection_margins(found) if quantity == "torque_injection" else {},
         delay_s=path.command_delay_s + found.fit.delay_s,
-        motion_s=_motion_s(records),
+        motion_s=motion_s,
         saturated_share=saturated,
         warnings=warnings,
         current_bandwidth_hz=path.current_bandwidth_hz,
-        speed_filter_hz=found.fit.path.response_bandwidth_hz,
+        speed_filter_hz=path.response_bandwidth_hz,
         hold=path.hold,
     )
 
@@ -457,9 +474,9 @@ def _reevaluate(arrays: dict[str, npt.NDArray[np.generic]], meta: dict[str, obje
 
 
 def as_json(result: SweepResult) -> dict[str, object]:
-    """The form that ``servodeck sweep --out`` writes (architecture.md)."""
+    """The form that ``servodeck sweep --out`` writes, that of `SweepAnswer`."""
     frf = result.frf
-    return {
+    found = {
         "kind": result.kind,
         "loop": result.loop,
         "sample_rate_hz": frf.sample_rate_hz,
@@ -501,6 +518,7 @@ def as_json(result: SweepResult) -> dict[str, object]:
         "model": asdict(result.model) if result.model is not None else None,
         **sentences("warnings", result.warnings, "warning"),
     }  # fmt: skip
+    return SweepAnswer.model_validate(found).model_dump(mode="json")
 
 
 def _numbers(values: FloatArray) -> list[float | None]:

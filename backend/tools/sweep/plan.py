@@ -19,6 +19,7 @@ from backend.tools.measuring.recording import cycle_s
 from backend.tools.sweep import speed_injection
 from backend.tools.sweep.evaluation import Loop, SweepSettings
 from drivers.errors import NotAllowed, OutOfRange
+from drivers.texts import limits
 from drivers.texts.message import cause_of
 
 _TURN = 2 * np.pi
@@ -59,7 +60,7 @@ def check(settings: SweepSettings) -> None:
         raise OutOfRange(
             "sweep.band-must-span-least",
             value=settings.f_max_hz,
-            limit=f"{4 * settings.f_min_hz:g} Hz or more",
+            limit=limits.at_least(4 * settings.f_min_hz, "Hz"),
         )
 
 

@@ -19,6 +19,7 @@ from drivers.ethercat.eeprom.image import (
     SlaveIdentity,
     differences,
 )
+from drivers.texts import limits
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +71,7 @@ def plan_restore(
         raise OutOfRange(
             "ethercat.eeprom-file-size",
             value=len(saved.data),
-            limit=f"{present.stated_bytes} bytes",
+            limit=limits.size(present.stated_bytes),
             bytes=len(saved.data),
             size=present.stated_bytes,
         )

@@ -19,6 +19,8 @@ from drivers.ethercat.exchange.assignment import (
 )
 from drivers.link import Address, CyclicSignal
 from drivers.motion.setpoints import TARGETS
+from drivers.texts import limits
+from drivers.texts.message import joined, text
 from profiles.schema import Parameter, PdoPart, PdoSet, Profile
 
 CONTROL_WORD = Address(0x6040, 0, "UINT16")
@@ -248,8 +250,11 @@ def _filled(
             raise NotAllowed(
                 "ethercat.station-cannot-cyclic-data",
                 parameter=str(address),
-                limit=f"{room.most} objects"
-                + (f", {room.bytes} bytes" if room.bytes is not None else ""),
+                limit=joined(
+                    [text("limit.objects", count=room.most)]
+                    + ([] if room.bytes is None else [limits.size(room.bytes)]),
+                    ", ",
+                ),
                 station=station,
                 address=str(address),
                 reason=reason,
@@ -304,7 +309,7 @@ def _fixed(
         own = ", ".join(f"{s.index:04X}h" for s in rules.sets)
         raise NotAllowed(
             "ethercat.station-none-drive-fixed",
-            limit=f"fixed process data: {own}",
+            limit=text("limit.fixed-process-data", own=own),
             station=station,
             must=", ".join(sorted(must)),
         )

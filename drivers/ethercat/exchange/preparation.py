@@ -22,6 +22,7 @@ from drivers.ethercat.wire.lanes import Done, LaneName, Lanes
 from drivers.ethercat.wire.steps import Steps
 from drivers.motion.interpolation import interpolation_period
 from drivers.motion.playback import AxisLoop
+from drivers.texts import limits
 
 CYCLE_NS = (250_000, 10_000_000)
 _SETUP_S = 30.0
@@ -77,7 +78,9 @@ class Preparation:
         cycle_ns = int(message["cycle_ns"])
         if not CYCLE_NS[0] <= cycle_ns <= CYCLE_NS[1]:
             raise NotAllowed(
-                "ethercat.cycle-not-possible", limit="250 µs to 10 ms", cycle_us=cycle_ns / 1000
+                "ethercat.cycle-not-possible",
+                limit=limits.between(0.25, 10.0, "ms"),
+                cycle_us=cycle_ns / 1000,
             )
         interpolation_period(cycle_ns)
         self._stations = stations

@@ -12,7 +12,7 @@ from typing import Literal
 
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
 from drivers.ethercat.exchange.setup import SYNC_MANAGERS, restore_mailbox
-from drivers.ethercat.process.station import Station, change_state, identify
+from drivers.ethercat.process.station import Station, change_state, identify, to_preop
 from drivers.ethercat.wire import foe, sii
 from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.mailbox import Mailbox
@@ -58,7 +58,7 @@ def load(
                 tell=tell,
             )  # fmt: skip
             return "BOOT"
-    yield from change_state(station, AlState.PREOP, clock)
+    yield from to_preop(station, clock)
     yield from _send(station.box, name, data, password=password, tell=tell)
     tell(1.0, text("ethercat.file-drive"))
     yield from identify(station, clock)

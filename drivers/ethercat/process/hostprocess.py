@@ -238,12 +238,12 @@ class HostProcess:
 
     def _gone(self, why: str) -> None:
         self.words = why
-        lost = LinkLost(why, remedy="it is started again by itself")
+        lost = LinkLost(why, remedy="ethercat.started-again-by-itself")
         if self._ready is not None and not self._ready.done():
             self._ready.set_exception(lost)
         for future, _ in self._waiting.values():
             if not future.done():
-                future.set_exception(LinkLost(why, remedy="it is started again by itself"))
+                future.set_exception(LinkLost(why, remedy="ethercat.started-again-by-itself"))
 
     async def _write(self, data: bytes) -> None:
         ours = self._socket

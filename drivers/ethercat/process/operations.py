@@ -20,6 +20,7 @@ from drivers.ethercat.process import station as transactions
 from drivers.ethercat.process.eeprom import EepromOperations
 from drivers.ethercat.process.examination import examine
 from drivers.ethercat.process.protocol import Message, error_to_wire
+from drivers.ethercat.process.requested import refuse_op, request
 from drivers.ethercat.process.roster import Roster, Send
 from drivers.ethercat.process.segment import Segment, SpoiltMap
 from drivers.ethercat.process.station import Station
@@ -58,6 +59,7 @@ class Operations:
             "write": self._write, "enumerate": self._enumerate, "state": self._state,
             "counters": self._counters, "clear_counters": self._clear_counters,
             "alias": self._alias, "foe": self._foe, "examine": self._examine,
+            "al_request": self._al_request,
             "configure": self._configure, "start": self._start, "stop": self._stop,
             "play": self._play, "renew": self._renew, "halt": self._halt, "pause": self._pause,
             "drive_to": self._drive_to,
@@ -238,6 +240,14 @@ class Operations:
         if target is AlState.OP:
             raise NotAllowed("ethercat.op-needs-cyclic-data")
         steps = transactions.change_state(station, target, time.monotonic)
+        self.lanes.submit(station.number, "mailbox", steps, done)
+
+    def _al_request(self, message: Message, done: Done) -> None:
+        station = self._calm_station(message)
+        if self.loop is not None:
+            raise Busy("ethercat.cyclic-exchange-owns-states")
+        refuse_op(station, message["control"])
+        steps = request(station, message["control"], time.monotonic)
         self.lanes.submit(station.number, "mailbox", steps, done)
 
     def _counters(self, _message: Message, done: Done) -> None:

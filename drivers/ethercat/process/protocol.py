@@ -29,7 +29,7 @@ class WireError(TypedDict):
     kind: str
     text: Wire
     parameter: str | None
-    limit: str | None
+    limit: Wire | None
     remedy: Wire | None
     abort_code: int | None
 
@@ -79,7 +79,7 @@ def error_to_wire(error: DriveError) -> WireError:
         kind=error.kind,
         text=error.text.to_wire(),
         parameter=error.parameter,
-        limit=error.limit,
+        limit=None if error.limit_text is None else error.limit_text.to_wire(),
         remedy=None if error.own_remedy is None else error.own_remedy.to_wire(),
         abort_code=error.abort_code if isinstance(error, Rejected) else None,
     )
@@ -87,18 +87,19 @@ def error_to_wire(error: DriveError) -> WireError:
 
 def error_from_wire(wire: WireError) -> DriveError:
     """The same error again, of the same class."""
+    limit = None if wire["limit"] is None else Text.from_wire(wire["limit"])
     remedy = None if wire["remedy"] is None else Text.from_wire(wire["remedy"])
     if wire["abort_code"] is not None:
         return Rejected(
             Text.from_wire(wire["text"]),
             abort_code=wire["abort_code"],
             parameter=wire["parameter"],
-            limit=wire["limit"],
+            limit=limit,
             remedy=remedy,
         )
     return _KINDS.get(wire["kind"], DriveError)(
         Text.from_wire(wire["text"]),
         parameter=wire["parameter"],
-        limit=wire["limit"],
+        limit=limit,
         remedy=remedy,
     )

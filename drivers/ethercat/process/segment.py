@@ -31,6 +31,7 @@ from drivers.errors import Busy, LinkLost, NotAllowed, ProtocolError
 from drivers.ethercat.process import promiscuous
 from drivers.ethercat.wire import frames
 from drivers.ethercat.wire.steps import Read, Write
+from drivers.texts import limits
 
 IO_MAP_BYTES = 4096
 MAX_STATIONS = 199
@@ -244,7 +245,7 @@ class Segment:
         if expected_bytes > IO_MAP_BYTES:
             raise NotAllowed(
                 "ethercat.process-data-all-drives",
-                limit=f"{IO_MAP_BYTES} bytes",
+                limit=limits.size(IO_MAP_BYTES),
                 expected_bytes=expected_bytes,
                 io_map_bytes=IO_MAP_BYTES,
             )

@@ -227,7 +227,7 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
         )
         return
     try:
-        yield from _to_preop(station, clock)
+        yield from to_preop(station, clock)
         reported = yield from _try_read(station, 0x1018, 4)
         if reported is not None and len(reported) == 4:
             station.serial = int.from_bytes(reported, "little") or station.serial
@@ -240,7 +240,7 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
         station.notes.append(error.message)
 
 
-def _to_preop(station: Station, clock: Callable[[], float]) -> Steps[None]:
+def to_preop(station: Station, clock: Callable[[], float]) -> Steps[None]:
     """To PREOP; where a lost frame left the mailboxes without their sync managers, once more."""
     try:
         yield from change_state(station, AlState.PREOP, clock)

@@ -15,6 +15,7 @@ from drivers.errors import DriveError, LinkTimeout, NotAllowed, ProtocolError, R
 from drivers.ethercat.wire.mailbox import COE, Mail, Mailbox, Overtaken
 from drivers.ethercat.wire.steps import Pause, Steps
 from drivers.sdo_abort import rejected
+from drivers.texts.message import Text, text
 
 _REQUEST = 2 << 12
 _RESPONSE = 3
@@ -67,15 +68,21 @@ def _upload(
     command = answer[2]
     if command & 0xE0 != 0x40:
         yield from _give_up(
-            box, index, subindex, ABORT_COMMAND, f"unexpected answer {command:#04x}"
+            box,
+            index,
+            subindex,
+            ABORT_COMMAND,
+            _unexpected(command),
         )
     if command & 0x02:
         return answer[6 : 10 - (command >> 2 & 3 if command & 0x01 else 0)]
     if len(answer) < 10:
-        yield from _give_up(box, index, subindex, ABORT_COMMAND, "an answer without a length")
+        yield from _give_up(box, index, subindex, ABORT_COMMAND, text("sdo.answer-without-length"))
     size = int.from_bytes(answer[6:10], "little")
     if size > MAX_BYTES:
-        yield from _give_up(box, index, subindex, 0x05040005, f"the drive announced {size} bytes")
+        yield from _give_up(
+            box, index, subindex, 0x05040005, text("sdo.announced-too-much", announced=size)
+        )
     data = bytearray(answer[10:])
     if len(data) < size:
         yield from _upload_segments(box, index, subindex, size=size, data=data, timeout_s=timeout_s)
@@ -98,14 +105,22 @@ def _upload_segments(
         _raise_abort(answer, index, subindex, writing=False)
         command = answer[2]
         if command & 0xE0:
-            yield from _give_up(box, index, subindex, ABORT_COMMAND, f"answer {command:#04x}")
+            yield from _give_up(
+                box,
+                index,
+                subindex,
+                ABORT_COMMAND,
+                _unexpected(command),
+            )
         if command & 0x10 != toggle:
-            yield from _give_up(box, index, subindex, ABORT_TOGGLE, "a segment came twice")
+            yield from _give_up(
+                box, index, subindex, ABORT_TOGGLE, text("sdo.segment-twice-or-lost")
+            )
         part = answer[3:]
         data += part[: 7 - (command >> 1 & 7)] if len(part) <= 7 else part
         if len(data) > size:
             yield from _give_up(
-                box, index, subindex, 0x06070010, f"more than the {size} bytes announced came"
+                box, index, subindex, 0x06070010, text("sdo.more-than-announced", announced=size)
             )
         if command & 0x01:
             break
@@ -151,7 +166,11 @@ def download(
     _raise_abort(answer, index, subindex, writing=True)
     if answer[2] & 0xE0 != 0x60:
         yield from _give_up(
-            box, index, subindex, ABORT_COMMAND, f"unexpected answer {answer[2]:#04x} to a write"
+            box,
+            index,
+            subindex,
+            ABORT_COMMAND,
+            _unexpected(answer[2]),
         )
     toggle = 0
     while sent < len(data):
@@ -162,7 +181,7 @@ def download(
         answer = yield from box.request(COE, request, _is_segment, timeout_s)
         _raise_abort(answer, index, subindex, writing=True)
         if answer[2] & 0xE0 != 0x20 or answer[2] & 0x10 != toggle:
-            yield from _give_up(box, index, subindex, ABORT_TOGGLE, "a segment went astray")
+            yield from _give_up(box, index, subindex, ABORT_TOGGLE, text("sdo.segment-out-of-turn"))
         toggle ^= 0x10
 
 
@@ -291,8 +310,13 @@ def _raise_abort(answer: bytes, index: int, subindex: int, *, writing: bool) -> 
         raise rejected(code, parameter=f"{index:04X}:{subindex:02X}", writing=writing)
 
 
-def _give_up(box: Mailbox, index: int, subindex: int, code: int, why: str) -> Steps[NoReturn]:
+def _unexpected(answer: int) -> Text:
+    return text("sdo.unexpected-answer", answer=f"{answer:#04x}")
+
+
+def _give_up(box: Mailbox, index: int, subindex: int, code: int, why: Text) -> Steps[NoReturn]:
     """Abort towards the slave, then raise."""
     yield from box.post(COE, struct.pack("<HBHBI", _REQUEST, 0x80, index, subindex, code))
     box.unsettled = True
-    raise ProtocolError(f"{why} ({index:04X}:{subindex:02X})")
+    at = f"{index:04X}:{subindex:02X}"
+    raise ProtocolError("sdo.transfer-given-up", parameter=at, why=why)

@@ -185,7 +185,7 @@ class Lanes:
             lane.running.clear()
             lane.waiting.clear()
             for job in jobs:
-                job.done(None, LinkLost(why, remedy="it is tried again by itself; or scan again"))
+                job.done(None, LinkLost(why, remedy="ethercat.tried-again-by-itself"))
 
     def _next_access(self, lane: _Lane, now: float) -> tuple[_Job, Request] | None:
         """Run a lane up to its next access; None where it has none now."""

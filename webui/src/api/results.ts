@@ -5,12 +5,15 @@ import type {
   HealthResult,
   InertiaAnswer,
   JobInfo,
+  StepAnswer,
 } from './schema'
 
 /** What a tool concluded: distinguished by its field `tool`. */
-type ToolOutcome = BrakeResult | FirstPowerResult | FrictionResult | HealthResult | InertiaAnswer
+type ToolOutcome =
+  BrakeResult | FirstPowerResult | FrictionResult | HealthResult | InertiaAnswer | StepAnswer
 
-const outcome = (result: unknown): ToolOutcome | null =>
+/** The result of a tool, or null where it is something else. */
+export const outcome = (result: unknown): ToolOutcome | null =>
   typeof result === 'object' && result !== null && 'tool' in result ? (result as ToolOutcome) : null
 
 /** The result of a job that is no tool with a result of its own. */

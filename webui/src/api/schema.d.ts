@@ -152,6 +152,30 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/box": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Box
+         * @description The station's name, what its network ports are for, and what could be chosen.
+         */
+        get: operations["box"];
+        /**
+         * Set Box
+         * @description Name the station and say which port is EtherCAT's and which the office's.
+         */
+        put: operations["set_box"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/bundles": {
         parameters: {
             query?: never;
@@ -326,6 +350,26 @@ export interface paths {
          * @description Energy of a braked mass and the resistor that takes it.
          */
         post: operations["calculate_braking"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/certificate": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Certificate
+         * @description The certificate of the station's authority, for a phone or computer that is to trust it.
+         */
+        get: operations["certificate"];
+        put?: never;
+        post?: never;
         delete?: never;
         options?: never;
         head?: never;
@@ -1198,7 +1242,7 @@ export interface paths {
         put?: never;
         /**
          * Start Step
-         * @description Step of speed, or a move, with its numbers.
+         * @description Command a step of speed or a move and read overshoot, settling and torque. The axis moves.
          */
         post: operations["start_step"];
         delete?: never;
@@ -3285,6 +3329,24 @@ export interface components {
             source: string;
         };
         /**
+         * AgainInfo
+         * @description A loop that answered otherwise than predicted, and what was made of it.
+         */
+        AgainInfo: {
+            /** Closed Db */
+            closed_db: number[] | null;
+            /** Closed Deg */
+            closed_deg: number[] | null;
+            /** Frequency Hz */
+            frequency_hz: number[] | null;
+            /** Gain Ratio */
+            gain_ratio: number | null;
+            measured: components["schemas"]["FiguresInfo"];
+            /** Outcome */
+            outcome: string;
+            predicted: components["schemas"]["FiguresInfo"];
+        };
+        /**
          * AliasRequest
          * @description A station alias to write to the EEPROM of a slave.
          */
@@ -3346,6 +3408,8 @@ export interface components {
              * @description what went wrong; empty for success
              */
             outcome: string;
+            /** @description the same as code and facts */
+            outcome_message: components["schemas"]["MessageInfo"] | null;
             /** Person */
             person: string;
             /** Station */
@@ -3357,6 +3421,8 @@ export interface components {
              * Format: date-time
              */
             time: string;
+            /** @description what a job is called */
+            title_message: components["schemas"]["MessageInfo"] | null;
         };
         /**
          * AuditNames
@@ -3402,6 +3468,8 @@ export interface components {
              * @description why they do not; empty while they do
              */
             problem: string;
+            /** @description the same as code and facts */
+            problem_message: components["schemas"]["MessageInfo"] | null;
         };
         /**
          * AuditVerdict
@@ -3424,6 +3492,65 @@ export interface components {
             ok: boolean;
             /** Why */
             why: string;
+            /** @description the same as code and facts */
+            why_message: components["schemas"]["MessageInfo"] | null;
+        };
+        /**
+         * AutotuneAnswer
+         * @description All that was measured and decided; ``before`` holds raw values that undo what was applied.
+         */
+        AutotuneAnswer: {
+            /**
+             * After
+             * @description raw values afterwards
+             */
+            after?: {
+                [key: string]: number;
+            };
+            again: components["schemas"]["AgainInfo"] | null;
+            applied: components["schemas"]["CandidateInfo"] | null;
+            /** Before */
+            before: {
+                [key: string]: number;
+            };
+            /** Candidates */
+            candidates: components["schemas"]["CandidateInfo"][];
+            /** Cautious */
+            cautious: boolean;
+            inertia: components["schemas"]["InertiaAnswer"];
+            /**
+             * Load
+             * @enum {string}
+             */
+            load: "stiff" | "medium" | "compliant";
+            /**
+             * Measurements
+             * @description names of the stored raw data
+             * @default []
+             */
+            measurements: string[];
+            mechanics: components["schemas"]["SweepAnswer"];
+            /** Note Messages */
+            note_messages: components["schemas"]["MessageInfo"][];
+            /**
+             * Notes
+             * @description in English
+             */
+            notes: string[];
+            step: components["schemas"]["StepAnswer"] | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            tool: "autotune";
+            /**
+             * Tried
+             * @description in English
+             */
+            tried: string[];
+            /** Tried Messages */
+            tried_messages: components["schemas"]["MessageInfo"][];
+            verified: components["schemas"]["VerifiedInfo"] | null;
         };
         /**
          * AutotuneRequest
@@ -3703,6 +3830,19 @@ export interface components {
             verdict: "stopped" | "coasting" | "still_moving" | "unreachable";
         };
         /**
+         * BandInfo
+         * @description Margins over one band; None where nothing crosses there.
+         */
+        BandInfo: {
+            gain_margin_db: components["schemas"]["IntervalInfo"] | null;
+            /** High Hz */
+            high_hz: number | null;
+            /** Low Hz */
+            low_hz: number;
+            peak_sensitivity: components["schemas"]["IntervalInfo"] | null;
+            phase_margin_deg: components["schemas"]["IntervalInfo"] | null;
+        };
+        /**
          * BaselineRequest
          * @description Which rounds are the baseline, and who signs where nobody is logged in by name.
          */
@@ -3719,6 +3859,68 @@ export interface components {
             person: string;
             /** Runs */
             runs: number[];
+        };
+        /**
+         * BoxChange
+         * @description The name is in force from the next start of the server on, the ports at once.
+         */
+        BoxChange: {
+            /**
+             * Ethercat
+             * @default
+             */
+            ethercat: string;
+            /** Name */
+            name: string;
+            /**
+             * Office
+             * @default
+             */
+            office: string;
+        };
+        /**
+         * BoxInfo
+         * @description What was set up, and what could be chosen.
+         */
+        BoxInfo: {
+            /** Configured */
+            configured: boolean;
+            /**
+             * Ethercat
+             * @description port of the drives; empty: any but the office's
+             */
+            ethercat: string;
+            /** Name */
+            name: string;
+            /**
+             * Office
+             * @description port of people; no EtherCAT is allowed there
+             */
+            office: string;
+            /** Ports */
+            ports: components["schemas"]["BoxPort"][];
+        };
+        /**
+         * BoxPort
+         * @description A network port of this computer.
+         */
+        BoxPort: {
+            /**
+             * Addresses
+             * @description IPv4 addresses that it has now
+             */
+            addresses: string[];
+            /**
+             * Here
+             * @description this request came by it
+             */
+            here: boolean;
+            /** Name */
+            name: string;
+            /** Up */
+            up: boolean;
+            /** Wired */
+            wired: boolean;
         };
         /**
          * BrakeResult
@@ -4124,6 +4326,30 @@ export interface components {
             url: string;
         };
         /**
+         * CandidateInfo
+         * @description A design: what it sets, and what is predicted of it.
+         */
+        CandidateInfo: {
+            /** Bandwidth Hz */
+            bandwidth_hz: number | null;
+            filters: components["schemas"]["FiltersInfo"];
+            gains: components["schemas"]["GainsInfo"];
+            /** Marks */
+            marks: ("robust" | "balanced" | "fast")[];
+            nominal: components["schemas"]["MarginsInfo"];
+            /** Notches */
+            notches: components["schemas"]["NotchInfo"][];
+            /** Overshoot Percent */
+            overshoot_percent: number | null;
+            /** Phase Cost Deg */
+            phase_cost_deg: number;
+            /** Position Bandwidth Hz */
+            position_bandwidth_hz: number | null;
+            promised: components["schemas"]["GoalsInfo"];
+            /** Settling S */
+            settling_s: number | null;
+        };
+        /**
          * CandidatesInfo
          * @description The table, fastest first; up to three rows carry a mark.
          */
@@ -4420,6 +4646,25 @@ export interface components {
             unit: string;
         };
         /**
+         * DirectResponse
+         * @description The response without any model, on the same lines.
+         */
+        DirectResponse: {
+            /** Magnitude Db */
+            magnitude_db: number[];
+            /** Phase Deg */
+            phase_deg: number[];
+            /** Std Db */
+            std_db: (number | null)[];
+            /** Std Deg */
+            std_deg: (number | null)[];
+            /** Valid Band Hz */
+            valid_band_hz: [
+                number,
+                number
+            ];
+        };
+        /**
          * DoctorCause
          * @description A possible cause; the texts in English and Chinese.
          */
@@ -4498,6 +4743,8 @@ export interface components {
              * @description non-empty when another drive answers here
              */
             identity_warning: string;
+            /** @description the same as code and facts */
+            identity_warning_message: components["schemas"]["MessageInfo"] | null;
             lease: components["schemas"]["Lease"];
             /** Maker */
             maker: string;
@@ -4882,6 +5129,28 @@ export interface components {
             size: number;
             /** Source */
             source: string;
+        };
+        /**
+         * FiguresInfo
+         * @description Of one loop, read on the lines that were verified; None beyond them.
+         */
+        FiguresInfo: {
+            /** Bandwidth Hz */
+            bandwidth_hz: number | null;
+            /** Gain Margin Db */
+            gain_margin_db: number | null;
+            /** Phase Margin Deg */
+            phase_margin_deg: number | null;
+        };
+        /**
+         * FiltersInfo
+         * @description Corners of filters that the drive can be given; None: not there, or unknown.
+         */
+        FiltersInfo: {
+            /** Speed Hz */
+            speed_hz: number | null;
+            /** Torque Hz */
+            torque_hz: number | null;
         };
         /**
          * Finding
@@ -5464,6 +5733,30 @@ export interface components {
             speed_nms: number | null;
         };
         /**
+         * GainStepInfo
+         * @description One raised gain and the oscillation of the torque in % of the rated (RMS).
+         */
+        GainStepInfo: {
+            /** Gain Db */
+            gain_db: number;
+            /** Oscillation Percent */
+            oscillation_percent: number;
+            /** Stable */
+            stable: boolean;
+        };
+        /**
+         * GainStepsInfo
+         * @description The highest gain at which the loop was stable, and the next where it was not.
+         */
+        GainStepsInfo: {
+            /** Onset Db */
+            onset_db: number | null;
+            /** Shown Db */
+            shown_db: number;
+            /** Steps */
+            steps: components["schemas"]["GainStepInfo"][];
+        };
+        /**
          * GainValues
          * @description Gains with a physical meaning. ``inertia_kgm2`` is the whole axis'.
          */
@@ -5485,6 +5778,20 @@ export interface components {
             gains?: components["schemas"]["GainValues"] | null;
             /** Level */
             level?: number | null;
+        };
+        /**
+         * GainsInfo
+         * @description Gains of both loops; ``speed_bandwidth_hz`` is speed_nms/(2π·J).
+         */
+        GainsInfo: {
+            /** Integral Hz */
+            integral_hz: number;
+            /** Position 1 S */
+            position_1_s: number;
+            /** Speed Bandwidth Hz */
+            speed_bandwidth_hz: number;
+            /** Speed Nms */
+            speed_nms: number;
         };
         /**
          * GearLimits
@@ -5676,6 +5983,18 @@ export interface components {
              * @enum {string}
              */
             unit: "rev" | "mm" | "°";
+        };
+        /**
+         * GoalsInfo
+         * @description The worst margins that were promised or found; None where they are not finite.
+         */
+        GoalsInfo: {
+            /** Gain Margin Db */
+            gain_margin_db: number | null;
+            /** Ms */
+            ms: number | null;
+            /** Phase Margin Deg */
+            phase_margin_deg: number | null;
         };
         /**
          * Grade
@@ -6641,6 +6960,18 @@ export interface components {
             virtual: string[];
         };
         /**
+         * IntervalInfo
+         * @description A value and the limits that hold the truth in 95 of 100 cases; None: without a limit.
+         */
+        IntervalInfo: {
+            /** High */
+            high: number | null;
+            /** Low */
+            low: number | null;
+            /** Value */
+            value: number | null;
+        };
+        /**
          * InvitationView
          * @description An invitation. ``code`` is shown to those who may invite; ``enabled``: the button is held.
          */
@@ -6730,9 +7061,7 @@ export interface components {
              * Result
              * @description of a tool: its result, which its field tool names
              */
-            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"]) | {
-                [key: string]: unknown;
-            } | null;
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | components["schemas"]["PlainResult"] | null;
             /**
              * Started
              * Format: date-time
@@ -7293,6 +7622,28 @@ export interface components {
             token: components["schemas"]["TokenInfo"];
         };
         /**
+         * MarginsInfo
+         * @description Margins of an open loop; None where there is no such crossing.
+         */
+        MarginsInfo: {
+            /** Crossover Hz */
+            crossover_hz: number | null;
+            /** Gain Margin Db */
+            gain_margin_db: number | null;
+            /** Gain Margin Hz */
+            gain_margin_hz: number | null;
+            /** Ms */
+            ms: number | null;
+            /** Ms Hz */
+            ms_hz: number | null;
+            /** Phase Margin Deg */
+            phase_margin_deg: number | null;
+            /** Phase Margin Hz */
+            phase_margin_hz: number | null;
+            /** Stable */
+            stable: boolean;
+        };
+        /**
          * MeasurementContent
          * @description Its settings, and its result evaluated anew from the raw data.
          */
@@ -7318,8 +7669,11 @@ export interface components {
              * @description version of servodeck that measured; empty: not reported
              */
             program: string;
-            /** Result */
-            result: {
+            /**
+             * Result
+             * @description of a tool: its result, which its field tool names
+             */
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | {
                 [key: string]: unknown;
             };
             /** Settings */
@@ -7434,6 +7788,32 @@ export interface components {
             wiring: string;
         };
         /**
+         * ModeInfo
+         * @description One resonance of the model: α·(s + β)/(s² + 2ζωs + ω²).
+         */
+        ModeInfo: {
+            /** Damping */
+            damping: number;
+            /** Frequency Hz */
+            frequency_hz: number;
+            /** Residue */
+            residue: number;
+            /** Zero Rad S */
+            zero_rad_s: number;
+        };
+        /**
+         * ModelInfo
+         * @description Torque to velocity: ``gain`` is 1/J of the rigid part, ``pole_rad_s`` b/J.
+         */
+        ModelInfo: {
+            /** Gain */
+            gain: number;
+            /** Modes */
+            modes: components["schemas"]["ModeInfo"][];
+            /** Pole Rad S */
+            pole_rad_s: number;
+        };
+        /**
          * MotionClass
          * @description Whether writing an object can cause motion, who says so, and whether it can be changed.
          */
@@ -7502,6 +7882,30 @@ export interface components {
             reason: string;
             /** Value */
             value?: number | string | null;
+        };
+        /**
+         * MoveNumbers
+         * @description Read-outs of a move; ``settling_s`` counts from the end of the commanded motion.
+         */
+        MoveNumbers: {
+            /** Following Peak */
+            following_peak: number;
+            /** Following Rms */
+            following_rms: number;
+            /** Overshoot */
+            overshoot: number;
+            /** Settling S */
+            settling_s: number | null;
+            /**
+             * Torque Peak
+             * @description in % of rated torque
+             */
+            torque_peak: number | null;
+            /**
+             * Torque Rms
+             * @description in % of rated torque
+             */
+            torque_rms: number | null;
         };
         /**
          * MoveRequest
@@ -7650,6 +8054,18 @@ export interface components {
             name: string;
             /** Scopes */
             scopes: components["schemas"]["Right"][];
+        };
+        /**
+         * NotchInfo
+         * @description Centre, width and depth, which is negative.
+         */
+        NotchInfo: {
+            /** Center Hz */
+            center_hz: number;
+            /** Depth Db */
+            depth_db: number;
+            /** Width Hz */
+            width_hz: number;
         };
         /**
          * NotchPreviewInfo
@@ -8028,6 +8444,13 @@ export interface components {
             type: "ping";
         };
         /**
+         * PlainResult
+         * @description What a job that is no tool concludes: a scan, reading all parameters, loading a set.
+         */
+        PlainResult: {
+            [key: string]: unknown;
+        };
+        /**
          * PlotCursor
          * @description Where on a plot this person points, in what its axis shows; null when they do not.
          *
@@ -8375,6 +8798,8 @@ export interface components {
             drive?: string | null;
             /** Limit */
             limit?: string | null;
+            /** @description limit as code and facts */
+            limit_message?: components["schemas"]["MessageInfo"] | null;
             /** Parameter */
             parameter?: string | null;
             /**
@@ -9006,6 +9431,33 @@ export interface components {
             power_w?: number | null;
             /** Resistance Ohm */
             resistance_ohm?: number | null;
+        };
+        /**
+         * ResonanceInfo
+         * @description A row of the table of resonances; ``height_db`` is how far it rises or falls there.
+         */
+        ResonanceInfo: {
+            /** Damping */
+            damping: number;
+            /** Damping Ci95 */
+            damping_ci95: [
+                number,
+                number
+            ] | null;
+            /** Frequency Ci95 Hz */
+            frequency_ci95_hz: [
+                number,
+                number
+            ] | null;
+            /** Frequency Hz */
+            frequency_hz: number;
+            /** Height Db */
+            height_db: number;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "resonance" | "antiresonance";
         };
         /**
          * RetentionBounds
@@ -9882,12 +10334,91 @@ export interface components {
             station: number;
         };
         /**
+         * StepAnswer
+         * @description Curves [n] over ``time_s``, and what is read from them.
+         */
+        StepAnswer: {
+            /** Actual */
+            actual: number[];
+            /** Demand */
+            demand: number[];
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "speed" | "move";
+            /**
+             * Measurements
+             * @description names of the stored raw data
+             * @default []
+             */
+            measurements: string[];
+            move: components["schemas"]["MoveNumbers"] | null;
+            /**
+             * Noise
+             * @description standard deviation of a held speed, or of the position at the end of a move
+             */
+            noise: number;
+            step: components["schemas"]["StepNumbers"] | null;
+            /** Time S */
+            time_s: number[];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            tool: "step";
+            /** Torque Peak Percent */
+            torque_peak_percent: number;
+            /**
+             * Torque Percent
+             * @description of rated torque
+             */
+            torque_percent: number[];
+            /** Torque Rms Percent */
+            torque_rms_percent: number;
+            /**
+             * Unit
+             * @description of demand, actual, noise and window
+             * @enum {string}
+             */
+            unit: "rpm" | "rev";
+            /**
+             * Widened
+             * @description whether noise asked for a wider window than usual
+             */
+            widened: boolean;
+            /**
+             * Window
+             * @description settling window
+             */
+            window: number | null;
+        };
+        /**
+         * StepNumbers
+         * @description Read-outs of a step of speed; times from the command, None where it was never reached.
+         */
+        StepNumbers: {
+            /** Final */
+            final: number;
+            /** Initial */
+            initial: number;
+            /** Overshoot Percent */
+            overshoot_percent: number;
+            /** Peak Time S */
+            peak_time_s: number;
+            /** Rise S */
+            rise_s: number | null;
+            /** Settling S */
+            settling_s: number | null;
+        };
+        /**
          * StepRequest
          * @description A step of speed (rpm) or a move (rev).
          */
         StepRequest: {
             /**
              * Acceleration
+             * @description acceleration of a move, in rpm/s
              * @default 6000
              */
             acceleration: number;
@@ -9905,11 +10436,13 @@ export interface components {
             cycle_ms: number;
             /**
              * Hold S
+             * @description time at the end, in s
              * @default 0.25
              */
             hold_s: number;
             /**
              * Kind
+             * @description what is commanded
              * @default speed
              * @enum {string}
              */
@@ -9921,11 +10454,13 @@ export interface components {
             rated_torque_nm?: number | null;
             /**
              * Size
+             * @description size of the step in rpm, or way of the move in revolutions
              * @default 100
              */
             size: number;
             /**
              * Speed
+             * @description speed of a move, in rpm
              * @default 300
              */
             speed: number;
@@ -9950,7 +10485,10 @@ export interface components {
              * @description longest way from the start, in revolutions
              */
             travel_limit: number;
-            /** Window */
+            /**
+             * Window
+             * @description settling window in rpm or revolutions; 2 % of the size
+             */
             window?: number | null;
         };
         /**
@@ -10114,6 +10652,100 @@ export interface components {
              * @default 0
              */
             version: number;
+        };
+        /**
+         * SweepAnswer
+         * @description The response [lines] with its deviations, and what is read from it.
+         *
+         *     ``coherence`` and the deviations stand beside each line; None where nothing is known of them.
+         *     ``margins`` hold from ``from_hz`` to ``to_hz``, each None where no crossing was measured.
+         */
+        SweepAnswer: {
+            /** Coherence */
+            coherence: number[];
+            /** Coulomb Nm */
+            coulomb_nm: number | null;
+            /** Current Bandwidth Hz */
+            current_bandwidth_hz: number | null;
+            /** Delay S */
+            delay_s: number | null;
+            direct: components["schemas"]["DirectResponse"];
+            /** Distortion */
+            distortion: (number | null)[];
+            /** Frequency Hz */
+            frequency_hz: number[];
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "mechanics" | "speed_loop" | "position_loop";
+            /**
+             * Loop
+             * @description that was closed meanwhile
+             */
+            loop: string;
+            /** Magnitude Db */
+            magnitude_db: number[];
+            /** Margins */
+            margins: {
+                [key: string]: number | boolean | null;
+            };
+            /**
+             * Measurements
+             * @description names of the stored raw data
+             * @default []
+             */
+            measurements: string[];
+            model: components["schemas"]["ModelInfo"] | null;
+            /** Motion S */
+            motion_s: number;
+            /** Noise */
+            noise: (number | null)[];
+            /** Periods Dropped */
+            periods_dropped: number;
+            /** Periods Used */
+            periods_used: number;
+            /** Phase Deg */
+            phase_deg: number[];
+            /** Resonances */
+            resonances: components["schemas"]["ResonanceInfo"][];
+            /** Sample Rate Hz */
+            sample_rate_hz: number;
+            /**
+             * Saturated Share
+             * @description of the samples had the torque at its limit
+             */
+            saturated_share: number;
+            /** Speed Filter Hz */
+            speed_filter_hz: number | null;
+            /** Std Db */
+            std_db: (number | null)[];
+            /** Std Deg */
+            std_deg: (number | null)[];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            tool: "sweep";
+            /** Trusted */
+            trusted: boolean;
+            /**
+             * Unit
+             * @description of the magnitude, which is in dB of it
+             */
+            unit: string;
+            /** Valid Band Hz */
+            valid_band_hz: [
+                number,
+                number
+            ];
+            /** Warning Messages */
+            warning_messages: components["schemas"]["MessageInfo"][];
+            /**
+             * Warnings
+             * @description in English
+             */
+            warnings: string[];
         };
         /**
          * SweepRequest
@@ -10540,6 +11172,46 @@ export interface components {
             values: components["schemas"]["ParameterValue"][];
         };
         /**
+         * VerdictInfo
+         * @description What is known of the tuned loop: measured over a band, predicted beyond it.
+         */
+        VerdictInfo: {
+            /** Contradicted */
+            contradicted: boolean;
+            /**
+             * Coverage
+             * @enum {string}
+             */
+            coverage: "measured" | "gain_steps" | "predicted";
+            delay_s: components["schemas"]["IntervalInfo"];
+            designed: components["schemas"]["BandInfo"] | null;
+            gain_db: components["schemas"]["IntervalInfo"];
+            /** Last Crossover Hz */
+            last_crossover_hz: number | null;
+            measured: components["schemas"]["BandInfo"] | null;
+            predicted: components["schemas"]["BandInfo"] | null;
+            /** Shown Gain Db */
+            shown_gain_db: number | null;
+            /** Stable */
+            stable: boolean;
+            stated: components["schemas"]["GoalsInfo"];
+            worst: components["schemas"]["GoalsInfo"];
+        };
+        /**
+         * VerifiedInfo
+         * @description The tuned loop as it was measured.
+         */
+        VerifiedInfo: {
+            expected: components["schemas"]["FiguresInfo"] | null;
+            gain_steps: components["schemas"]["GainStepsInfo"] | null;
+            /** Measured Bandwidth Hz */
+            measured_bandwidth_hz: number | null;
+            /** Predicted Bandwidth Hz */
+            predicted_bandwidth_hz: number | null;
+            sweep: components["schemas"]["SweepAnswer"];
+            verdict: components["schemas"]["VerdictInfo"] | null;
+        };
+        /**
          * VersionInfo
          * @description One state of an entry; never changed.
          */
@@ -10650,6 +11322,7 @@ export interface components {
 export type AccountChange = components['schemas']['AccountChange'];
 export type AccountInfo = components['schemas']['AccountInfo'];
 export type ActiveFault = components['schemas']['ActiveFault'];
+export type AgainInfo = components['schemas']['AgainInfo'];
 export type AliasRequest = components['schemas']['AliasRequest'];
 export type ArmRequest = components['schemas']['ArmRequest'];
 export type AuditEvent = components['schemas']['AuditEvent'];
@@ -10657,13 +11330,18 @@ export type AuditNames = components['schemas']['AuditNames'];
 export type AuditPage = components['schemas']['AuditPage'];
 export type AuditStatus = components['schemas']['AuditStatus'];
 export type AuditVerdict = components['schemas']['AuditVerdict'];
+export type AutotuneAnswer = components['schemas']['AutotuneAnswer'];
 export type AutotuneRequest = components['schemas']['AutotuneRequest'];
 export type AxisHealth = components['schemas']['AxisHealth'];
 export type AxisInfo = components['schemas']['AxisInfo'];
 export type AxisRecordInfo = components['schemas']['AxisRecordInfo'];
 export type AxisState = components['schemas']['AxisState'];
 export type AxisStopInfo = components['schemas']['AxisStopInfo'];
+export type BandInfo = components['schemas']['BandInfo'];
 export type BaselineRequest = components['schemas']['BaselineRequest'];
+export type BoxChange = components['schemas']['BoxChange'];
+export type BoxInfo = components['schemas']['BoxInfo'];
+export type BoxPort = components['schemas']['BoxPort'];
 export type BrakeResult = components['schemas']['BrakeResult'];
 export type BrakeSettings = components['schemas']['BrakeSettings'];
 export type BrakeTest = components['schemas']['BrakeTest'];
@@ -10675,6 +11353,7 @@ export type BundleInfo = components['schemas']['BundleInfo'];
 export type BundleList = components['schemas']['BundleList'];
 export type BundleRequest = components['schemas']['BundleRequest'];
 export type Bus = components['schemas']['Bus'];
+export type CandidateInfo = components['schemas']['CandidateInfo'];
 export type CandidatesInfo = components['schemas']['CandidatesInfo'];
 export type CandidatesRequest = components['schemas']['CandidatesRequest'];
 export type ChangeRecording = components['schemas']['ChangeRecording'];
@@ -10691,6 +11370,7 @@ export type CyclicRequest = components['schemas']['CyclicRequest'];
 export type DescribedDevice = components['schemas']['DescribedDevice'];
 export type Diff = components['schemas']['Diff'];
 export type DiffRow = components['schemas']['DiffRow'];
+export type DirectResponse = components['schemas']['DirectResponse'];
 export type DoctorCause = components['schemas']['DoctorCause'];
 export type DoctorFact = components['schemas']['DoctorFact'];
 export type DriveIdentification = components['schemas']['DriveIdentification'];
@@ -10709,6 +11389,8 @@ export type EthercatSegment = components['schemas']['EthercatSegment'];
 export type ExcitationInfo = components['schemas']['ExcitationInfo'];
 export type FaultHistory = components['schemas']['FaultHistory'];
 export type FaultHistoryInfo = components['schemas']['FaultHistoryInfo'];
+export type FiguresInfo = components['schemas']['FiguresInfo'];
+export type FiltersInfo = components['schemas']['FiltersInfo'];
 export type Finding = components['schemas']['Finding'];
 export type FirstPowerResult = components['schemas']['FirstPowerResult'];
 export type FirstPowerSettings = components['schemas']['FirstPowerSettings'];
@@ -10725,13 +11407,17 @@ export type FrictionSettings = components['schemas']['FrictionSettings'];
 export type Functions = components['schemas']['Functions'];
 export type GainBlock = components['schemas']['GainBlock'];
 export type GainInfo = components['schemas']['GainInfo'];
+export type GainStepInfo = components['schemas']['GainStepInfo'];
+export type GainStepsInfo = components['schemas']['GainStepsInfo'];
 export type GainValues = components['schemas']['GainValues'];
 export type GainWrite = components['schemas']['GainWrite'];
+export type GainsInfo = components['schemas']['GainsInfo'];
 export type GearLimits = components['schemas']['GearLimits'];
 export type GearPlanInfo = components['schemas']['GearPlanInfo'];
 export type GearValueInfo = components['schemas']['GearValueInfo'];
 export type GearWritten = components['schemas']['GearWritten'];
 export type GenerateRequest = components['schemas']['GenerateRequest'];
+export type GoalsInfo = components['schemas']['GoalsInfo'];
 export type Grade = components['schemas']['Grade'];
 export type GrantView = components['schemas']['GrantView'];
 export type Guide = components['schemas']['Guide'];
@@ -10765,6 +11451,7 @@ export type InertiaAnswer = components['schemas']['InertiaAnswer'];
 export type InertiaIntervals = components['schemas']['InertiaIntervals'];
 export type InertiaRequest = components['schemas']['InertiaRequest'];
 export type Interfaces = components['schemas']['Interfaces'];
+export type IntervalInfo = components['schemas']['IntervalInfo'];
 export type InvitationView = components['schemas']['InvitationView'];
 export type IoInfo = components['schemas']['IoInfo'];
 export type JobChanged = components['schemas']['JobChanged'];
@@ -10795,15 +11482,19 @@ export type LogIn = components['schemas']['LogIn'];
 export type Logged = components['schemas']['Logged'];
 export type MadeInvitation = components['schemas']['MadeInvitation'];
 export type MadeToken = components['schemas']['MadeToken'];
+export type MarginsInfo = components['schemas']['MarginsInfo'];
 export type MeasurementContent = components['schemas']['MeasurementContent'];
 export type MeasurementInfo = components['schemas']['MeasurementInfo'];
 export type Mechanics = components['schemas']['Mechanics'];
 export type MechanicsUpdate = components['schemas']['MechanicsUpdate'];
 export type MessageInfo = components['schemas']['MessageInfo'];
 export type MissingPort = components['schemas']['MissingPort'];
+export type ModeInfo = components['schemas']['ModeInfo'];
+export type ModelInfo = components['schemas']['ModelInfo'];
 export type MotionClass = components['schemas']['MotionClass'];
 export type MotionClassRequest = components['schemas']['MotionClassRequest'];
 export type MotionSettingWrite = components['schemas']['MotionSettingWrite'];
+export type MoveNumbers = components['schemas']['MoveNumbers'];
 export type MoveRequest = components['schemas']['MoveRequest'];
 export type NamedSetup = components['schemas']['NamedSetup'];
 export type NetworkInterface = components['schemas']['NetworkInterface'];
@@ -10811,6 +11502,7 @@ export type NewAccount = components['schemas']['NewAccount'];
 export type NewGrant = components['schemas']['NewGrant'];
 export type NewInvitation = components['schemas']['NewInvitation'];
 export type NewToken = components['schemas']['NewToken'];
+export type NotchInfo = components['schemas']['NotchInfo'];
 export type NotchPreviewInfo = components['schemas']['NotchPreviewInfo'];
 export type NotchPreviewRequest = components['schemas']['NotchPreviewRequest'];
 export type NotchShape = components['schemas']['NotchShape'];
@@ -10829,6 +11521,7 @@ export type PeopleHere = components['schemas']['PeopleHere'];
 export type PeopleList = components['schemas']['PeopleList'];
 export type PersonHere = components['schemas']['PersonHere'];
 export type Ping = components['schemas']['Ping'];
+export type PlainResult = components['schemas']['PlainResult'];
 export type PlotCursor = components['schemas']['PlotCursor'];
 export type Pointer = components['schemas']['Pointer'];
 export type PointerMoved = components['schemas']['PointerMoved'];
@@ -10874,6 +11567,7 @@ export type Regeneration = components['schemas']['Regeneration'];
 export type ReportInfo = components['schemas']['ReportInfo'];
 export type ReportRequest = components['schemas']['ReportRequest'];
 export type ResistorModel = components['schemas']['ResistorModel'];
+export type ResonanceInfo = components['schemas']['ResonanceInfo'];
 export type RetentionBounds = components['schemas']['RetentionBounds'];
 export type Right = components['schemas']['Right'];
 export type Role = components['schemas']['Role'];
@@ -10910,6 +11604,8 @@ export type SnapshotTrace = components['schemas']['SnapshotTrace'];
 export type StartRecording = components['schemas']['StartRecording'];
 export type StateChanged = components['schemas']['StateChanged'];
 export type StationDiagnosis = components['schemas']['StationDiagnosis'];
+export type StepAnswer = components['schemas']['StepAnswer'];
+export type StepNumbers = components['schemas']['StepNumbers'];
 export type StepRequest = components['schemas']['StepRequest'];
 export type StopAll = components['schemas']['StopAll'];
 export type StopReached = components['schemas']['StopReached'];
@@ -10918,6 +11614,7 @@ export type StopResult = components['schemas']['StopResult'];
 export type StopStepInfo = components['schemas']['StopStepInfo'];
 export type StopTaken = components['schemas']['StopTaken'];
 export type StoredSet = components['schemas']['StoredSet'];
+export type SweepAnswer = components['schemas']['SweepAnswer'];
 export type SweepRequest = components['schemas']['SweepRequest'];
 export type TagCount = components['schemas']['TagCount'];
 export type TerminalBits = components['schemas']['TerminalBits'];
@@ -10935,6 +11632,8 @@ export type TurningInfo = components['schemas']['TurningInfo'];
 export type Uncertainty = components['schemas']['Uncertainty'];
 export type Undo = components['schemas']['Undo'];
 export type ValuesChanged = components['schemas']['ValuesChanged'];
+export type VerdictInfo = components['schemas']['VerdictInfo'];
+export type VerifiedInfo = components['schemas']['VerifiedInfo'];
 export type VersionInfo = components['schemas']['VersionInfo'];
 export type WatchState = components['schemas']['WatchState'];
 export type WatchUpdate = components['schemas']['WatchUpdate'];
@@ -12086,6 +12785,284 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["AuditVerdict"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    box: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BoxInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    set_box: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["BoxChange"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BoxInfo"];
                 };
             };
             /** @description Not a request of this interface */
@@ -13756,6 +14733,143 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["BrakingInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    certificate: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/x-x509-ca-cert": unknown;
                 };
             };
             /** @description Not a request of this interface */

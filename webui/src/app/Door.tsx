@@ -50,6 +50,7 @@ function Entrance({
           {send}
         </Button>
       </form>
+      <Authority />
     </Panel>
   )
 }
@@ -127,6 +128,23 @@ function CodeField({ help, value, onChange }: Field & { help: string }) {
   )
 }
 
+const CERTIFICATE_FILE = 'servodeck.crt'
+
+/** For a browser that came by HTTPS: the station's authority, to be trusted once. */
+function Authority() {
+  const t = useT()
+  if (window.location.protocol !== 'https:') return null
+  return (
+    <details>
+      <summary>{t('door.certificate')}</summary>
+      <p className="dim">{t('door.certificateHelp')}</p>
+      <a href="./api/v1/certificate" download>
+        {CERTIFICATE_FILE}
+      </a>
+    </details>
+  )
+}
+
 export function LogIn() {
   const t = useT()
   const [name, setName] = useState('')
@@ -157,7 +175,12 @@ export function SetUp() {
       text={t('door.setUpText')}
       send={t('door.setUpDo')}
       blocked={differs}
-      enter={() => ask(api.POST('/api/v1/setup', { body: { code, name, password } }))}
+      enter={async () => {
+        const session = await ask(api.POST('/api/v1/setup', { body: { code, name, password } }))
+        // There the station is named, and its ports get their roles.
+        window.location.hash = '#/connect'
+        return session
+      }}
     >
       <CodeField help={t('door.codeText')} value={code} onChange={setCode} />
       <NameField value={name} onChange={setName} />

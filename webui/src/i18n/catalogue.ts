@@ -1,5 +1,6 @@
 import { axis } from './texts/axis'
 import { bench } from './texts/bench'
+import { box } from './texts/box'
 import { drive } from './texts/drive'
 import { frame } from './texts/frame'
 import { functions } from './texts/functions'
@@ -25,6 +26,7 @@ import { unwatched } from './texts/unwatched'
 export const catalogue = {
   ...frame,
   ...bench,
+  ...box,
   ...axis,
   ...drive,
   ...functions,

@@ -22,6 +22,15 @@ describe('a message of the server', () => {
     )
     expect(words('zh', rejected)).toBe('驱动器拒绝写入 6081:00：驱动器不接受该值（中止 06090030h）')
   })
+  it('is found under its present name in a file of an earlier version', () => {
+    const params = { drive: 'x', detail: 'y' }
+    expect(words('en', { code: 'autotune.no-candidate-kept-promise', params })).toBe(
+      'x: no design met its prediction in the verification: y',
+    )
+    expect(words('en', { code: 'autotune.promise-not-kept', params: {} })).toBe(
+      'it did not meet its prediction when it was verified',
+    )
+  })
   it('has a remedy behind its code', () => {
     expect(words('en', { code: 'canopen.not-open/remedy', params: { drive: 'x' } })).toBe(
       'open the bus first',

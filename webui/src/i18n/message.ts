@@ -18,6 +18,12 @@ const PROSE = ''
 const JOINED = '+'
 const CHINESE_JOINTS: Record<string, string> = { '; ': '；', ': ': '：', ', ': '、', ' ': '' }
 
+/** Codes of files that earlier versions wrote; the server has the same list (`message.py`). */
+const RENAMED: Record<string, string> = {
+  'autotune.no-candidate-kept-promise': 'autotune.no-candidate-verified',
+  'autotune.promise-not-kept': 'autotune.prediction-not-confirmed',
+}
+
 /** The server's own files, so that page, server and command line say the same. */
 const FILES: Record<Spoken, () => Promise<{ sources: Record<string, string> }>> = {
   en: () => import('./sources-en'),
@@ -127,7 +133,8 @@ export function words(language: Spoken, message: Message, otherwise?: string): s
 }
 
 function pattern(language: Spoken, message: Message): string | undefined {
-  const [code = '', attribute] = message.code.split('/')
+  const [stored = '', attribute] = message.code.split('/')
+  const code = RENAMED[stored] ?? stored
   const own = bundle(code.split('.')[0] ?? '', language)
   const entry = own?.getMessage(code.replaceAll('.', '_'))
   const found = attribute === undefined ? entry?.value : entry?.attributes[attribute]

@@ -32,7 +32,8 @@ export function ProblemNote({
       </p>
       {problem.limit && (
         <p>
-          {t('problem.limit')} <span className="num">{problem.limit}</span>
+          {t('problem.limit')}{' '}
+          <span className="num">{say.message(problem.limit_message, problem.limit)}</span>
         </p>
       )}
       {(problem.remedy || unreachable || forgotten) && (

@@ -29,3 +29,4 @@ api-drive_read = Read { $member_drive }
 api-drive_small-move = Small move by { $increments } increments: { $drive }
 api-drive_stop-pressed-during = { $drive }: STOP was pressed during “{ $title }”
     .remedy = try again when it is safe
+api-drive_use-page-of-function = use the page of the function that the object belongs to

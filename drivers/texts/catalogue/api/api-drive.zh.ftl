@@ -29,3 +29,4 @@ api-drive_read = 读取 { $member_drive }
 api-drive_small-move = 小幅运动 { $increments } 个增量：{ $drive }
 api-drive_stop-pressed-during = { $drive }：在“{ $title }”期间按下了停止
     .remedy = 请在安全时重试
+api-drive_use-page-of-function = 请使用该对象所属功能的页面

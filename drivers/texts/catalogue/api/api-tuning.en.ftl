@@ -1,13 +1,14 @@
+api-tuning_cannot-be-evaluated = { $value }: { $cause }
 api-tuning_frequency-response = Frequency response
 api-tuning_give-either-gains-level = give either gains or a level
     .remedy = give one of the two
 api-tuning_not-frequency-response = { $value } is not a frequency response
 api-tuning_not-of-mechanics = it is not of the mechanics
+api-tuning_notch-out-of-range = { $drive }: { $cause }
 api-tuning_nothing-designed = { $name }: nothing can be designed on it: { $why }
     .remedy = measure the mechanics, with enough excitation
 api-tuning_now-change-left-changed = { $drive }: { $parameter } is { $value } now, where this change had left { $left }: it was changed again since, so nothing was undone
     .remedy = look at the list of changes; undo it all the same, or write the value that you want
-api-tuning_step-response = Step response
 api-tuning_too-large = { $name } is too large
     .remedy = import one measurement at a time, as this program exported it
 api-tuning_tune = Tune

@@ -1,2 +1,13 @@
 audit_line-no-entry-audit = 第 { $number } 行不是审计记录
     .remedy = 请用 --format jsonl 且不带筛选导出
+audit_another-value-kept = 驱动器保持 { $kept }，而不是 { $wanted }
+audit_events-lost = { $count } 个事件没有空间可记录
+audit_hash-not-of-anchor = 其哈希值与锚点 { $anchor } 不符：历史记录已被改写
+audit_head-gone = 链首缺失
+audit_end-missing = 链原本止于第 { $ended } 条；现存最后一条为第 { $last } 条
+audit_anchor-beyond-end = 锚点指向第 { $anchor } 条；现存最后一条为第 { $last } 条
+audit_entry-missing = 第 { $number } 条缺失
+audit_entry-does-not-follow = 它与前一条不连续
+audit_contents-altered = 其内容与写入时不同
+audit_contents-unreadable = 其内容无法读取
+audit_column-altered = 其列 { $column } 与内容不符

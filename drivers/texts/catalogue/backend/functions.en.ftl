@@ -1,6 +1,8 @@
 functions_0x-written-0x-read = { $drive_name }: { $key } is 0x{ NUM($raw, format: "X") } as written, and 0x{ NUM($kept, format: "X") } as read back
 functions_acts-process-data-exchanged = { $drive }: { $spec_title } acts only while process data are exchanged
     .remedy = start the exchange on the Connect page
+functions_axis-began-to-turn = { $drive }: the axis began to turn with { $parameter } { $name } = { $value }; { $undone }; a quick stop was sent
+    .remedy = use the machine's emergency stop if it still turns; switch the inputs off that jog, home or enable before you try again
 functions_cannot-overruled = { $drive }: { $value } cannot be overruled
     .remedy = choose one of { $limit }
 functions_cannot-read = { $drive }: { $missing } cannot be read
@@ -8,6 +10,7 @@ functions_cannot-read-back = { $drive_name }: { $key } cannot be read back
 functions_changed-parameters-begin-act = { $drive }: { $others } changed parameters would begin to act with this: { $other_others }
     .remedy = run “Write settings” for them first, or put them back
 functions_command-not-setting = { $drive }: { $parameter } { $key } is a command, not a setting
+functions_could-not-be-restored = it could not be restored: { $cause }
 functions_ended = { $drive }: { $spec_title } has ended: { $why }
     .remedy = begin it again
 functions_function-act-once-when = { $drive }: { $name } has a function, which could act at once when it is inverted
@@ -18,6 +21,7 @@ functions_function-lets-forced = { $drive }: { $name } has function { $value }, 
     .remedy = give { $name } the function { $needed } ({ $label }) first
 functions_gear-changes-position-means = { $drive }: the gear changes what a position means, and the axis is enabled
     .remedy = disable the axis first
+functions_is-again = it is { $before } again
 functions_keeps-instead = { $drive }: { $parameter } { $key } keeps { $kept } instead of { $value }
     .remedy = see its range; the gear is as it was before
 functions_needs-write-settings-possible = { $drive }: { $spec_title } needs “write settings”, which is possible only while the motor is not enabled

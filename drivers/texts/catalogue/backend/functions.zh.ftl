@@ -1,6 +1,8 @@
 functions_0x-written-0x-read = { $drive_name }：{ $key } 写入为 0x{ NUM($raw, format: "X") }，读回为 0x{ NUM($kept, format: "X") }
 functions_acts-process-data-exchanged = { $drive }：{ $spec_title } 仅在交换过程数据时有效
     .remedy = 请在“连接”页面启动交换
+functions_axis-began-to-turn = { $drive }：设置 { $parameter } { $name } = { $value } 后轴开始转动；{ $undone }；已发送快速停止
+    .remedy = 如果轴仍在转动，请使用机器的急停；重试前请断开用于点动、回零或使能的输入
 functions_cannot-overruled = { $drive }：{ $value } 不能强制
     .remedy = 请选择 { $limit } 之一
 functions_cannot-read = { $drive }：无法读取 { $missing }
@@ -8,6 +10,7 @@ functions_cannot-read-back = { $drive_name }：无法读回 { $key }
 functions_changed-parameters-begin-act = { $drive }：{ $others } 个已更改的参数会随之生效：{ $other_others }
     .remedy = 请先对其执行“写入设置”，或将其恢复
 functions_command-not-setting = { $drive }：{ $parameter } { $key } 是指令，不是设置
+functions_could-not-be-restored = 无法恢复原值：{ $cause }
 functions_ended = { $drive }：{ $spec_title } 已结束：{ $why }
     .remedy = 请重新开始
 functions_function-act-once-when = { $drive }：{ $name } 已有功能，取反时可能立即动作
@@ -18,6 +21,7 @@ functions_function-lets-forced = { $drive }：{ $name } 的功能为 { $value }�
     .remedy = 请先为 { $name } 分配功能 { $needed }（{ $label }）
 functions_gear-changes-position-means = { $drive }：齿轮比会改变位置的含义，而轴已使能
     .remedy = 请先断开轴的使能
+functions_is-again = 已恢复为 { $before }
 functions_keeps-instead = { $drive }：{ $parameter } { $key } 保持 { $kept }，而不是 { $value }
     .remedy = 请查看其范围；齿轮比保持原样
 functions_needs-write-settings-possible = { $drive }：{ $spec_title } 需要“写入设置”，只能在电机未使能时执行

@@ -1,5 +1,6 @@
 handover_carries-no-value = nothing of { $drive } fits this format: { $key } and others are larger than it carries
     .remedy = choose another format
+handover_choose-esi = choose the maker's ESI file
 handover_damaged = { $name } is damaged: { $shorten }
     .remedy = export the list again
 handover_defines-xml-entities-no = { $name } defines XML entities, which no start-up list needs and an attack does
@@ -25,6 +26,8 @@ handover_no-mailboxes-no-start = { $value }: { $chosen } has no mailboxes, so no
     .remedy = choose the ESI file of this very drive
 handover_no-start-up-list = { $name } is no start-up list that is known here
     .remedy = give TwinCAT, CODESYS or ENI, lcec XML, ROS 2 YAML, an ethercat script, DCF or CSV
+handover_nothing-to-hand-over = nothing of the set can be handed over{ $why }
+    .remedy = choose other rows
 handover_process-data-drives-take = the process data of { $axes } drives take { $total_bytes } bytes, one frame holds { $frame }
     .remedy = export the segment in two parts
 handover_set-drive-not = the set is of a { $profile } drive, not of { $profile_drive }

@@ -1,5 +1,6 @@
 handover_carries-no-value = { $drive } 没有任何值适合此格式：{ $key } 等超出其可表示的范围
     .remedy = 请选择其他格式
+handover_choose-esi = 请选择厂家的 ESI 文件
 handover_damaged = { $name } 已损坏：{ $shorten }
     .remedy = 请重新导出列表
 handover_defines-xml-entities-no = { $name } 定义了 XML 实体，启动列表不需要，只有攻击才会使用
@@ -25,6 +26,8 @@ handover_no-mailboxes-no-start = { $value }：{ $chosen } 没有邮箱，无法�
     .remedy = 选择此驱动器本身的 ESI 文件
 handover_no-start-up-list = { $name } 不是已知的启动列表
     .remedy = 请给出 TwinCAT、CODESYS 或 ENI、lcec XML、ROS 2 YAML、ethercat 脚本、DCF 或 CSV
+handover_nothing-to-hand-over = 参数集中没有可交接的内容{ $why }
+    .remedy = 请选择其他行
 handover_process-data-drives-take = { $axes } 个驱动器的过程数据占 { $total_bytes } 字节，一帧只能容纳 { $frame } 字节
     .remedy = 请分两部分导出该网段
 handover_set-drive-not = 参数集属于 { $profile } 驱动器，而不是 { $profile_drive }

@@ -45,3 +45,4 @@ health_suspected = { $name } has changed by { NUM($change_percent, format: "+.1f
     .remedy = measure again: one check alone is no proof
 health_undecided = { $name }: a change of { NUM($looked_for_percent, format: ".0f") } % is neither shown nor excluded ({ NUM($low_percent, format: "+.1f") } to { NUM($high_percent, format: "+.1f") } %)
     .remedy = measure again; where it stays so, sign a baseline of more rounds
+health_title = Health check

@@ -45,3 +45,4 @@ health_suspected = { $name }在一次检查中相对基线变化 { NUM($change_p
     .remedy = 请再次测量：单次检查不能作为证明
 health_undecided = { $name }：{ NUM($looked_for_percent, format: ".0f") } % 的变化既未证实也未排除（{ NUM($low_percent, format: "+.1f") } 至 { NUM($high_percent, format: "+.1f") } %）
     .remedy = 请再次测量；若仍如此，请签署由更多轮构成的基线
+health_title = 健康检查

@@ -73,3 +73,4 @@ people_token-lives-least-minute = a token lives at least a minute and at most a 
 people_too-many-log-ins = too many log-ins at once
 people_too-many-wrong-tries = too many wrong tries
 people_wait = wait { NUM($wait_s, format: ".0f") } s, then try again
+people_wrong-name-or-password = wrong name or password

@@ -73,3 +73,4 @@ people_token-lives-least-minute = 令牌有效期至少一分钟，至多一年
 people_too-many-log-ins = 同时登录过多
 people_too-many-wrong-tries = 错误尝试过多
 people_wait = 请等待 { NUM($wait_s, format: ".0f") } s 后重试
+people_wrong-name-or-password = 名称或密码错误

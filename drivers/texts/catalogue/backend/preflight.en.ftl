@@ -1,3 +1,4 @@
+preflight_as-administrator = as the administrator of the computer: { $command }
 preflight_cannot-restored = { $setting } cannot be restored to { $value }: { $strerror }
     .remedy = restart the computer, which restores it
 preflight_cannot-set = { $setting } cannot be set to { $value }: { $strerror }

@@ -1,3 +1,4 @@
+preflight_as-administrator = 以计算机管理员身份执行：{ $command }
 preflight_cannot-restored = 无法将 { $setting } 恢复为 { $value }：{ $strerror }
     .remedy = 重新启动计算机即可恢复
 preflight_cannot-set = 无法将 { $setting } 设为 { $value }：{ $strerror }

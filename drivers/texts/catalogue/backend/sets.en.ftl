@@ -1,3 +1,4 @@
+sets_choose-dcf-or-csv = choose a DCF file, or a CSV list
 sets_damaged-no-parameter-set = { $name } is damaged or no parameter set: { $cause }
     .remedy = use an undamaged copy
 sets_drive-vendor = { $name } is for a drive of vendor { NUM($value, format: "08X") }h; a { $profile_title } has { NUM($vendor_id, format: "08X") }h

@@ -1,3 +1,4 @@
+sets_choose-dcf-or-csv = 请选择 DCF 文件或 CSV 列表
 sets_damaged-no-parameter-set = { $name } 已损坏或不是参数集：{ $cause }
     .remedy = 请使用未损坏的副本
 sets_drive-vendor = { $name } 用于厂商 { NUM($value, format: "08X") }h 的驱动器；{ $profile_title } 为 { NUM($vendor_id, format: "08X") }h

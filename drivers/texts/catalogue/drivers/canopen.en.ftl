@@ -7,6 +7,7 @@ canopen_bit-not-canopen-bit = { $value } bit/s is not a CANopen bit rate
     .remedy = choose the bit rate that is set in the drives
 canopen_bus-lost = the CAN bus is lost
     .remedy = wait until the adapter is back
+canopen_check-when-silent = power, cable, both terminating resistors, bit rate and node number
 canopen_cycle-ms-too-short = a cycle of { NUM($cycle_ms, format: "g") } ms is too short for CANopen
     .remedy = use 1 ms or longer
 canopen_cyclic-data-stopped-coming = its cyclic data stopped coming

@@ -7,6 +7,7 @@ canopen_bit-not-canopen-bit = { $value } bit/s 不是 CANopen 比特率
     .remedy = 请选择驱动器中设置的比特率
 canopen_bus-lost = CAN 总线已断开
     .remedy = 请等待适配器恢复
+canopen_check-when-silent = 电源、电缆、两端终端电阻、比特率和节点号
 canopen_cycle-ms-too-short = { NUM($cycle_ms, format: "g") } ms 的周期对 CANopen 太短
     .remedy = 请使用 1 ms 或更长
 canopen_cyclic-data-stopped-coming = 其循环数据中断

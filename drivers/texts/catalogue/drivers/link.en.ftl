@@ -1,5 +1,6 @@
 link_bytes-came-bytes = { $bytes } bytes came for a { $data_type } of { $calcsize_bytes } bytes
     .remedy = the drive's firmware may be of another version: compare with its dictionary
+link_check-when-silent = power, cable and address
 link_drive-cannot-list-objects = a drive on { $kind } cannot list its own objects
     .remedy = import the maker's EDS or ESI file, or use the generic profile
 link_frames-not-being-recorded = the frames of { $interface } are not being recorded
@@ -29,3 +30,4 @@ link_terminal-servodeck-itself-runs = { $value } is the terminal that servodeck 
     .remedy = give the device of the adapter, as /dev/ttyUSB0
 link_wire-running-demo = { $bus } is a wire that only a running demo has
     .remedy = start 'servodeck demo', or give the path of a real or virtual port
+link_write-it-like = write it like { $example }

@@ -1,5 +1,6 @@
 link_bytes-came-bytes = 收到 { $bytes } 字节，{ $data_type } 应为 { $calcsize_bytes } 字节
     .remedy = 驱动器固件可能为其他版本：请与其对象字典比较
+link_check-when-silent = 电源、电缆和地址
 link_drive-cannot-list-objects = { $kind } 上的驱动器不能列出自身的对象
     .remedy = 请导入厂家的 EDS 或 ESI 文件，或使用通用配置文件
 link_frames-not-being-recorded = 未记录 { $interface } 的报文
@@ -29,3 +30,4 @@ link_terminal-servodeck-itself-runs = { $value } 是 servodeck 自身运行的�
     .remedy = 请给出适配器的设备，如 /dev/ttyUSB0
 link_wire-running-demo = { $bus } 是只有运行中的演示才有的线路
     .remedy = 请启动 'servodeck demo'，或给出真实或虚拟端口的路径
+link_write-it-like = 请写成 { $example }

@@ -7,6 +7,7 @@ modbus_cannot-opened = { $device } cannot be opened: { $text }
     .remedy = unplug and replug the adapter
 modbus_cannot-set = { $device } cannot be set to { $value }: { $text }
     .remedy = choose a baud rate and parity that the adapter's chip supports
+modbus_check-when-silent = power, cable, baud rate, parity and address
 modbus_found = { $count } found
 modbus_found-and-damaged = { $count } found; damaged answers at { $places }: two drives with the same address, or wrong line settings
 modbus_line-never-falls-silent = the line { $device } never falls silent

@@ -7,6 +7,7 @@ modbus_cannot-opened = 无法打开 { $device }：{ $text }
     .remedy = 请重新插拔适配器
 modbus_cannot-set = { $device } 不能设置为 { $value }：{ $text }
     .remedy = 请选择适配器芯片支持的波特率和校验
+modbus_check-when-silent = 电源、电缆、波特率、校验位和地址
 modbus_found = 找到 { $count } 个
 modbus_found-and-damaged = 找到 { $count } 个；{ $places } 的应答已损坏：两台驱动器地址相同，或线路设置错误
 modbus_line-never-falls-silent = 线路 { $device } 从不静默

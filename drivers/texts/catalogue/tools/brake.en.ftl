@@ -9,3 +9,4 @@ brake_say-what-hangs = { $drive }: nobody has said whether a load hangs at this 
     .remedy = support a hanging load and state that (load_supported), or state that none pulls at the axis (nothing_hangs)
 brake_torque-not-permitted = { $drive }: a test torque of { NUM($percent, format: ".3g") } % of rated needs { NUM($needed, format: ".3g") } % to be permitted, as the actual torque swings about it
     .remedy = permit more torque where motor and machine take it, or test with less
+brake_title = Brake test

@@ -9,3 +9,4 @@ brake_say-what-hangs = { $drive }：尚未声明此轴上是否悬挂负载；�
     .remedy = 请支撑悬挂负载并声明（load_supported），或声明没有负载拉动该轴（nothing_hangs）
 brake_torque-not-permitted = { $drive }：额定 { NUM($percent, format: ".3g") } % 的测试转矩需要允许 { NUM($needed, format: ".3g") } %，因为实际转矩会围绕其波动
     .remedy = 若电机和机器允许，请允许更大的转矩，或以较小转矩测试
+brake_title = 抱闸测试

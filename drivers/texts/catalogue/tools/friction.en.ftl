@@ -9,3 +9,4 @@ friction_no-speed-held-evenly = no speed was held evenly in both directions, so 
 friction_speeds-friction-map-take = the speeds of a friction map take longer than { NUM($time_s, format: "g") } s
     .remedy = allow more time, or ask for fewer speeds
 friction_speed-both-directions = { NUM($speed_rpm, format: ".3g") } rpm, both directions
+friction_title = Friction map

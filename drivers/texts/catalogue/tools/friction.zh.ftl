@@ -9,3 +9,4 @@ friction_no-speed-held-evenly = 两个方向上都没有保持均匀的速度，
 friction_speeds-friction-map-take = 摩擦图的各个速度所需时间超过 { NUM($time_s, format: "g") } s
     .remedy = 允许更长时间，或要求更少的速度
 friction_speed-both-directions = { NUM($speed_rpm, format: ".3g") } rpm，两个方向
+friction_title = 摩擦图谱

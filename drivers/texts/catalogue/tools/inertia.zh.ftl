@@ -40,3 +40,4 @@ inertia_too-little-acceleration = 相对噪声而言加速度太小：请增大�
 inertia_torque-opposes-acceleration = 转矩与加速度方向相反：转矩或速度的符号错误
 inertia_turns-rpm-rated-torque = { $drive } 本应由速度环保持静止，却以 { NUM($np_rpm, format: ".3g") } rpm、{ NUM($np_percent, format: ".3g") } % 额定转矩转动
     .remedy = 驱动器无法保持该轴：请检查功率级供电、转矩限值、增益和负载
+inertia_title = 惯量与摩擦

@@ -136,7 +136,7 @@ export const functions = {
     '在误差形成之前把指令速度交给速度环。',
   ],
   'blockHelp.speed': [
-    'Higher is stiffer against forces, until the axis hums. A shorter integral time or higher integral frequency removes standing errors sooner.',
+    'Higher is stiffer against forces, until the axis oscillates. A shorter integral time or higher integral frequency removes standing errors sooner.',
     '越大越能抵抗外力，直至出现啸叫。积分时间越短或频率越高，静差消除越快。',
   ],
   'blockHelp.torque_ff': [

@@ -18,6 +18,11 @@ export const people = {
     '目前无人可以登录。请由机器旁的人员创建首个账户。',
   ],
   'door.setUpDo': ['Make the account', '创建账户'],
+  'door.certificate': ['Certificate for this phone or computer', '供此手机或计算机使用的证书'],
+  'door.certificateHelp': [
+    'Install it as a trusted authority, and no browser warns here any more. Compare its SHA-256 fingerprint with the one on the console of the station first. It can vouch for this station and private networks alone.',
+    '将其安装为受信任的证书颁发机构后，浏览器在此不再警告。安装前请将其 SHA-256 指纹与本站控制台上的指纹核对。它只能为本站和专用网络作证明。',
+  ],
   'door.code': ['Code', '代码'],
   'door.codeText': [
     'It stands in the terminal in which servodeck was started.',

@@ -62,7 +62,7 @@ export const tuning = {
     '测量时缓慢往复运动，以克服静摩擦',
   ],
   'sweep.moves': [
-    'The axis is enabled and shaken with about {part} % of rated torque, at most {torque} %. It stays within ±{travel} rev of where it stands and below {speed} rpm, returns to its place, and is disabled. Keep everyone clear of the machine.',
+    'The axis is enabled and excited with about {part} % of rated torque, at most {torque} %. It stays within ±{travel} rev of where it stands and below {speed} rpm, returns to its place, and is disabled. Keep everyone clear of the machine.',
     '轴将使能并以约 {part}%（最大 {torque}%）额定转矩激振，在当前位置 ±{travel} 转内、低于 {speed} rpm 运动，之后返回原位并断使能。请确保无人靠近。',
   ],
   'sweep.movesLoop': [
@@ -153,16 +153,13 @@ export const tuning = {
     'A filter hides a loose or soft part from the drive; it does not mend it. Look at the machine first: fix the coupling, tension the belt, then measure again.',
     '滤波器只是让驱动器看不到松动或柔软的部件，并不能修好它。请先检查机械：紧固联轴器、张紧皮带，再测量。',
   ],
-  'shape.load.stiff': [
-    'A stiff load: nothing swings below 300 Hz.',
-    '刚性负载：300 Hz 以下无振动。',
-  ],
+  'shape.load.stiff': ['A stiff load: no resonance below 300 Hz.', '刚性负载：300 Hz 以下无振动。'],
   'shape.load.medium': [
-    'A load of medium stiffness: it swings between 80 and 300 Hz.',
+    'A load of medium stiffness: it resonates between 80 and 300 Hz.',
     '中等刚性负载：在 80 至 300 Hz 之间振动。',
   ],
   'shape.load.compliant': [
-    'A compliant load: it swings below 80 Hz.',
+    'A compliant load: it resonates below 80 Hz.',
     '柔性负载：在 80 Hz 以下振动。',
   ],
   'shape.ratio': [
@@ -186,7 +183,7 @@ export const tuning = {
     '宽而低的峰：由橡胶联轴器、磨损轴承或润滑脂阻尼造成。此处陷波必须很宽，相位损失大。',
   ],
   'shape.hint.low': [
-    'The load swings slowly. A notch cannot make such an axis fast: tension the belt, shorten or thicken what is between motor and load.',
+    'The load oscillates slowly. A notch cannot make such an axis fast: tension the belt, shorten or thicken what is between motor and load.',
     '负载振动缓慢。陷波无法使其变快：请张紧皮带，缩短或加粗电机与负载之间的传动件。',
   ],
   'shape.hint.many': [
@@ -214,7 +211,7 @@ export const tuning = {
   ],
   'shape.several': ['Several peaks', '多个峰'],
   'shape.several.text': [
-    'Several soft parts in a row, or a frame that swings too. Fix the motor and the machine to the floor, and mend the lowest peak first.',
+    'Several soft parts in a row, or a frame that resonates too. Fix the motor and the machine to the floor, and mend the lowest peak first.',
     '多个柔性部件串联，或机架也在振动。请固定电机和机器，先处理最低的峰。',
   ],
   'shape.backlash': ['A ragged line with poor coherence', '粗糙曲线且相干性差'],
@@ -347,6 +344,26 @@ export const tuning = {
     'Look at the machine: can the axis travel this far in both directions, and is nobody within reach?',
     '请查看机器：轴能否在两个方向上运动这么远？是否无人在可及范围内？',
   ],
+  'fold.first': ['First power', '首次通电'],
+  'fold.firstHelp': ['Once, before the first closed loop.', '首次闭环之前做一次。'],
+  'fold.automaticHelp': ['Steps 2 to 6 in one job.', '一次完成步骤 2 至 6。'],
+  'fold.manual': ['Step by step', '逐步整定'],
+  'fold.manualHelp': ['Steps 2 to 6 by hand.', '手动完成步骤 2 至 6。'],
+  'fold.more': ['Friction, brake, health', '摩擦、抱闸、健康检查'],
+  'fold.moreHelp': ['Not a part of tuning.', '不属于整定步骤。'],
+  'fold.response': [
+    'The mechanics are measured from torque to speed.',
+    '测量从转矩到速度的机械频率响应。',
+  ],
+  'fold.notches': [
+    'Compute designs from the measured response here, or place notches by hand.',
+    '在此根据测得的响应计算设计，或手动设置陷波。',
+  ],
+  'fold.verify': [
+    'Measure the speed loop and compare it with the measurement from before. A step shows the same in time.',
+    '测量速度环，并与之前的测量对比。阶跃从时间上显示同样的结果。',
+  ],
+  'fold.toResponse': ['Open the page Response', '打开“频率响应”页面'],
   'path.title': ['Steps of commissioning', '调试步骤'],
   'path.checks': ['Pre-checks', '预检查'],
   'path.inertia': ['Inertia and friction', '惯量与摩擦'],

@@ -2,7 +2,7 @@ import { Button, NativeSelect, TextInput } from '@mantine/core'
 import { useState } from 'react'
 import { API_ROOT } from '../../api/client'
 import type { AuditNames } from '../../api/schema'
-import { known, useT } from '../../i18n'
+import { known, useSay, useT } from '../../i18n'
 import { Icon } from '../../widgets/Icon'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
@@ -15,6 +15,7 @@ import { useAudit } from './useAudit'
 /** Who did what, when, to which axis. */
 export function AuditPage() {
   const t = useT()
+  const say = useSay()
   const [filters, setFilters] = useState<AuditFilters>(ALL)
   const { events, names, status, problem, refresh, older } = useAudit(filters)
   return (
@@ -23,7 +24,7 @@ export function AuditPage() {
       {status?.problem && (
         <div className="note fault" role="alert">
           <p>{t('audit.problem', { count: status.pending })}</p>
-          <p>{status.problem}</p>
+          <p>{say.message(status.problem_message, status.problem)}</p>
         </div>
       )}
       <Panel

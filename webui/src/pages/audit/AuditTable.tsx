@@ -1,10 +1,12 @@
 import type { AuditEvent } from '../../api/schema'
-import { known, useT } from '../../i18n'
+import { known, useSay, useT } from '../../i18n'
+import type { Say } from '../../i18n'
 import { dateTime } from '../../widgets/format'
 
 /** Entries as rows; on a narrow screen each becomes a card. */
 export function AuditTable({ events }: { events: AuditEvent[] }) {
   const t = useT()
+  const say = useSay()
   if (events.length === 0) return <p className="empty">{t('audit.none')}</p>
   return (
     <table className="audit-table">
@@ -28,11 +30,11 @@ export function AuditTable({ events }: { events: AuditEvent[] }) {
             <td>{event.axis}</td>
             <td>
               <strong>{known(t, 'audit.kind', event.kind)}</strong>{' '}
-              {known(t, 'audit.action', event.action)} {whatOf(event)}
+              {known(t, 'audit.action', event.action)} {whatOf(event, say)}
             </td>
             <td className="num">{changeOf(event)}</td>
             <td className={event.outcome ? 'warn-text' : 'dim'}>
-              {event.outcome || t('audit.ok')}
+              {say.message(event.outcome_message, event.outcome) || t('audit.ok')}
             </td>
           </tr>
         ))}
@@ -42,9 +44,9 @@ export function AuditTable({ events }: { events: AuditEvent[] }) {
 }
 
 /** What it was done to: a parameter with its name, a job's title, a file. */
-export function whatOf(event: AuditEvent): string {
-  const { title, parameter, version } = event.detail
-  if (typeof title === 'string') return title
+export function whatOf(event: AuditEvent, say: Say): string {
+  const { parameter, version } = event.detail
+  if (event.title_message) return say.message(event.title_message)
   if (typeof parameter === 'string') return `${event.target} ${parameter}`
   return typeof version === 'number' ? `${event.target} · ${version}` : event.target
 }

@@ -2,7 +2,7 @@ import { Button, TextInput } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { AuditVerdict } from '../../api/schema'
-import { useT } from '../../i18n'
+import { useSay, useT } from '../../i18n'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
@@ -12,6 +12,7 @@ const ANCHOR = /^(\d{1,18}:[0-9a-f]{64})?$/
 /** Checks that nothing was changed, and that an entry noted earlier is still in the chain. */
 export function ChainCheck() {
   const t = useT()
+  const say = useSay()
   const act = useAction()
   const [anchor, setAnchor] = useState('')
   const [verdict, setVerdict] = useState<AuditVerdict | null>(null)
@@ -46,7 +47,8 @@ export function ChainCheck() {
       {verdict && !verdict.ok && (
         <div className="note fault" role="alert">
           <p>
-            <strong>{t('audit.broken', { number: verdict.broken ?? 0 })}</strong> {verdict.why}
+            <strong>{t('audit.broken', { number: verdict.broken ?? 0 })}</strong>{' '}
+            {say.message(verdict.why_message, verdict.why)}
           </p>
         </div>
       )}

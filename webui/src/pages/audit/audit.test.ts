@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest'
 import type { AuditEvent } from '../../api/schema'
+import { sayIn } from '../../i18n'
 import { changeOf, whatOf } from './AuditTable'
 import { ALL, auditQuery } from './filters'
 
@@ -15,10 +16,14 @@ const event = (part: Partial<AuditEvent>): AuditEvent => ({
   old: null,
   new: null,
   outcome: '',
+  outcome_message: null,
+  title_message: null,
   detail: {},
   hash: '',
   ...part,
 })
+
+const say = sayIn('zh')
 
 describe('an entry', () => {
   it('says what changed, and what was wanted where that differs', () => {
@@ -29,9 +34,17 @@ describe('an entry', () => {
   })
 
   it('names the thing as people know it', () => {
-    expect(whatOf(event({ detail: { parameter: 'Gain' } }))).toBe('2005:03 Gain')
-    expect(whatOf(event({ target: 'move-1', detail: { title: 'Move X' } }))).toBe('Move X')
-    expect(whatOf(event({ target: 'a.sdset', detail: { version: 3 } }))).toBe('a.sdset · 3')
+    expect(whatOf(event({ detail: { parameter: 'Gain' } }), say)).toBe('2005:03 Gain')
+    expect(
+      whatOf(
+        event({
+          target: 'move-1',
+          title_message: { code: 'work.of-drive', params: { title: '移动', drive: 'X' } },
+        }),
+        say,
+      ),
+    ).toContain('X')
+    expect(whatOf(event({ target: 'a.sdset', detail: { version: 3 } }), say)).toBe('a.sdset · 3')
   })
 })
 

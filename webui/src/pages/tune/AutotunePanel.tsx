@@ -84,22 +84,24 @@ export function AutotunePanel({
         data={MARKS.map((each) => ({ value: each, label: t(`mark.${each}`) }))}
       />
       <p className="dim">{t(`mark.help.${mark}`)}</p>
-      <NativeSelect
-        label={t('candidate.load')}
-        value={load}
-        onChange={(event) => setLoad(event.currentTarget.value as typeof load)}
-        data={LOADS.map((each) => ({ value: each, label: t(`load.${each}`) }))}
-      />
-      <SchemeFields of={scheme} state={state} />
-      <NumberField
-        label={t('inertia.motor')}
-        unit="kg·m²"
-        value={motor}
-        onChange={setMotor}
-        above={0}
-        optional
-        help={t('autotune.motorHelp')}
-      />
+      <div className="fields wide">
+        <NativeSelect
+          label={t('candidate.load')}
+          value={load}
+          onChange={(event) => setLoad(event.currentTarget.value as typeof load)}
+          data={LOADS.map((each) => ({ value: each, label: t(`load.${each}`) }))}
+        />
+        <SchemeFields of={scheme} state={state} />
+        <NumberField
+          label={t('inertia.motor')}
+          unit="kg·m²"
+          value={motor}
+          onChange={setMotor}
+          above={0}
+          optional
+          help={t('autotune.motorHelp')}
+        />
+      </div>
       <Checkbox
         label={t('autotune.apply')}
         checked={apply}

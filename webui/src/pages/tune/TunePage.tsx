@@ -1,5 +1,6 @@
 import { href } from '../../app/router'
 import { useSay, useT } from '../../i18n'
+import type { DriveSummary, JobInfo } from '../../api/schema'
 import { useAxisState, useDrive, useLink } from '../../live/store'
 import { useJobEnd } from '../../widgets/JobNote'
 import { Panel } from '../../widgets/Panel'
@@ -14,24 +15,33 @@ import { useMeasurements } from '../response/useMeasurements'
 import { useToolJob } from '../response/useToolJob'
 import { AutotunePanel } from './AutotunePanel'
 import { CandidatesPanel } from './CandidatesPanel'
+import { Fold } from './Fold'
 import { BrakePanel } from './BrakePanel'
 import { FirstPowerPanel } from './FirstPowerPanel'
 import { FrictionPanel } from './FrictionPanel'
 import { GainsPanel } from './GainsPanel'
 import { HealthPanel } from './HealthPanel'
 import { InertiaPanel } from './InertiaPanel'
-import { type Known, later, tunedAt } from './path'
+import { type Known, later, nextStep, type StepName, STEPS, stepsDone, tunedAt } from './path'
 import { PathNav } from './PathNav'
 import { PreChecks } from './PreChecks'
 import { ReportPanel, useReports } from './ReportPanel'
+import { present, type Section, useSections } from './sections'
 import { StepPanel } from './StepPanel'
 import { preChecks, ready } from './steps'
 
 /** The guided path; every step can also be done alone. */
 export function TunePage({ drive }: { drive: string }) {
+  const summary = useDrive(drive)
+  // Another axis has another present step.
+  return summary && <TunePath key={drive} drive={drive} summary={summary} />
+}
+
+const running = (job: JobInfo | null) => job?.state === 'running'
+
+function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) {
   const t = useT()
   const say = useSay()
-  const summary = useDrive(drive)
   const state = useAxisState(drive)
   const { buses, refresh } = useBuses()
   const { possible, cycleMs } = useMeasurable(summary, state)
@@ -47,6 +57,7 @@ export function TunePage({ drive }: { drive: string }) {
   const frictionJob = useToolJob(drive, 'friction').job
   const brakeJob = useToolJob(drive, 'brake-test').job
   const firstJob = useToolJob(drive, 'first-power').job
+  const healthJob = useToolJob(drive, 'health').job
   useJobEnd(inertiaJob?.id ?? null, () => void measured.refresh())
   useJobEnd(frictionJob?.id ?? null, () => void measured.refresh())
   useJobEnd(brakeJob?.id ?? null, () => void measured.refresh())
@@ -57,7 +68,6 @@ export function TunePage({ drive }: { drive: string }) {
     void gains.read()
   })
   const tuned = asAutotune(tuneJob?.result)
-  if (!summary) return null
   const bus =
     buses.find(
       (each) => each.cyclic_possible && summary.ports.some((port) => port.url === each.url),
@@ -86,12 +96,43 @@ export function TunePage({ drive }: { drive: string }) {
     (each) => each.kind === 'sweep-mechanics' && each.profile === summary.profile,
   )
   const path: Known = {
-    ready: able,
+    ready: able && limits.agreed,
     inertia: si !== null,
     changed: later(changes.at(-1)?.time ?? null, tuned && tuneJob ? tunedAt(tuned, tuneJob) : null),
     measured: ours,
     reported: reports.list[0]?.made ?? null,
   }
+  const done = stepsDone(path)
+  const next = nextStep(done)
+  const busy: [JobInfo | null, Section][] = [
+    [tuneJob, 'automatic'],
+    [inertiaJob, 'inertia'],
+    [stepJob, 'verify'],
+    [firstJob, 'first'],
+    [frictionJob, 'more'],
+    [brakeJob, 'more'],
+    [healthJob, 'more'],
+  ]
+  const now: Section[] = possible
+    ? present(done, {
+        automatic: designable,
+        tuned: tuned?.applied != null,
+        running: busy.find(([job]) => running(job))?.[1] ?? null,
+      })
+    : ['checks', 'manual', 'gains']
+  const of = useSections(now)
+  // Before all of this is known, the present step is not, and nothing may open under a finger.
+  const known =
+    measured.asked && reports.asked && state !== null && (gains.gains ?? gains.problem) !== null
+  const consented = limits.agreed ? limits.limits : null
+  const step = (name: StepName) => ({
+    of,
+    name,
+    number: STEPS.indexOf(name) + 1,
+    title: t(`path.${name}`),
+    state: done[name] ? ('done' as const) : name === next ? ('next' as const) : ('open' as const),
+  })
+  const measure = { drive, limits: consented, obstacle, cycleMs }
   return (
     <div className="page">
       <h1>
@@ -100,104 +141,104 @@ export function TunePage({ drive }: { drive: string }) {
       {possible && (
         // It has its place before it is known how far one has come, which moves what is below it.
         <div className={measured.asked && reports.asked ? 'arrived' : 'arriving'}>
-          <PathNav drive={drive} known={path} />
+          <PathNav drive={drive} known={path} onOpen={(name) => of.set(name, true)} />
         </div>
       )}
       {state && !possible && <p className="note info">{t('tune.needsCyclic')}</p>}
-      <div className="columns">
-        <div className="stack">
-          <div id="step-checks">
-            <PreChecks
-              drive={summary}
-              checks={checks}
-              bus={bus}
-              limits={limits}
-              cycleMs={cycleMs}
-              onChange={refresh}
-            />
-          </div>
-          {possible && <FirstPowerPanel drive={drive} obstacle={obstacle} cycleMs={cycleMs} />}
-          {possible && designable && (
+      <div
+        className={`stack tune-path ${known || !open ? '' : 'arriving-path'}`}
+        onPointerDownCapture={of.keep}
+        onKeyDownCapture={of.keep}
+      >
+        <Fold {...step('checks')}>
+          <PreChecks
+            drive={summary}
+            checks={checks}
+            bus={bus}
+            limits={limits}
+            cycleMs={cycleMs}
+            onChange={refresh}
+          />
+        </Fold>
+        {possible && (
+          <Fold of={of} name="first" title={t('fold.first')} help={t('fold.firstHelp')}>
+            <FirstPowerPanel drive={drive} obstacle={obstacle} cycleMs={cycleMs} />
+          </Fold>
+        )}
+        {possible && designable && (
+          <Fold
+            of={of}
+            name="automatic"
+            title={t('autotune.title')}
+            help={t('fold.automaticHelp')}
+            {...(now.includes('automatic') ? { state: 'next' as const } : {})}
+            {...(tuned && done.verify ? { state: 'done' as const } : {})}
+          >
             <AutotunePanel
-              drive={drive}
+              {...measure}
               state={state}
-              limits={limits.agreed ? limits.limits : null}
-              obstacle={obstacle}
-              cycleMs={cycleMs}
               now={gains.gains?.raw ?? null}
               onChanged={() => void gains.read()}
             />
-          )}
+          </Fold>
+        )}
+        {gains.gains && !designable && (
+          <Panel title={t('autotune.title')}>
+            <p className="note info">
+              {t('autotune.noMeaning')} <a href={href('gains', drive)}>{t('gains.toPage')}</a>
+            </p>
+          </Panel>
+        )}
+        <Fold of={of} name="manual" title={t('fold.manual')} help={t('fold.manualHelp')}>
           {possible && (
-            <div id="step-inertia">
-              <InertiaPanel
-                drive={drive}
-                state={state}
-                limits={limits.agreed ? limits.limits : null}
-                obstacle={obstacle}
-                cycleMs={cycleMs}
-              />
-            </div>
+            <>
+              <Fold {...step('inertia')}>
+                <InertiaPanel {...measure} state={state} />
+              </Fold>
+              <Fold {...step('response')}>
+                <p>
+                  {t('fold.response')} <a href={href('response', drive)}>{t('fold.toResponse')}</a>
+                </p>
+              </Fold>
+              <Fold {...step('notches')}>
+                <p>
+                  {t('fold.notches')} <a href={href('response', drive)}>{t('fold.toResponse')}</a>
+                </p>
+                {designable && gains.gains && (
+                  <CandidatesPanel
+                    drive={drive}
+                    list={mechanics}
+                    gains={gains.gains}
+                    inertia={si}
+                    onApplied={gains.read}
+                  />
+                )}
+              </Fold>
+            </>
           )}
-          <div id="step-gains">
+          <Fold {...step('gains')}>
             <GainsPanel drive={drive} of={gains} inertia={si} />
-          </div>
-        </div>
-        <div className="stack">
-          {gains.gains && !designable && (
-            <Panel title={t('autotune.title')}>
-              <p className="note info">
-                {t('autotune.noMeaning')} <a href={href('gains', drive)}>{t('gains.toPage')}</a>
+          </Fold>
+          {possible && (
+            <Fold {...step('verify')}>
+              <p>
+                {t('fold.verify')} <a href={href('response', drive)}>{t('fold.toResponse')}</a>
               </p>
-            </Panel>
+              <StepPanel {...measure} stored={ours.filter((each) => each.kind === 'step')} />
+            </Fold>
           )}
-          {possible && (
-            <StepPanel
-              drive={drive}
-              limits={limits.agreed ? limits.limits : null}
-              obstacle={obstacle}
-              cycleMs={cycleMs}
-              stored={ours.filter((each) => each.kind === 'step')}
-            />
-          )}
-          {possible && (
-            <FrictionPanel
-              drive={drive}
-              limits={limits.agreed ? limits.limits : null}
-              obstacle={obstacle}
-              cycleMs={cycleMs}
-            />
-          )}
-          {possible && (
-            <BrakePanel
-              drive={drive}
-              limits={limits.agreed ? limits.limits : null}
-              obstacle={obstacle}
-              cycleMs={cycleMs}
-            />
-          )}
-          {possible && (
-            <HealthPanel
-              drive={drive}
-              limits={limits.agreed ? limits.limits : null}
-              obstacle={obstacle}
-              cycleMs={cycleMs}
-            />
-          )}
-          <div id="step-report">
-            <ReportPanel drive={drive} of={reports} />
-          </div>
-        </div>
+        </Fold>
+        <Fold {...step('report')}>
+          <ReportPanel drive={drive} of={reports} />
+        </Fold>
+        {possible && (
+          <Fold of={of} name="more" title={t('fold.more')} help={t('fold.moreHelp')}>
+            <FrictionPanel {...measure} />
+            <BrakePanel {...measure} />
+            <HealthPanel {...measure} />
+          </Fold>
+        )}
       </div>
-      {designable && gains.gains && (
-        <CandidatesPanel
-          drive={drive}
-          list={mechanics}
-          gains={gains.gains}
-          inertia={si}
-          onApplied={gains.read}
-        />
-      )}
     </div>
   )
 }

@@ -1,0 +1,75 @@
+"""How far a loop's gain is raised to show what no measured line does, and what stays open."""
+
+from __future__ import annotations
+
+from backend.analysis.loop.design import Candidate
+from backend.analysis.loop.loop_goals import Goals
+from backend.analysis.loop.loop_verdict import WORST_DB, LoopVerdict, Missed, excluding_db
+from backend.analysis.loop.measured_plant import MeasuredPlant
+from backend.axis.axis import Axis
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.autotune.gain_steps import GainSteps
+from backend.tools.autotune.verdict import MARGIN_DB, in_words, loops_of, misses
+from drivers.texts.message import Text, text
+
+#: So much of a promised gain margin is shown by raising the gain, where the last crossover is above
+#: what was measured: all but this, and no more than that.
+_NOT_SHOWN_DB, _MOST_SHOWN_DB = 1.5, 7.0
+#: A gain is raised by this beyond what excludes a loop, as a parameter has steps; and where that is
+#: more than what must be shown and this, it stays so far below the predicted margin.
+_SURELY_DB, _AT_ONCE_DB, _KEPT_BACK_DB = 0.2, 0.5, 2.5
+
+
+def by_raised_gain(missed: Missed) -> bool:
+    """Whether a raised gain can still show it: what is possible above the measured band."""
+    return missed.what == "coverage" or missed.end == "predicted"
+
+
+def wanted_db(missed: tuple[Missed, ...], promised: Goals) -> float:
+    """How much more gain must be shown; where uncertain, the required margin less its tolerance."""
+    if any(each.what != "coverage" for each in missed):
+        return promised.gain_margin_db - WORST_DB
+    return min(promised.gain_margin_db - _NOT_SHOWN_DB, _MOST_SHOWN_DB)
+
+
+def raised_to(
+    axis: Axis, facts: AxisFacts, plant: MeasuredPlant | None, candidate: Candidate,
+    verdict: LoopVerdict | None, promised: Goals, missed: tuple[Missed, ...],
+) -> float:  # fmt: skip
+    """By how many dB the gain is raised: what must be shown, or more, where that shows the goals.
+
+    A slow loop of which too few lines stand out may be late by a whole loop period; with so much
+    more gain it would oscillate if it were. What is tried beyond `wanted_db` leaves
+    `_KEPT_BACK_DB` of the predicted gain margin.
+
+    Raises:
+        NotAllowed, ValueError: a part of the loop has no known meaning.
+    """
+    least = wanted_db(missed, promised)
+    predicted = verdict.predicted if verdict is not None else None
+    if verdict is None or plant is None or predicted is None or predicted.gain_margin_db is None:
+        return least
+    f = plant.frequency_hz
+    every = loops_of(axis, facts, candidate, f, plant.shifted())
+    excludes = excluding_db(verdict, f, every, promised) + _SURELY_DB
+    most = max(predicted.gain_margin_db.value - _KEPT_BACK_DB, least + _AT_ONCE_DB)
+    return excludes if least < excludes <= most else least
+
+
+def not_shown(
+    verdict: LoopVerdict | None, promised: Goals, shown: GainSteps, missed: tuple[Missed, ...]
+) -> list[Text]:
+    """What raising the gain leaves open above the measured band; empty where nothing."""
+    if verdict is None:
+        return []
+    said = in_words(misses(verdict, promised))
+    wanted = wanted_db(missed, promised)
+    if shown.shown_db < wanted - MARGIN_DB:
+        top = 0.0 if verdict.measured is None else verdict.measured.high_hz
+        said.append(
+            text(
+                "autotune.crossover-not-shown", crossover_hz=verdict.last_crossover_hz,
+                measured_hz=top, shown_db=shown.shown_db, wanted_db=wanted,
+            )
+        )  # fmt: skip
+    return said

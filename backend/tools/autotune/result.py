@@ -1,0 +1,191 @@
+"""What an automatic tuning measured and decided, as page, report and files have it."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from backend.tools.inertia.result import InertiaAnswer
+from backend.tools.step.result import StepAnswer
+from backend.tools.sweep.result import SweepAnswer
+from backend.tools.tool import ToolResult
+from backend.tools.wire_message import MessageInfo
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class NotchInfo(_Part):
+    """Centre, width and depth, which is negative."""
+
+    center_hz: float
+    width_hz: float
+    depth_db: float
+
+
+class GainsInfo(_Part):
+    """Gains of both loops; ``speed_bandwidth_hz`` is speed_nms/(2π·J)."""
+
+    speed_nms: float
+    integral_hz: float
+    position_1_s: float
+    speed_bandwidth_hz: float
+
+
+class MarginsInfo(_Part):
+    """Margins of an open loop; None where there is no such crossing."""
+
+    crossover_hz: float | None
+    phase_margin_deg: float | None
+    phase_margin_hz: float | None
+    gain_margin_db: float | None
+    gain_margin_hz: float | None
+    ms: float | None
+    ms_hz: float | None
+    stable: bool
+
+
+class GoalsInfo(_Part):
+    """The worst margins that were promised or found; None where they are not finite."""
+
+    gain_margin_db: float | None
+    phase_margin_deg: float | None
+    ms: float | None
+
+
+class FiltersInfo(_Part):
+    """Corners of filters that the drive can be given; None: not there, or unknown."""
+
+    speed_hz: float | None
+    torque_hz: float | None
+
+
+class CandidateInfo(_Part):
+    """A design: what it sets, and what is predicted of it."""
+
+    notches: tuple[NotchInfo, ...]
+    gains: GainsInfo
+    bandwidth_hz: float | None
+    position_bandwidth_hz: float | None
+    nominal: MarginsInfo
+    promised: GoalsInfo
+    phase_cost_deg: float
+    overshoot_percent: float | None
+    settling_s: float | None
+    marks: tuple[Literal["robust", "balanced", "fast"], ...]
+    filters: FiltersInfo
+
+
+class IntervalInfo(_Part):
+    """A value and the limits that hold the truth in 95 of 100 cases; None: without a limit."""
+
+    value: float | None
+    low: float | None
+    high: float | None
+
+
+class BandInfo(_Part):
+    """Margins over one band; None where nothing crosses there."""
+
+    low_hz: float
+    high_hz: float | None
+    phase_margin_deg: IntervalInfo | None
+    gain_margin_db: IntervalInfo | None
+    peak_sensitivity: IntervalInfo | None
+
+
+class VerdictInfo(_Part):
+    """What is known of the tuned loop: measured over a band, predicted beyond it."""
+
+    measured: BandInfo | None
+    predicted: BandInfo | None
+    last_crossover_hz: float | None
+    coverage: Literal["measured", "gain_steps", "predicted"]
+    shown_gain_db: float | None
+    stated: GoalsInfo
+    worst: GoalsInfo
+    stable: bool
+    delay_s: IntervalInfo
+    gain_db: IntervalInfo
+    contradicted: bool
+    designed: BandInfo | None
+
+
+class GainStepInfo(_Part):
+    """One raised gain and the oscillation of the torque in % of the rated (RMS)."""
+
+    gain_db: float
+    oscillation_percent: float
+    stable: bool
+
+
+class GainStepsInfo(_Part):
+    """The highest gain at which the loop was stable, and the next where it was not."""
+
+    shown_db: float
+    onset_db: float | None
+    steps: tuple[GainStepInfo, ...]
+
+
+class FiguresInfo(_Part):
+    """Of one loop, read on the lines that were verified; None beyond them."""
+
+    bandwidth_hz: float | None
+    phase_margin_deg: float | None
+    gain_margin_db: float | None
+
+
+class VerifiedInfo(_Part):
+    """The tuned loop as it was measured."""
+
+    verdict: VerdictInfo | None
+    gain_steps: GainStepsInfo | None
+    sweep: SweepAnswer
+    predicted_bandwidth_hz: float | None
+    measured_bandwidth_hz: float | None
+    expected: FiguresInfo | None
+
+
+class AgainInfo(_Part):
+    """A loop that answered otherwise than predicted, and what was made of it."""
+
+    predicted: FiguresInfo
+    measured: FiguresInfo
+    outcome: str
+    gain_ratio: float | None
+    frequency_hz: tuple[float, ...] | None
+    closed_db: tuple[float, ...] | None
+    closed_deg: tuple[float, ...] | None
+
+
+class AutotuneAnswer(ToolResult):
+    """All that was measured and decided; ``before`` holds raw values that undo what was applied."""
+
+    tool: Literal["autotune"] = "autotune"
+    inertia: InertiaAnswer
+    mechanics: SweepAnswer
+    load: Literal["stiff", "medium", "compliant"]
+    candidates: tuple[CandidateInfo, ...]
+    applied: CandidateInfo | None
+    verified: VerifiedInfo | None
+    again: AgainInfo | None
+    step: StepAnswer | None
+    before: dict[str, int]
+    after: dict[str, int] = Field(default_factory=dict, description="raw values afterwards")
+    tried: tuple[str, ...] = Field(description="in English")
+    tried_messages: tuple[MessageInfo, ...]
+    notes: tuple[str, ...] = Field(description="in English")
+    note_messages: tuple[MessageInfo, ...]
+    cautious: bool
+
+
+def finite(value: object) -> object:
+    """The same value with None for every number in it that JSON does not know."""
+    if isinstance(value, dict):
+        return {name: finite(each) for name, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,163 @@
+"""From the recording of a step or a move to its numbers, and to the files that keep it. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from backend.analysis.signals.step import MoveMetrics, StepMetrics, move_metrics, step_metrics
+from backend.axis.axis import Envelope
+from backend.tools.autotune.axis_facts import AxisFacts
+from backend.tools.measuring.figures import figures_of
+from backend.tools.measuring.recording import Recording
+from backend.tools.step.result import MoveNumbers, StepAnswer, StepNumbers
+from backend.tools.tool import Arrays, Meta
+
+_TURN = 2 * np.pi
+#: A settling window is so many times the noise at least: what leaves a narrower one is noise.
+_NOISES = 10.0
+#: Rest before the step.
+LEAD_S = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class StepSettings:
+    """``size`` in rpm (speed) or rev (move). A move runs at ``speed_rpm`` and ``acceleration``."""
+
+    envelope: Envelope
+    kind: Literal["speed", "move"] = "speed"
+    size: float = 100.0
+    hold_s: float = 0.25
+    speed_rpm: float = 300.0
+    acceleration_rpm_s: float = 6000.0
+    window: float | None = None
+    """Settling window in rpm or rev; 2 % of the size where None."""
+    rated_torque_nm: float | None = None
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """Curves [n] in rpm or rev and % of rated torque, and the numbers read from them."""
+
+    kind: Literal["speed", "move"]
+    time_s: npt.NDArray[np.float64]
+    demand: npt.NDArray[np.float64]
+    actual: npt.NDArray[np.float64]
+    torque_percent: npt.NDArray[np.float64]
+    step: StepMetrics | None
+    move: MoveMetrics | None
+    torque_peak_percent: float
+    torque_rms_percent: float
+    noise: float = 0.0
+    """Standard deviation about the trend of a speed that is held, in rpm, or of the position at the
+    end of a move, in rev."""
+    window: float | None = None
+    """The settling window, in rpm or rev."""
+    widened: bool = False
+    """Whether noise is more than a tenth of the usual window, so that a wider one was taken."""
+
+
+def evaluate(
+    recording: Recording,
+    demand: npt.NDArray[np.float64],
+    settings: StepSettings,
+    rated_torque_nm: float,
+) -> StepResult:
+    """Numbers from a recording."""
+    rate = recording.sample_rate_hz
+    time = np.arange(demand.size) / rate
+    torque = recording.torque_nm / rated_torque_nm * 100.0
+    begin = round(LEAD_S * rate)
+    step = move = None
+    noise, widened, window = 0.0, False, settings.window
+    if settings.kind == "speed":
+        actual = recording.velocity_rad_s * 60.0 / _TURN
+        end = begin + round(settings.hold_s * rate)
+        noise = _noise(actual[begin + (end - begin) // 2 : end])
+        if window is None:
+            usual = 0.02 * abs(settings.size)
+            window, widened = max(usual, _NOISES * noise), _NOISES * noise > usual
+        step = step_metrics(
+            time[begin:end], actual[begin:end], target=settings.size, initial=0.0, window=window
+        )  # fmt: skip
+    else:
+        actual = (recording.position_rad - recording.position_rad[0]) / _TURN
+        noise = _noise(actual[-round(0.5 * settings.hold_s * rate) :])
+        if window is None:
+            usual = 0.02 * abs(settings.size)
+            window, widened = max(usual, _NOISES * noise), _NOISES * noise > usual
+        move = move_metrics(time, demand, actual, window=window, torque=torque)
+    return StepResult(
+        settings.kind, time, demand, actual, torque, step, move,
+        float(np.max(np.abs(torque))), float(np.sqrt(np.mean(torque**2))),
+        noise, window, widened,
+    )  # fmt: skip
+
+
+def _noise(part: npt.NDArray[np.float64]) -> float:
+    """Standard deviation about a parabola, in the unit of the signal; 0 for too few samples."""
+    if part.size < 8:
+        return 0.0
+    x = np.linspace(-1.0, 1.0, part.size)
+    return float(np.std(part - np.polynomial.Legendre.fit(x, part, 2)(x)))
+
+
+def significant_size(result: StepResult) -> float:
+    """The size in rpm whose usual settling window is ten times the noise that this step shows."""
+    return _NOISES * result.noise / 0.02
+
+
+def raw_of(
+    recording: Recording, demand: npt.NDArray[np.float64], settings: StepSettings, facts: AxisFacts
+) -> tuple[dict[str, npt.NDArray[np.generic]], dict[str, object]]:
+    """Arrays and facts from which `reevaluate` makes the same answer again."""
+    return {**recording.arrays(), "demand": demand}, {
+        "tool": "step",
+        "sample_rate_hz": recording.sample_rate_hz,
+        "facts": asdict(facts),
+        "settings": asdict(settings),
+    }
+
+
+def reevaluate(arrays: Arrays, meta: Meta) -> StepAnswer:
+    """The answer again, from kept raw data.
+
+    Raises:
+        ValueError: not the raw data of a step.
+    """
+    given, reported = meta.get("settings"), meta.get("facts")
+    if not isinstance(given, dict) or not isinstance(reported, dict) or "demand" not in arrays:
+        raise ValueError("not the raw data of a step")
+    settings = StepSettings(**{**given, "envelope": Envelope(**given["envelope"])})
+    columns = {
+        name: np.asarray(values, np.float64)
+        for name, values in arrays.items()
+        if name not in ("demand", "valid")
+    }
+    recording = Recording(
+        float(str(meta["sample_rate_hz"])), **columns, valid=np.asarray(arrays["valid"], np.bool_)
+    )
+    demand = np.asarray(arrays["demand"], np.float64)
+    return answer_of(evaluate(recording, demand, settings, float(reported["rated_torque_nm"])))
+
+
+def answer_of(result: StepResult) -> StepAnswer:
+    """The result as page, report, files and command line have it."""
+    return StepAnswer(
+        kind=result.kind,
+        unit="rpm" if result.kind == "speed" else "rev",
+        time_s=tuple(result.time_s.tolist()),
+        demand=tuple(result.demand.tolist()),
+        actual=tuple(result.actual.tolist()),
+        torque_percent=tuple(result.torque_percent.tolist()),
+        step=StepNumbers(**figures_of(result.step)) if result.step else None,
+        move=MoveNumbers(**figures_of(result.move)) if result.move else None,
+        noise=result.noise,
+        window=result.window,
+        widened=result.widened,
+        torque_peak_percent=result.torque_peak_percent,
+        torque_rms_percent=result.torque_rms_percent,
+    )

@@ -1,0 +1,56 @@
+"""What a step of speed or a move concludes; curves and numbers in the unit that ``unit`` names."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from backend.tools.tool import ToolResult
+
+
+class _Numbers(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class StepNumbers(_Numbers):
+    """Read-outs of a step of speed; times from the command, None where it was never reached."""
+
+    initial: float
+    final: float
+    overshoot_percent: float
+    rise_s: float | None
+    settling_s: float | None
+    peak_time_s: float
+
+
+class MoveNumbers(_Numbers):
+    """Read-outs of a move; ``settling_s`` counts from the end of the commanded motion."""
+
+    following_peak: float
+    following_rms: float
+    overshoot: float
+    settling_s: float | None
+    torque_peak: float | None = Field(description="in % of rated torque")
+    torque_rms: float | None = Field(description="in % of rated torque")
+
+
+class StepAnswer(ToolResult):
+    """Curves [n] over ``time_s``, and what is read from them."""
+
+    tool: Literal["step"] = "step"
+    kind: Literal["speed", "move"]
+    unit: Literal["rpm", "rev"] = Field(description="of demand, actual, noise and window")
+    time_s: tuple[float, ...]
+    demand: tuple[float, ...]
+    actual: tuple[float, ...]
+    torque_percent: tuple[float, ...] = Field(description="of rated torque")
+    step: StepNumbers | None
+    move: MoveNumbers | None
+    noise: float = Field(
+        description="standard deviation of a held speed, or of the position at the end of a move"
+    )
+    window: float | None = Field(description="settling window")
+    widened: bool = Field(description="whether noise asked for a wider window than usual")
+    torque_peak_percent: float
+    torque_rms_percent: float

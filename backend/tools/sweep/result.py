@@ -1,0 +1,90 @@
+"""What a frequency response concludes, as page, report, files and command line have it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from backend.tools.tool import ToolResult
+from backend.tools.wire_message import MessageInfo
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ResonanceInfo(_Part):
+    """A row of the table of resonances; ``height_db`` is how far it rises or falls there."""
+
+    kind: Literal["resonance", "antiresonance"]
+    frequency_hz: float
+    damping: float
+    height_db: float
+    frequency_ci95_hz: tuple[float, float] | None
+    damping_ci95: tuple[float, float] | None
+
+
+class DirectResponse(_Part):
+    """The response without any model, on the same lines."""
+
+    valid_band_hz: tuple[float, float]
+    magnitude_db: tuple[float, ...]
+    phase_deg: tuple[float, ...]
+    std_db: tuple[float | None, ...]
+    std_deg: tuple[float | None, ...]
+
+
+class ModeInfo(_Part):
+    """One resonance of the model: α·(s + β)/(s² + 2ζωs + ω²)."""
+
+    frequency_hz: float
+    damping: float
+    residue: float
+    zero_rad_s: float
+
+
+class ModelInfo(_Part):
+    """Torque to velocity: ``gain`` is 1/J of the rigid part, ``pole_rad_s`` b/J."""
+
+    gain: float
+    pole_rad_s: float
+    modes: tuple[ModeInfo, ...]
+
+
+class SweepAnswer(ToolResult):
+    """The response [lines] with its deviations, and what is read from it.
+
+    ``coherence`` and the deviations stand beside each line; None where nothing is known of them.
+    ``margins`` hold from ``from_hz`` to ``to_hz``, each None where no crossing was measured.
+    """
+
+    tool: Literal["sweep"] = "sweep"
+    kind: Literal["mechanics", "speed_loop", "position_loop"]
+    loop: str = Field(description="that was closed meanwhile")
+    sample_rate_hz: float
+    valid_band_hz: tuple[float, float]
+    frequency_hz: tuple[float, ...]
+    magnitude_db: tuple[float, ...]
+    phase_deg: tuple[float, ...]
+    coherence: tuple[float, ...]
+    std_db: tuple[float | None, ...]
+    std_deg: tuple[float | None, ...]
+    resonances: tuple[ResonanceInfo, ...]
+    margins: dict[str, float | bool | None]
+    unit: str = Field(description="of the magnitude, which is in dB of it")
+    trusted: bool
+    delay_s: float | None
+    motion_s: float
+    saturated_share: float = Field(description="of the samples had the torque at its limit")
+    current_bandwidth_hz: float | None
+    speed_filter_hz: float | None
+    coulomb_nm: float | None
+    noise: tuple[float | None, ...]
+    distortion: tuple[float | None, ...]
+    periods_used: int
+    periods_dropped: int
+    direct: DirectResponse
+    model: ModelInfo | None
+    warnings: tuple[str, ...] = Field(description="in English")
+    warning_messages: tuple[MessageInfo, ...]

@@ -1,0 +1,62 @@
+"""Requests to the AL state machine as they are, for trying what a slave makes of them.
+
+Source: ETG.1000.6 clause 6.4 (state machine), ETG.1000.4 clause 6 (registers).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from drivers.conformance.subject import AlAnswer
+from drivers.errors import NotAllowed
+from drivers.ethercat.process.station import AL_CONTROL, STATE_TIMEOUT_S, Station, al_status
+from drivers.ethercat.wire.al_status import ERROR_BIT, AlState
+from drivers.ethercat.wire.steps import Pause, Steps, Write
+from drivers.link import Progress
+
+_UNKNOWN_S = 1.0
+"""For so long a request of no known state may go without an answer."""
+_WAIT_STEP_S = 0.002
+_ANSWER_S = 30.0
+
+Call = Callable[[dict[str, Any], float, Progress | None], Awaitable[Any]]
+"""A message to the host with its time-out [s] and progress."""
+
+
+class AlRequests:
+    """The server's side; see `drivers.conformance.subject.AlStates`."""
+
+    def __init__(self, call: Call) -> None:
+        self._call = call
+
+    async def request(self, station: int, control: int) -> AlAnswer:
+        """Write ``control`` to 120h and wait for the slave's decision."""
+        message = {"op": "al_request", "station": station, "control": control}
+        return AlAnswer(*await self._call(message, _ANSWER_S, None))
+
+
+def refuse_op(station: Station, control: int) -> None:
+    """Op is only requested where a slave has to refuse it: without process data it is no state.
+
+    Raises:
+        NotAllowed: Op is requested of a slave that is not in Pre-Op.
+    """
+    if control & 0x0F == AlState.OP and station.al_state & 0x0F != AlState.PREOP:
+        raise NotAllowed("ethercat.op-needs-cyclic-data")
+
+
+def request(station: Station, control: int, clock: Callable[[], float]) -> Steps[list[int]]:
+    """Write 120h; 130h and 134h once the state or the error bit show a decision, or time is up."""
+    wanted = control & 0x0F
+    known = wanted in set(AlState)
+    deadline = clock() + (STATE_TIMEOUT_S[AlState(wanted)] if known else _UNKNOWN_S)
+    yield Write(AL_CONTROL, struct.pack("<H", control))
+    while clock() < deadline:
+        yield Pause(_WAIT_STEP_S)
+        if not (yield from al_status(station)):
+            continue
+        if station.al_state == wanted or (station.al_state & ERROR_BIT and station.al_code):
+            break
+    return [station.al_state, station.al_code]

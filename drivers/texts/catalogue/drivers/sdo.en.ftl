@@ -1,0 +1,15 @@
+sdo_announced-and-sent = the drive announced { $announced } bytes and sent { $sent }
+sdo_announced-too-much = the drive announced { $announced } bytes
+sdo_answer-without-length = an answer without a length
+sdo_block-acknowledged = a block was acknowledged wrongly
+sdo_block-checksum = the checksum of a block transfer is wrong
+sdo_block-does-not-end = the drive does not end its block transfer
+sdo_block-not-taken = the drive takes no segment of a block
+sdo_block-size = the drive asked for blocks of { $block }
+sdo_more-than-announced = the drive sent more than the { $announced } bytes it announced
+sdo_same-segments = the same segments come again and again
+sdo_segment-out-of-turn = a segment was acknowledged out of turn
+sdo_segment-twice-or-lost = a segment came twice or was lost
+sdo_transfer-given-up = { $why } ({ $parameter })
+    .remedy = check for a second node with the same number or a second master on the bus
+sdo_unexpected-answer = unexpected answer { $answer }

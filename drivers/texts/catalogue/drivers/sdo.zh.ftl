@@ -1,0 +1,15 @@
+sdo_announced-and-sent = 驱动器声明 { $announced } 字节，实际发送 { $sent } 字节
+sdo_announced-too-much = 驱动器声明了 { $announced } 字节
+sdo_answer-without-length = 应答中没有长度
+sdo_block-acknowledged = 块的确认错误
+sdo_block-checksum = 块传输的校验和错误
+sdo_block-does-not-end = 驱动器不结束块传输
+sdo_block-not-taken = 驱动器不接受块中的任何段
+sdo_block-size = 驱动器要求的块大小为 { $block }
+sdo_more-than-announced = 驱动器发送的数据超过其声明的 { $announced } 字节
+sdo_same-segments = 相同的段反复到达
+sdo_segment-out-of-turn = 某一段的确认顺序错误
+sdo_segment-twice-or-lost = 某一段重复到达或丢失
+sdo_transfer-given-up = { $why }（{ $parameter }）
+    .remedy = 检查总线上是否有相同编号的第二个节点或第二个主站
+sdo_unexpected-answer = 意外的应答 { $answer }
