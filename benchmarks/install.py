@@ -21,6 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from benchmarks._aims import Aim, print_verdict
+from tests.support.contained import Recipe
 from tests.support.installed import plain_environment, served
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -109,6 +110,15 @@ def uv(walk: Walk, dist: Path) -> None:
 
 def debian(walk: Walk, dist: Path) -> None:
     """dpkg in a root of its own; service, user and udev are not started there."""
+    walk.page(
+        "systemctl start servodeck (here: its program)",
+        _installed(walk, dist), "serve", "--port", "0",
+        path=Path(sys.base_prefix) / "bin",
+    )  # fmt: skip
+
+
+def _installed(walk: Walk, dist: Path) -> Path:
+    """The program of the Debian package, installed in a root of its own."""
     if shutil.which("dpkg") is None:
         raise NotHere("no dpkg on this computer")
     file, root = _one(dist, "servodeck_*.deb"), walk.scratch / "root"
@@ -119,11 +129,7 @@ def debian(walk: Walk, dist: Path) -> None:
         ["dpkg", f"--root={root}", f"--log={root}/log", "--force-script-chrootless",
          "--force-depends", "--force-not-root", "--force-bad-path", "--install", file],
     )  # fmt: skip
-    walk.page(
-        "systemctl start servodeck (here: its program)",
-        root / "opt/servodeck/bin/servodeck", "serve", "--port", "0",
-        path=Path(sys.base_prefix) / "bin",
-    )  # fmt: skip
+    return root / "opt/servodeck/bin/servodeck"
 
 
 def folder(walk: Walk, dist: Path) -> None:
@@ -135,25 +141,69 @@ def folder(walk: Walk, dist: Path) -> None:
     walk.page("./servodeck serve, cold", unpacked / "servodeck", "serve", "--port", "0")
 
 
-def container(_walk: Walk, dist: Path) -> None:
-    """An image, where a builder and its base image are to be had."""
-    for builder in ("podman", "docker", "buildah"):
-        if shutil.which(builder) is None:
-            continue
-        arguments = ["bud"] if builder == "buildah" else ["build"]
-        done = subprocess.run(
-            [builder, *arguments, "-f", str(ROOT / ".ci/supply/Containerfile"), str(dist.parent)],
-            capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        if done.returncode:
-            raise NotHere(f"{builder}: {done.stderr.strip().splitlines()[-1]}")
-        raise NotHere(f"{builder} has built it; it is not started by this script")
-    raise NotHere("no container builder (podman, docker, buildah) on this computer")
+def container(walk: Walk, dist: Path) -> None:
+    """The image that the Containerfile describes; its root is started in namespaces, not by an
+    engine, with the capabilities that it declares and no others.
+    """
+    if shutil.which("unshare") is None or os.geteuid():
+        raise NotHere("its root is started by the superuser with unshare (util-linux)")
+    recipe = Recipe.read((ROOT / ".ci/supply/Containerfile").read_text("utf-8"))
+    for pattern, _ in recipe.adds:
+        _one(dist, Path(pattern).name)
+    state = walk.scratch / "state"
+    state.mkdir()
+    walk.page(
+        "podman run servodeck serve (here: its root, in namespaces)",
+        *recipe.started(_image(walk, dist, recipe), state, "serve", "--port", "0"),
+    )
 
 
-def edge_box(_walk: Walk, _dist: Path) -> None:
-    """The first-boot page."""
-    raise NotHere("the set-up page of an edge box is not made yet")
+def _image(walk: Walk, dist: Path, recipe: Recipe) -> Path:
+    """Root folder of the image, by buildah or laid out as the Containerfile says."""
+    if shutil.which("buildah") is None:
+        root, began, worked = walk.scratch / "image", time.monotonic(), os.times()
+        recipe.unpack(dist.parent, root)
+        used = os.times().user + os.times().system - worked.user - worked.system
+        walk.steps.append(
+            Step("podman build (here: its ADD lines)", time.monotonic() - began, used)
+        )
+        return root
+    buildah = ["buildah", "--storage-driver", "vfs", "--root", walk.scratch / "storage",
+               "--runroot", walk.scratch / "running"]  # fmt: skip
+    walk.do(
+        "podman build -f .ci/supply/Containerfile -t servodeck .",
+        [*buildah, "bud", "--quiet", "--isolation", "chroot", "--tag", "servodeck",
+         "-f", ROOT / ".ci/supply/Containerfile", dist.parent],
+    )  # fmt: skip
+    made = subprocess.run(
+        [str(part) for part in (*buildah, "from", "servodeck")],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    mounted = subprocess.run(
+        [str(part) for part in (*buildah, "mount", made.stdout.strip())],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return Path(mounted.stdout.strip())
+
+
+def edge_box(walk: Walk, dist: Path) -> None:
+    """The Debian package, then by commands what a person types on the page."""
+    program, state = _installed(walk, dist), walk.scratch / "state"
+    path = f"{Path(sys.base_prefix) / 'bin'}:/usr/bin:/bin"
+    walk.do(
+        "page: code, administrator, password (here: servodeck people add)",
+        [program, "people", "add", "Anna", "--role", "administrator", "--config", state],
+        PATH=path, SERVODECK_PASSWORD="eleven blue horses",
+    )  # fmt: skip
+    walk.do(
+        "page: name and ports (here: servodeck station set-up)",
+        [program, "station", "set-up", "--name", "cabinet-3", "--config", state],
+        PATH=path,
+    )
+    walk.page(
+        "the page asks for the log-in", program, "serve", "--port", "0", "--config", state,
+        path=Path(sys.base_prefix) / "bin",
+    )  # fmt: skip
 
 
 def _one(folder_of: Path, pattern: str) -> Path:
@@ -186,7 +236,7 @@ WAYS: dict[str, tuple[Callable[[Walk, Path], None], float | None]] = {
     "Debian package": (debian, 60.0),
     "self-contained folder": (folder, None),
     "container": (container, None),
-    "edge box": (edge_box, None),
+    "edge box": (edge_box, 60.0),
 }
 """How each is gone, and in how many seconds from file to page."""
 

@@ -83,7 +83,7 @@ async def homing(rig: Rig) -> None:
 
 async def jogging(rig: Rig) -> None:
     """The server's own hold-to-run jog."""
-    hold = Hold()
+    hold = _hold()
     settings = JogSettings(1, SPEED_RPM, _RAMP_RPM_S, 1000.0, 100.0)
     axis = rig.connected.axis
 
@@ -99,7 +99,7 @@ async def cyclic_jog(rig: Rig) -> None:
     """The server's jog through process data."""
     url = rig.link.url
     session = await rig.bench.start_cyclic(url, 0.002)
-    hold = Hold()
+    hold = _hold()
     settings = JogSettings(1, SPEED_RPM, _RAMP_RPM_S, 1000.0, 100.0)
     axis = rig.connected.axis
 
@@ -109,6 +109,11 @@ async def cyclic_jog(rig: Rig) -> None:
     rig.bench.jobs.start("jog", "Jog", work, drive=rig.connected.drive.id, motion=True)
     rig.keep(_renewing(hold))
     await rig.until_rpm(0.9 * SPEED_RPM)
+
+
+def _hold() -> Hold:
+    """In simulated time: by the computer's own clock a busy computer would let go of it."""
+    return Hold(clock=asyncio.get_running_loop().time)
 
 
 async def _renewing(hold: Hold) -> None:
@@ -152,6 +157,9 @@ async def identification(rig: Rig) -> None:
     """MMS7 bit 11 of the control word, R6L P12.11, M6-L P09.00."""
     if rig.family == "mms7":
         await enable(rig, _PV)
+    if rig.before_trigger is not None:
+        await rig.before_trigger()
+    if rig.family == "mms7":
         rig.poke("6040:00", 0x80F)
     else:
         rig.poke("200C:0C" if rig.family == "r6l" else "2009:01", 1)

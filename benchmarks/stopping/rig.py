@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import tempfile
-from collections.abc import AsyncIterator, Coroutine
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -125,6 +125,8 @@ class Rig:
     device: VirtualServo
     http: httpx.AsyncClient
     kept: list[asyncio.Task[None]] = field(default_factory=list)
+    before_trigger: Callable[[], Awaitable[None]] | None = None
+    """Waited for between enabling and the trigger of a drive's own identification."""
 
     def keep(self, work: Coroutine[None, None, None]) -> None:
         """Run beside the test until the bench closes."""

@@ -332,8 +332,9 @@ def test_command_line_jogs_and_records(
     before = station.state(b)["position"]
     turn = ("--station", "2", "--speed", "300", "--seconds", "0.8", "--travel", "20",
             "--torque", "200", "--acceleration", "3000", "--cycle-us", "1000")  # fmt: skip
-    assert "ended: " in command(station, "jog", URL, *turn)
-    assert station.state(b)["position"] > before + 0.5
+    said = command(station, "jog", URL, *turn)
+    assert "ended: " in said
+    assert station.state(b)["position"] > before + 0.5, said
     assert station.ok(station.http.get("/buses"))[0]["cyclic"] is None, "as it was before"
     file = tmp_path / "x.csv"
     reported = command(

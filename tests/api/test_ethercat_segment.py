@@ -155,6 +155,22 @@ def test_an_eeprom_is_saved_compared_and_restored_after_two_confirmations(
     assert not station.ok(eeprom(station, "plan", saved))["changes"]
 
 
+def test_nobody_writes_an_eeprom_or_alias_under_the_control_of_another(station: Station) -> None:
+    saved = bytes.fromhex(station.drives.segments[URL].command("eeprom", slave=1)["data"])
+    drive = station.ok(station.http.get("/drives"))[0]["id"]
+    with station.live() as other:
+        other.send(type="lease", drive=drive, take=True)
+        until(lambda: station.ok(station.http.get(f"/drives/{drive}"))["lease"]["holder"])
+        restore = eeprom(station, "restore", saved, digest="-", confirmed=True)
+        alias = station.http.post(
+            "/ethercat/alias", json={"url": URL, "station": 1, "alias": 7, "confirmed": True}
+        )
+    for refused in (restore, alias):
+        assert refused.status_code == 409
+        assert "has control" in refused.json()["detail"]
+    assert station.drives.segments[URL].command("eeprom", slave=1)["data"] == saved.hex()
+
+
 def test_no_eeprom_is_touched_while_the_exchange_runs(station: Station) -> None:
     saved = bytes.fromhex(station.drives.segments[URL].command("eeprom", slave=1)["data"])
     station.ok(station.http.post("/buses/cyclic", json={"url": URL, "cycle_us": 2000}))

@@ -88,11 +88,12 @@ def _panels(page: Page, drive: str, folder: Path, colours: int) -> None:
         _store(what, folder / f"tuning-{name}.png", colours)
 
     open_axis(page, drive, "tune")
-    page.get_by_role("heading", name="Designs").wait_for()
     keep(page.get_by_role("navigation", name="Steps of commissioning"), "path")
+    tuning.open_step(page, "verify")
     page.get_by_label("Shown").select_option(index=1)
     page.get_by_label("Compared with").select_option(index=1)
     keep(_panel(page, "Step response"), "step")
+    tuning.open_step(page, "notches")
     page.get_by_role("button", name="Compute designs").click()
     page.get_by_role("table", name="Designs").wait_for()
     keep(_panel(page, "Designs"), "designs")
@@ -114,11 +115,11 @@ def _panels(page: Page, drive: str, folder: Path, colours: int) -> None:
 def _automatic(page: Page, station: Station, drive: str, folder: Path, colours: int) -> None:
     """All steps in one job, and what its panel then tells."""
     open_axis(page, drive, "tune")
-    page.get_by_role("heading", name="Tune automatically").wait_for()
+    tuning.open_step(page, "automatic")
     tuning.run_job(page, station, drive, "Start tuning")
     page.get_by_role("heading", name="Verification").wait_for()
     page.wait_for_timeout(SETTLE_MS)
-    panel = _panel(page, "Tune automatically")
+    panel = page.locator("#step-automatic")
     whole, reported = panel.bounding_box(), panel.locator(".note.good").first.bounding_box()
     assert whole is not None
     assert reported is not None
@@ -134,7 +135,7 @@ def _pages(browser: Browser, station: Station, drive: str, folder: Path, colours
             page = context.new_page()
             page.goto(station.url)
             open_axis(page, drive, "tune")
-            page.get_by_role("heading", name="Designs").wait_for()
+            page.get_by_role("navigation", name="Steps of commissioning").wait_for()
             page.wait_for_timeout(SETTLE_MS)
             _store(page, folder / f"tune-{screen}-{scheme}.png", colours)
             open_axis(page, drive, "response")

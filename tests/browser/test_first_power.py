@@ -38,7 +38,7 @@ def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
     running.drives = DemoBench(bench, folder / "wires", folder / "nvm", steady=True)
     running.start()
     # Starting an exchange is some transactions on a bus that may have to wait.
-    expect.set_options(timeout=45_000)
+    expect.set_options(timeout=120_000)
     try:
         yield running
     finally:
@@ -50,7 +50,7 @@ def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
 def page(browser: Browser, station: Station) -> Iterator[Page]:
     opened = _open(browser, station.url, **LAPTOP)
     found = next(opened)
-    found.set_default_timeout(45_000)
+    found.set_default_timeout(120_000)
     yield found
     next(opened, None)
 
@@ -59,6 +59,7 @@ def test_exchanged_phases_are_found_and_named(page: Page, station: Station) -> N
     axis = station.add(1, tuning.URL, name="Spindle")
     tuning.keep_exchanging(page, axis)
     open_axis(page, axis, "tune")
+    tuning.open_step(page, "first")
     start = page.get_by_role("button", name="Go through the checklist")
     # Nothing starts before somebody has stated what hangs at the axis.
     expect(start).to_be_disabled()

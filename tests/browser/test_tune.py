@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Locator, Page, expect
 from pypdf import PdfReader
 
 from tests.browser import tuning
@@ -47,7 +47,7 @@ def page(browser: Browser, cable: Cable, axis: str) -> Iterator[Page]:
     """One page for the whole path: what it remembers of changes is part of it."""
     opened = _open(browser, cable.url, **LAPTOP)
     found = next(opened)
-    found.set_default_timeout(45_000)
+    found.set_default_timeout(120_000)
     tuning.keep_exchanging(found, axis)
     yield found
     next(opened, None)
@@ -70,9 +70,29 @@ def expect_step(page: Page, name: str, reported: str) -> None:
     expect(step).to_have_text(re.compile(f"^(?:{reported})$"))
 
 
+def open_sections(page: Page) -> list[str]:
+    """Which steps stand open."""
+    found = page.locator("details.fold[open]").evaluate_all("all => all.map(each => each.id)")
+    return [str(each).removeprefix("step-") for each in found]
+
+
+def test_only_the_present_step_is_open(page: Page, axis: str) -> None:
+    open_axis(page, axis, "overview")
+    open_axis(page, axis, "tune")
+    start = page.get_by_role("button", name="Start tuning")
+    expect(start).to_be_in_viewport(ratio=1)
+    assert open_sections(page) == ["automatic"]
+    # The way to a step opens it, with the group that it stands in, and folds nothing.
+    path = page.get_by_role("navigation", name="Steps of commissioning")
+    path.get_by_role("link", name=re.compile("Verify")).click()
+    expect(page.get_by_role("button", name="Start the step")).to_be_in_viewport()
+    assert open_sections(page) == ["automatic", "manual", "verify"]
+
+
 def test_identify(page: Page, axis: str, station: Station) -> None:
     expect_step(page, "Pre-checks", "done")
     expect_step(page, "Inertia", "next")
+    tuning.open_step(page, "inertia")
     page.get_by_label("Repetitions").fill("2")
     tuning.run_job(page, station, axis, "Measure the inertia")
     table = page.get_by_role("table", name="Inertia and friction")
@@ -84,6 +104,11 @@ def test_identify(page: Page, axis: str, station: Station) -> None:
     friction = tuning.number_in(row(table, "Coulomb").inner_text(), "N·m")
     assert friction == pytest.approx(COULOMB, rel=0.1)
     expect_step(page, "Inertia", "done")
+    # Who went on by hand finds the next step open.
+    open_axis(page, axis, "overview")
+    open_axis(page, axis, "tune")
+    expect(page.locator("#step-response")).to_have_attribute("open", "")
+    assert open_sections(page) == ["manual", "response"]
 
 
 def test_measure_before(page: Page, axis: str, station: Station) -> None:
@@ -113,6 +138,7 @@ def test_place_write_and_take_back_a_notch(page: Page, axis: str, station: Stati
 
 def test_step_before(page: Page, axis: str, station: Station) -> None:
     open_axis(page, axis, "tune")
+    tuning.open_step(page, "verify")
     tuning.run_job(page, station, axis, "Start the step")
     table = page.get_by_role("table", name="Numbers of the step")
     table.wait_for(timeout=MEASURED_MS)
@@ -121,7 +147,7 @@ def test_step_before(page: Page, axis: str, station: Station) -> None:
 
 def test_design_and_apply(page: Page, axis: str, station: Station) -> None:
     open_axis(page, axis, "tune")
-    expect(page.get_by_role("button", name="Compute designs")).to_be_visible()
+    tuning.open_step(page, "notches")
     page.get_by_role("button", name="Compute designs").click()
     table = page.get_by_role("table", name="Designs").last
     table.wait_for(timeout=MEASURED_MS)
@@ -156,6 +182,7 @@ def test_verify_over_the_measurement_of_before(page: Page, axis: str, station: S
 
     open_axis(page, axis, "tune")
     expect_step(page, "Verify", "done")
+    tuning.open_step(page, "verify")
     tuning.run_job(page, station, axis, "Start the step")
     head = page.get_by_role("table", name="Numbers of the step")
     expect(head).to_contain_text("before", timeout=MEASURED_MS)
@@ -163,6 +190,9 @@ def test_verify_over_the_measurement_of_before(page: Page, axis: str, station: S
 
 def test_report(page: Page, axis: str) -> None:
     open_axis(page, axis, "tune")
+    # Verified by hand: nobody has tuned this axis automatically.
+    expect(page.locator("#step-verify > summary")).to_contain_text("done")
+    expect(page.locator("#step-automatic > summary")).not_to_contain_text("done")
     page.get_by_label("Machine").fill("Press <4>")
     page.get_by_label("Commissioned by").fill("Ann")
     page.get_by_label("Language of the report").select_option("zh")
@@ -181,6 +211,7 @@ def test_report(page: Page, axis: str) -> None:
 def test_take_everything_back(page: Page, axis: str, station: Station) -> None:
     open_axis(page, axis, "tune")
     assert notches_of(station, axis) != []
+    tuning.open_step(page, "gains")
     expect(page.get_by_role("button", name="Undo").first).to_be_visible()
     back = page.get_by_role("button", name="Undo")
     for left in (1, 0):
@@ -204,6 +235,7 @@ def test_autotune_is_cancelled_while_the_axis_moves(
 ) -> None:
     open_axis(page, axis, "tune")
     before = settings_of(station, axis)
+    tuning.open_step(page, "automatic")
     page.get_by_label("Write and verify the result").uncheck()
     page.get_by_role("button", name="Start tuning").click()
     now = page.locator("ol.steps li[aria-current=step]")
@@ -218,18 +250,24 @@ def test_autotune_is_cancelled_while_the_axis_moves(
     assert settings_of(station, axis) == before
 
 
+def details_of(page: Page, title: str) -> Locator:
+    """What the answer of the automatic tuning folds under this title."""
+    summary = page.locator("summary", has_text=title)
+    return page.locator("#step-automatic .stack details", has=summary)
+
+
 def test_autotune_shows_designs_and_writes_nothing_unasked(
     page: Page, axis: str, station: Station
 ) -> None:
     before = settings_of(station, axis)
     tuning.run_job(page, station, axis, "Start tuning")
-    reported = page.locator("details", has=page.locator("summary", has_text="What was measured"))
+    reported = details_of(page, "What was measured")
     reported.locator("summary").click()
     read = row(reported.get_by_role("table", name="Inertia and friction"), "Inertia").inner_text()
     assert tuning.number_in(read, "kg·m²") == pytest.approx(INERTIA, rel=0.02)
     read = row(reported.get_by_role("table", name="Resonances"), "resonance").inner_text()
     assert tuning.number_in(read, "Hz") == pytest.approx(RESONANCE_HZ, rel=0.01)
-    reported = page.locator("details", has=page.locator("summary", has_text="Designs"))
+    reported = details_of(page, "Designs")
     reported.locator("summary").click()
     designs = reported.get_by_role("table", name="Designs")
     for mark in ("Robust", "Balanced", "Fast"):

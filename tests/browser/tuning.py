@@ -69,9 +69,25 @@ def running(folder: Path) -> Iterator[Station]:
         station.stop()
 
 
+_MANUAL = ("inertia", "response", "notches", "gains", "verify")
+
+
+def open_step(page: Page, name: str) -> Locator:
+    """Open a step of the page Tune, with the group that it stands in."""
+    for each in (*(("manual",) if name in _MANUAL else ()), name):
+        fold = page.locator(f"#step-{each}")
+        head = fold.locator("> summary")
+        head.wait_for()
+        if fold.get_attribute("open") is None:
+            head.click()
+        expect(fold).to_have_attribute("open", "")
+    return fold
+
+
 def keep_exchanging(page: Page, axis: str) -> None:
     """Start the cyclic exchange by hand, so that measurements need not start it every time."""
     open_axis(page, axis, "tune")
+    open_step(page, "checks")
     page.get_by_text("Before anything moves").wait_for()
     started = page.get_by_text("The cyclic exchange runs.")
     begin = page.get_by_role("button", name="Start", exact=True)

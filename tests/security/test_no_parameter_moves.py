@@ -34,6 +34,7 @@ PLACES: tuple[tuple[str, LinkKind], ...] = (
     ("mms7", "ethercat"),
     ("mms7", "mlink"),
     ("m6l", "ethercat"),
+    ("el7", "ethercat"),
     ("r6l", "ethercat"),
     ("ep3e", "ethercat"),
     ("ds_c", "canopen"),

@@ -250,7 +250,7 @@ def test_a_full_disk_is_reported_and_leaves_everything_whole(full: str, tmp_path
     else:
         for number in range(3000):
             records.audit.add(Fact("write", "written", "X", "2005:03", new=number))
-        until(lambda: "full" in records.audit.problem, 20)
+        until(lambda: "full" in str(records.audit.problem), 20)
         records.audit.add(Fact("stop", "pressed"))
         limit(1 << 30)
         until(lambda: records.audit.pending == 0, 20)

@@ -17,7 +17,8 @@ from backend.library.measurements import pack
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.measuring import excite
-from backend.tools.step.run import StepSettings, _demand
+from backend.tools.step.evaluate import StepSettings
+from backend.tools.step.run import _demand
 from backend.tools.sweep.evaluation import SweepSettings
 
 RATE_HZ = 1000.0

@@ -14,7 +14,7 @@ from fluent.syntax import parse
 from fluent.syntax.visitor import Visitor
 
 from drivers.errors import DriveError
-from drivers.texts.message import REMEDY, Language, Text, is_code
+from drivers.texts.message import REMEDY, RENAMED, Language, Text, is_code
 from drivers.texts.render import CATALOGUE, bundle, files, identifier, render
 
 ROOT = Path(__file__).parents[2]
@@ -91,7 +91,7 @@ def _first_arguments() -> Iterator[str]:
                 first = node.args[0]
                 if not isinstance(first, ast.Constant) or not isinstance(first.value, str):
                     continue
-                if name in ("text", "Text") or name in ERRORS:
+                if name in ("text", "Text", "print_text", "note", "words_of") or name in ERRORS:
                     yield first.value
 
 
@@ -179,6 +179,27 @@ def test_every_code_is_rendered(language: Language) -> None:
             assert "\u2068" not in shown, "no isolating signs"
 
 
+def test_files_of_earlier_versions_open_with_their_sentences() -> None:
+    params = {"drive": "Axis 1", "detail": "phase margin 20°"}
+    stored = {"code": "autotune.no-candidate-kept-promise", "params": params}
+    opened = Text.from_wire(stored)
+    assert opened == Text("autotune.no-candidate-verified", params)
+    assert "no design met its prediction" in opened.words()
+    remedy = Text.from_wire({"code": "autotune.no-candidate-kept-promise/remedy", "params": params})
+    assert remedy.words() == str(opened.remedy())
+    slower = {"code": "autotune.promise-not-kept", "params": {}}
+    inner = {"code": "autotune.slower-than-it-was", "params": {"share": 0.5, "why": slower}}
+    assert "it did not meet its prediction" in Text.from_wire(inner).words()
+
+
+def test_the_page_knows_the_same_earlier_names() -> None:
+    page = (ROOT / "webui/src/i18n/message.ts").read_text("utf-8")
+    listed = dict(re.findall(r"^  '([a-z.-]+)': '([a-z.-]+)',$", page, re.MULTILINE))
+    assert listed == RENAMED
+    assert set(RENAMED.values()) <= set(ENGLISH)
+    assert not set(RENAMED) & set(ENGLISH)
+
+
 def test_chinese_is_chinese() -> None:
     bare = [
         code for code, names in CHINESE.items()
@@ -186,3 +207,34 @@ def test_chinese_is_chinese() -> None:
         and re.search(r"[a-z]{3}", render(Text(code, dict.fromkeys(names, "x")), "en"))
     ]  # fmt: skip
     assert not bare
+
+
+def _is_sentence(node: ast.expr) -> bool:
+    """A literal that is no code, or words put together in the code."""
+    if isinstance(node, ast.Constant):
+        return isinstance(node.value, str) and not is_code(node.value)
+    by_str = isinstance(node, ast.Call) and getattr(node.func, "id", "") == "str"
+    return by_str or isinstance(node, ast.JoinedStr | ast.BinOp)
+
+
+def _called(node: ast.AST) -> str:
+    """The name of what is called; empty where nothing is."""
+    if not isinstance(node, ast.Call):
+        return ""
+    return str(getattr(node.func, "id", getattr(node.func, "attr", "")))
+
+
+def test_no_error_carries_a_sentence() -> None:
+    """What an error says and advises comes from the catalogue, so that it has both languages."""
+    found = []
+    for folder in ("backend", "drivers", "profiles"):
+        for file in (ROOT / folder).rglob("*.py"):
+            tree = ast.parse(file.read_text("utf-8"))
+            kinds = [n for n in ast.walk(tree) if isinstance(n, ast.ClassDef) and n.name in ERRORS]
+            own = [n for kind in kinds for n in ast.walk(kind) if _called(n) == "__init__"]
+            for node in (*(n for n in ast.walk(tree) if _called(n) in ERRORS), *own):
+                assert isinstance(node, ast.Call)
+                advice = [each.value for each in node.keywords if each.arg == "remedy"]
+                if any(_is_sentence(each) for each in (*node.args[:1], *advice)):
+                    found.append(f"{file.relative_to(ROOT)}:{node.lineno}")
+    assert not found, "\n".join(found)

@@ -61,10 +61,6 @@ ALLOWED: dict[tuple[str, str], str] = {
         "fitting = [s for s in found if all(word in s.words() for word in words)]",
     ): "a person searches recordings by the words in their descriptions",
     (
-        "backend/commands/values.py",
-        "print(words.rstrip())",
-    ): "what is printed has no space at its end",
-    (
         "backend/commands/virtual.py",
         'error.text = prose(error.message.removeprefix(f"bench file {file}: "))',
     ): "the file is a temporary one, which nobody who reads the message knows",

@@ -15,6 +15,7 @@ from tests.support.two_masses import Bench, multisine
 
 RATE = 2500.0
 LINES = np.arange(11, 251)
+MIDDLE = np.arange(30, 151)
 REAL = Path(__file__).parents[2] / "data" / "two_mass_bench_a.csv.gz"
 
 
@@ -114,6 +115,7 @@ def test_the_band_holds_another_run_of_a_rough_bench(number: int) -> None:
         "other phases": (multisine(RATE, LINES, 1.0, 10, 22), LINES),
         "twice the level": (multisine(RATE, LINES, 2.0, 10, 23), LINES),
         "odd lines": (multisine(RATE, LINES[::2], 1.0, 10, 24), LINES[::2]),
+        "0.7 of the level, 30 to 150 Hz": (multisine(RATE, MIDDLE, 0.7, 10, 25), MIDDLE),
     }
     for name, (torque, lines) in others.items():
         assert share_held(found, bench, torque, lines) >= 0.9, name

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from backend.analysis.loop.loop_goals import Goals
-from backend.analysis.loop.loop_verdict import Lines, LoopVerdict, judge
+from backend.analysis.loop.loop_verdict import Lines, LoopVerdict, excluding_db, judge
 from backend.analysis.response.reference_path import reference_paths
 from backend.analysis.response.sampling import hold_response
 
@@ -198,3 +198,47 @@ def test_a_motor_that_may_be_alone_above_the_band_widens_what_is_stated() -> Non
     # Without a raised gain the loop is not kept, and nothing is widened.
     unseen = judged(None)
     assert unseen.predicted == unseen.designed
+
+
+def delayed(crossover_hz: float, late_s: float, factor: float) -> tuple[float, float, float]:
+    """Gain margin in dB, phase margin and Ms of L = w_c e^(-s (0.5 ms + late))/s."""
+    d, f = 0.5e-3 + late_s, crossover_hz * factor
+    peak = np.max(1.0 / np.abs(1.0 + loop_of(DENSE, f, d)))
+    return float(20 * np.log10(1.0 / (4 * f * d))), 90.0 - 360.0 * f * d, float(peak)
+
+
+def test_a_raised_gain_keeps_only_loops_that_no_line_told_but_are_sound() -> None:
+    """A loop late by up to 200 µs and 1.5 dB stronger: no line tells it, its gain is raised.
+
+    It oscillates above its true gain margin. 300 loops, of which most miss the goals.
+    """
+    rng = np.random.default_rng(11)
+    sound = kept = unsound = 0
+    for _ in range(300):
+        crossover = float(rng.uniform(90.0, 170.0))
+        late, factor = float(rng.uniform(0.0, 200e-6)), float(rng.uniform(0.96, 1.18))
+        true_db, true_deg, true_ms = delayed(crossover, late, factor)
+        nominal = loop_of(DENSE, crossover, 0.5e-3)
+        before = judge(None, DENSE, nominal[None, :], nominal)
+        wanted = max(8.0, excluding_db(before, DENSE, nominal[None, :], PROMISED) + 0.2)
+        shown = min(wanted, true_db)
+        found = judge(None, DENSE, nominal[None, :], nominal, shown_gain_db=shown)
+        missed = found.missed(PROMISED, 1.0, 1.0, 1.03) or shown < 7.0
+        meets = true_db >= 9.0 and true_deg >= 48.0 and true_ms <= 1.8
+        holds = true_db >= 7.8 and true_deg >= 42.5 and true_ms <= 1.8 * 10 ** (1.2 / 20)
+        unsound += not holds
+        sound += meets and true_db >= wanted
+        kept += meets and true_db >= wanted and not missed
+        assert holds or missed, (crossover, late, factor, true_db, true_deg, true_ms)
+    assert unsound > 30
+    assert sound > 60
+    assert kept >= 0.95 * sound
+
+
+def test_delays_between_the_ends_count_where_a_raised_gain_excludes_the_ends() -> None:
+    """130 Hz, 0.5 ms, shown 9.5 dB: 643 µs would leave 9.5 dB, with 60° of phase margin."""
+    nominal = loop_of(DENSE, 130.0, 0.5e-3)
+    found = judge(None, DENSE, nominal[None, :], nominal, shown_gain_db=9.5, size=(0.0, 1e-6))
+    assert found.worst.gain_margin_db >= 9.5
+    # The grid of delays ends at 600 µs: 63°, of 67° of the loop without any.
+    assert found.worst.phase_margin_deg < 64.0

@@ -21,6 +21,7 @@ from backend.audit.facts import body_of
 from backend.audit.pending import PendingFile
 from backend.audit.trail import Filter, Trail
 from backend.store.database import DatabaseFailed, Store
+from drivers.texts.message import Text, prose
 from tests.support.station import until
 
 
@@ -164,17 +165,17 @@ async def test_an_answer_waits_until_its_entry_is_safe(store: SickStore, audit: 
 async def test_a_database_that_fails_is_reported_and_nothing_is_lost(
     store: SickStore, tmp_path: Path
 ) -> None:
-    reported: list[str] = []
+    reported: list[Text | None] = []
     audit = AuditLog(store, "bench-1", changed=reported.append)
     store.sick = True
     audit.add(write(1))
     audit.add(write(2))
     assert await audit.settled(60.0)  # safe in the file
-    assert "disk full" in audit.problem
+    assert "disk full" in str(audit.problem)
     store.sick = False
     flush(audit)
-    until(lambda: reported == ["the database failed: disk full", ""])
-    assert audit.problem == ""
+    until(lambda: reported == [prose("the database failed: disk full"), None])
+    assert audit.problem is None
     audit.close()
     assert [e.old for e in Trail(store).search(Filter())] == [2, 1]
     assert not (tmp_path / "audit-pending.jsonl").exists()
@@ -216,7 +217,7 @@ def test_what_a_lost_answer_had_stored_is_not_stored_twice(
     station = LostAnswer(tmp_path)
     audit = AuditLog(station, "bench-1")
     audit.add(write(1))
-    until(lambda: audit.problem != "")
+    until(lambda: audit.problem is not None)
     audit.add(write(2))
     audit.close()
     station.close()
@@ -254,7 +255,9 @@ def test_four_threads_make_one_chain(store: SickStore, audit: AuditLog) -> None:
 def test_search_and_export(store: SickStore, audit: AuditLog) -> None:
     audit.add(Fact("login", "logged in", person="Anna"))
     audit.add(Fact("write", "written", "X", "2005:03", 35.0, 40.0, person="Anna"))
-    audit.add(Fact("write", "written", "Y", "2005:03", 1, 2, person="Bert", outcome="refused"))
+    audit.add(
+        Fact("write", "written", "Y", "2005:03", 1, 2, person="Bert", outcome=prose("refused"))
+    )
     audit.add(Fact("file", "saved", "Y", "=cmd|'x'!A1", person='a"b', detail={"version": 3}))
     flush(audit)
     trail = Trail(store)

@@ -24,6 +24,7 @@ from backend.drive.readings import Reading
 from backend.station.bench import Bench
 from backend.station.records import REMOTE_S
 from drivers.errors import NotAllowed
+from drivers.texts.message import prose
 from profiles import load_profile
 from tests.support.machine import OwnTime
 from tests.support.memory_link import MemoryLink
@@ -113,9 +114,9 @@ async def test_what_goes_wrong_later_is_reported_too_but_not_every_drives_troubl
 ) -> None:
     bench = Bench(tmp_path)
     _tell_problems(bench)
-    bench.journal.add("the audit waits: the disk is full", level="error")
-    bench.journal.add("it may still be enabled", level="error", drive="x")
-    bench.journal.add("opened mlink:///dev/ttyUSB0")
+    bench.journal.add(prose("the audit waits: the disk is full"), level="error")
+    bench.journal.add(prose("it may still be enabled"), level="error", drive="x")
+    bench.journal.add(prose("opened mlink:///dev/ttyUSB0"))
     assert capsys.readouterr().out == "  note: the audit waits: the disk is full\n"
     await bench.close()
 

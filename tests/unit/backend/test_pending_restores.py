@@ -394,7 +394,7 @@ async def test_another_drive_in_its_place_owes_nothing(
     servo.set((0x1018, 4), servo.number((0x1018, 4)) + 1)
     again, connected = await bench_with(servo, state)
     await back(again, servo)
-    assert "had serial number 7" in connected.drive.identity_warning
+    assert "had serial number 7" in str(connected.drive.identity_warning)
     assert held(servo) == {TORQUE: 800, SPEED: 200}, "nothing is written to it"
     await again.accept_identity("x")
     assert not connected.drive.pending_restores

@@ -12,7 +12,7 @@ import pytest
 from backend.axis.axis import Envelope
 from backend.tools.autotune.gain_steps import judged
 from backend.tools.measuring.recording import Recording
-from backend.tools.step.run import (
+from backend.tools.step.evaluate import (
     LEAD_S,
     StepResult,
     StepSettings,

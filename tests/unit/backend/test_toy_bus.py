@@ -18,6 +18,7 @@ from drivers import urls
 from drivers.bus import BusKind, BusUrl
 from drivers.errors import OutOfRange
 from drivers.link import Address, Found, LinkTraits, Progress
+from drivers.texts.message import prose
 from profiles import load_profile
 from profiles.schema import LinkSpec, Profile
 from tests.support.memory_link import MemoryLink
@@ -62,7 +63,7 @@ def toy(monkeypatch: pytest.MonkeyPatch) -> None:
     """What the folder drivers/toy and the line in `LinkKind` would do."""
     module = ModuleType("drivers.toy.bus")
     module.BUS = BusKind(  # type: ignore[attr-defined]
-        example="toy://shelf0", traits=LinkTraits(batch=10, silent="the batteries"),
+        example="toy://shelf0", traits=LinkTraits(batch=10, silent=prose("the batteries")),
         require_place=require_place, link=ToyLink,
     )  # fmt: skip
     monkeypatch.setitem(sys.modules, "drivers.toy", ModuleType("drivers.toy"))
@@ -128,4 +129,4 @@ def test_nothing_in_the_backend_asks_for_a_kind_of_bus() -> None:
             if any(isinstance(s, ast.Constant) and s.value in urls.SCHEMES for s in sides):
                 found.append(f"{file.name}:{node.lineno}")
     # `servodeck virtual` may: it refuses to answer on a real network.
-    assert found == ["virtual.py:33"]
+    assert found == ["virtual.py:34"]

@@ -27,7 +27,7 @@ from backend.tools.autotune.verify import (
     verify,
     worse_than,
 )
-from backend.tools.step.run import LEAD_S, StepResult
+from backend.tools.step.evaluate import LEAD_S, StepResult
 from backend.tools.sweep.evaluation import SweepResult, SweepSettings
 from backend.work.jobs import Progress
 
@@ -186,7 +186,7 @@ async def verified_of(
         return 0.0
 
     monkeypatch.setattr(tune_verify.sweep_tool, "sweep", sweep)
-    monkeypatch.setattr(tune_verify.step_tool, "step_response", stepped)
+    monkeypatch.setattr(tune_verify, "step_response", stepped)
     monkeypatch.setattr(tune_verify, "holding_torque", still)
     gains = Gains(0.1, 6.0, 50.0, 60.0)
     nominal = Margins(40.0, 65.0, 40.0, None, None, 1.3, 60.0, True)

@@ -12,15 +12,18 @@ import pytest
 BYTES = 5_000_000
 MOST_S, MOST_MB = 3.0, 300
 _MEASURE = """
-import json, resource, sys, time
+import json, sys, time
 from pathlib import Path
 from profiles.importer import import_file, write_profile
 before = time.process_time()
 imported = import_file(Path(sys.argv[1]).read_bytes(), "large.xml", drive="large")
 write_profile(imported.profile, Path(sys.argv[2]))
+# The figure of getrusage begins with what the parent held when it forked.
+status = Path("/proc/self/status").read_text().splitlines()
+peak = next(line for line in status if line.startswith("VmHWM"))
 print(json.dumps({
     "cpu_s": time.process_time() - before,
-    "memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    "memory_mb": int(peak.split()[1]) / 1024,
     "parameters": len(imported.profile.parameters),
     "product": imported.profile.identity.product_code,
 }))

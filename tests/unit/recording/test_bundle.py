@@ -19,6 +19,7 @@ from backend.recording.reader import RecordingReader
 from backend.station.recording import capture
 from backend.station.recording.recorder import Trigger, fires
 from backend.work.journal import Entry, Journal
+from drivers.texts.message import prose
 from tests.unit.recording.support import block, header
 
 
@@ -83,7 +84,7 @@ def test_bundle_holds_the_samples_as_a_recording(tmp_path: Path) -> None:
         version="1",
         axes=[axis],
         links=[{"drive": "x0", "timeouts": 3}],
-        log=[Entry(1_700_000_000.0, "error", "x0", "", "it broke")],
+        log=[Entry(1_700_000_000.0, "error", "x0", "", prose("it broke"))],
         history=[
             Value(1_700_000_000.0, "x0", "6041:00", 0x218),
             *(Value(1_700_000_000.0 + n, "x0", "6079:00", 310.0 + n) for n in range(3)),

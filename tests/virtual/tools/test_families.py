@@ -6,15 +6,20 @@ time for; limits are those of `tuning.md`, truth is the analytic response of the
 
 from __future__ import annotations
 
+import json
+
 import pytest
+from pydantic import TypeAdapter
 
 from backend.commands.tools import lines_of
-from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, autotune
+from backend.tools.autotune.result import AutotuneAnswer
+from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, as_json, autotune
 from backend.tools.inertia.evaluation import InertiaSettings, answer_of
 from backend.tools.inertia.run import TOOL as INERTIA
 from backend.tools.inertia.run import inertia
 from backend.tools.measuring.temporary import put_back
 from backend.tools.notch.meaning import meaning_of
+from backend.tools.results import ToolOutcome
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.run import sweep
 from drivers.virtual.mechanics import MechanicsSpec, PlaceSpec
@@ -32,7 +37,13 @@ HEAVY = mechanics((3e-3, 300.0, 0.05), viscous=1e-3, coulomb=0.06)
 
 @pytest.mark.parametrize(
     ("drive", "spec", "khz"),
-    [("mms7", FAR, 1.0), ("mms7", THREE, 4.0), ("m6l", ONE, 1.0), ("r6l", ONE, 1.0)],
+    [
+        ("mms7", FAR, 1.0),
+        ("mms7", THREE, 4.0),
+        ("m6l", ONE, 1.0),
+        ("r6l", ONE, 1.0),
+        ("el7", ONE, 1.0),  # the worked example of a profile
+    ],
 )
 async def test_mechanics_of_every_family(drive: str, spec: MechanicsSpec, khz: float) -> None:
     async with direct(spec, 1e-3 / khz, drive=drive) as b:
@@ -81,7 +92,7 @@ async def test_inertia_between_ends_that_are_found() -> None:
         assert abs(units.position(await b.axis.position_raw())) < 0.05
 
 
-@pytest.mark.parametrize("drive", ["mms7", "m6l", "r6l"])
+@pytest.mark.parametrize("drive", ["mms7", "m6l", "r6l", "el7"])
 async def test_autotune_of_a_family_and_back(drive: str) -> None:
     # M6-L does not tell its motor's inertia, which its load ratio counts in.
     settings = AutotuneSettings(WIDE, motor_inertia_kgm2=None if drive == "mms7" else 5e-5)
@@ -105,6 +116,10 @@ async def test_autotune_of_a_family_and_back(drive: str) -> None:
         await put_back(b.axis, result.before)
         for key, raw in result.before.items():
             assert await b.axis.drive.raw(key) == raw
+        published = TypeAdapter[ToolOutcome](ToolOutcome).validate_json(json.dumps(as_json(result)))
+        assert isinstance(published, AutotuneAnswer)
+        assert published.before == result.before
+        assert published.mechanics.kind == "mechanics"
 
 
 def _moving_s(result: AutotuneResult) -> float:

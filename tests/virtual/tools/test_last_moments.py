@@ -11,7 +11,8 @@ from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.inertia.run import inertia
 from backend.tools.measuring.alignment import aligned
 from backend.tools.measuring.interrupted import Interrupted
-from backend.tools.step.run import StepSettings, step_response
+from backend.tools.step.evaluate import StepSettings
+from backend.tools.step.run import step_response
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.run import sweep
 from backend.work.jobs import Progress

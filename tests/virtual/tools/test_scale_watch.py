@@ -25,7 +25,8 @@ from backend.tools.measuring.interrupted import Interrupted
 from backend.tools.moves.homing import HomingSettings, home
 from backend.tools.moves.move import MoveSettings, SequenceSettings, move, sequence
 from backend.tools.moves.small_move import SmallMoveSettings, small_move
-from backend.tools.step.run import StepSettings, step_response
+from backend.tools.step.evaluate import StepSettings
+from backend.tools.step.run import step_response
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.run import sweep
 from drivers.errors import MotionHalted, NotAllowed, OutOfRange

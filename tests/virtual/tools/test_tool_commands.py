@@ -162,7 +162,7 @@ def test_everything_around_a_tool_is_there(tool: AnyTool) -> None:
     assert tool.kind in cli.COMMANDS
     own = set(tool.settings.model_fields) - set(inspect.getmro(tool.settings)[1].model_fields)  # type: ignore[attr-defined]
     for name in ("title", "help", *(f"field.{each}" for each in own)):
-        english, chinese = tool.texts[name]
+        english, chinese = tool.text(name, "en"), tool.text(name, "zh")
         assert english
         assert chinese
         assert english != chinese

@@ -28,7 +28,8 @@ from backend.tools.inertia.run import inertia
 from backend.tools.measuring.restore import settle
 from backend.tools.measuring.temporary import put_back, write_settings
 from backend.tools.notch.meaning import NotchMeaning, meaning_of, remember
-from backend.tools.step.run import StepSettings, step_response
+from backend.tools.step.evaluate import StepSettings
+from backend.tools.step.run import step_response
 from backend.tools.sweep.evaluation import SweepSettings, completed
 from backend.tools.sweep.run import sweep
 from backend.work.jobs import Progress

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import gc
+import threading
 import time
 
 import pytest
@@ -126,6 +128,34 @@ async def test_a_write_overtakes_batches_of_reads(
     await link.write(5, SMALL, b"\x02")
     assert done.index("write") <= before + 1
     assert [len(await batch) for batch in batches] == [16] * 3
+
+
+async def test_what_fails_after_it_was_cancelled_is_no_defect_in_the_log(
+    link: CanopenLink,
+) -> None:
+    """Found by the chaos on real wires (CANopen, seed 133): "Future exception was never retrieved"
+    after a read that was cancelled ended by its time-out."""
+    reported: list[dict[str, object]] = []
+    asyncio.get_running_loop().set_exception_handler(lambda _, what: reported.append(what))
+    begun, go = threading.Event(), threading.Event()
+
+    def fails() -> None:
+        begun.set()
+        go.wait(5)
+        raise LinkTimeout("no answer")
+
+    asked = asyncio.create_task(link._in_worker(fails))
+    await asyncio.to_thread(begun.wait, 5)
+    asked.cancel()
+    await asyncio.sleep(0)
+    go.set()
+    await asyncio.wait([asked])
+    assert asked.cancelled()
+    # The error is reported when the last reference to its future is gone.
+    del asked
+    await asyncio.sleep(0)
+    gc.collect()
+    assert reported == []
 
 
 async def test_cancelling_a_batch_waits_for_one_read_only(

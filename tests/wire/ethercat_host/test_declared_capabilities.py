@@ -18,11 +18,10 @@ import pytest
 from backend.station.service import systemd_unit
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import Namespace, child_environment, unavailable
+from tests.support.contained import NUMBERS
 from tests.wire.ethercat_host.conftest import FACTORY
 
 ROOT = Path(__file__).resolve().parents[3]
-#: linux/capability.h
-NUMBERS = {"CAP_NET_ADMIN": 12, "CAP_NET_RAW": 13, "CAP_IPC_LOCK": 14, "CAP_SYS_NICE": 23}
 MISSING = unavailable() or ("" if shutil.which("setpriv") else "setpriv (util-linux) is not here")
 
 pytestmark = pytest.mark.skipif(bool(MISSING), reason=MISSING)

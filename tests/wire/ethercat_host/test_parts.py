@@ -19,7 +19,7 @@ from drivers.ethercat.exchange.cyclic import percentile_us
 from drivers.ethercat.exchange.ring import RING_BYTES, SLOT, VALID, Ring
 from drivers.ethercat.exchange.samples import contiguous
 from drivers.ethercat.process import protocol
-from drivers.ethercat.process.station import Station, _to_preop, change_state
+from drivers.ethercat.process.station import Station, change_state, to_preop
 from drivers.ethercat.wire import esc, sii
 from drivers.ethercat.wire.al_status import AlState, al_status_text, state_name
 from drivers.ethercat.wire.frames import Request
@@ -350,7 +350,7 @@ def test_mailboxes_whose_sync_managers_were_lost_are_set_again() -> None:
         return b""
 
     station = Station(1, mailbox=Mailbox(0x1000, 128, 0x1080, 128, lambda: 0.0, lambda _d: None))
-    steps = _to_preop(station, lambda: 0.0)
+    steps = to_preop(station, lambda: 0.0)
     step = next(steps)
     with contextlib.suppress(StopIteration):
         while True:

@@ -108,3 +108,28 @@ def test_lockstep_lets_time_pass_while_a_master_only_polls() -> None:
     for _ in range(clock.IDLE_FRAMES + 10):
         clock.arrival(process_data=False, cycle_ns=0)
     assert clock.now() - before == clock.IDLE_FRAMES * 5_000 + 10 * 200_000
+
+
+def test_sync1_beside_a_faster_sync0_rules_the_exchange() -> None:
+    """ETG.1000.4 clause 6.8: SYNC1 follows the first SYNC0 by 9A4h, then every second SYNC0."""
+    wire = Wire()
+    wire.number()
+    dc = wire.slaves[0].dc
+    wire.write(0x0990, struct.pack("<Q", 10 * MS))
+    wire.write(0x09A0, struct.pack("<II", MS // 2, MS // 2 + 125_000))
+    wire.write(0x0981, b"\x07")
+    assert dc.exchange_cycle_ns == MS
+    pulses, at = [], 0
+    while len(pulses) < 6:
+        pulse = dc.next_pulse(at)
+        assert pulse is not None
+        at = pulse
+        pulses.append((pulse, dc.exchanges_at(pulse)))
+    start = 10 * MS
+    assert pulses == [
+        (start, False), (start + 500_000, False), (start + 625_000, True),
+        (start + 1_000_000, False), (start + 1_500_000, False), (start + 1_625_000, True),
+    ]  # fmt: skip
+    wire.write(0x0981, b"\x03")
+    assert dc.exchange_cycle_ns == MS // 2
+    assert dc.exchanges_at(start + 500_000)

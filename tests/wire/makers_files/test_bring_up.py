@@ -36,15 +36,17 @@ def namespace() -> Iterator[Namespace]:
 async def brought(
     namespace: Namespace, name: str, haste: float = 1.0
 ) -> AsyncIterator[tuple[EthercatLink, VirtualSegment]]:
-    """``haste``: how many times as fast as real time a lockstep wire may run."""
-    # A slave that takes its time takes real time: that of a lockstep wire stands without frames.
-    lockstep = "slow" not in name
+    """``haste``: how many times as fast as real time the wire may run with process data."""
+    # A slave that takes its time takes real time, while the time of a lockstep wire stands without
+    # frames. With process data its time follows the frames as well: a cycle that this computer
+    # sends late is not late for the drive.
+    wire = "--steady" if "slow" in name else "--lockstep"
     arguments = ["--factory", _FACTORY, "--slave", _SLAVE, "--sdo-ms", "0.3", "--drive", name]
-    arguments += ["--lockstep"] if lockstep else []
+    arguments.append(wire)
     segment = VirtualSegment.start("ec0s", arguments, namespace)
     link = EthercatLink(
         "ec0m", url="ethercat://virtual0", launcher=namespace.command([]),
-        lockstep=haste if lockstep else 0.0,
+        lockstep=haste,
     )  # fmt: skip
     await link.open()
     try:

@@ -125,13 +125,7 @@ async def responded(way: Way) -> None:
     assert np.abs(found.frf.magnitude_db[inside]).max() < 0.2
 
 
-#: Not to the end of the way: the virtual drive's time stands between two pulses of a SYNC0 that is
-#: faster than the process data, and the slow one takes real time, which a busy computer has not.
-#: Both reach Operational and exchange process data in `test_bring_up`.
-NOT_YET = {"two_pulses", "many_commands_and_slow"}
-
-
-@pytest.mark.parametrize("name", [name for name in SAMPLES if name not in NOT_YET])
+@pytest.mark.parametrize("name", SAMPLES)
 async def test_scan_jog_scope_and_response_with_the_file_alone(
     namespace: Namespace,
     name: str,

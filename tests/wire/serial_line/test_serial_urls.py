@@ -80,7 +80,7 @@ def test_the_remedy_is_an_example_of_that_bus(text: str, kinds: list[str]) -> No
         kind for kind in ("ethercat", "canopen", "modbus", "mlink") if f"{kind}:" in reported
     ] == (kinds)
     # An example that would be refused itself were no help.
-    for example in reported.removeprefix("write it like ").split(" or "):
+    for example in reported.removeprefix("write it like ").split(", "):
         parse_url(example)
 
 
