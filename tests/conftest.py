@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from drivers.computer.scheduling import VIRTUAL_PRIORITY
+from tests.support.hang import EndsWhatHangs
+
 _ROOT = Path(__file__).resolve().parents[1]
 _homes = pytest.StashKey[tempfile.TemporaryDirectory[str]]()
 
@@ -17,12 +20,18 @@ def pytest_configure(config: pytest.Config) -> None:
 
     The cache is shared by all tests: it holds only what is made from the project's own files.
     """
+    config.pluginmanager.register(EndsWhatHangs(), "ends-what-hangs")
     home = tempfile.TemporaryDirectory(prefix="servodeck-tests-")
     config.stash[_homes] = home
     os.environ["XDG_DATA_HOME"] = str(Path(home.name) / "data")
     os.environ["XDG_CONFIG_HOME"] = str(Path(home.name) / "config")
     os.environ["XDG_STATE_HOME"] = str(Path(home.name) / "state")
     os.environ["XDG_CACHE_HOME"] = str(_ROOT / ".pytest_cache" / "user")
+    # Tests share two cores: a second BLAS thread waits for the first. Child processes inherit it.
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    # Virtual drives and the masters beside them keep their time however busy the computer is.
+    os.environ[VIRTUAL_PRIORITY] = "20"
     for name in ("SERVODECK_PROFILES", "SERVODECK_CACHE", "SERVODECK_SERVER"):
         os.environ.pop(name, None)
 

@@ -10,13 +10,16 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import FrameType
 from typing import IO, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -49,6 +52,8 @@ AT_IDLE = ["chrt", "--idle", "0"]
 BEHIND = ["nice", "-n", "10"]
 
 
+#: No check takes as long, in s: one that does hangs, and ends with all that it has started.
+LIMIT_S = 2400.0
 #: Of every suite what ran, as JUnit XML.
 REPORTS = ".pytest_cache/reports"
 TWO = ["-n", "2", "--dist", "loadfile"]
@@ -126,7 +131,10 @@ class Runner:
         """What failed in suites, to be run once more when nothing else runs."""
         self._out = out
         self._before = before
-        self._environment = os.environ | {"PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
+        self._environment = os.environ | {
+            "PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}",
+            "PYTHONUNBUFFERED": "1",
+        }
 
     def run(self, checks: Sequence[Check], *, last: bool = False) -> None:
         """Run them in turn; what they print goes where this prints.
@@ -151,10 +159,42 @@ class Runner:
 
     def _once(self, command: Sequence[str], folder: Path) -> int:
         whole = [*self._before, *command]
-        return subprocess.run(
-            whole, cwd=folder, env=self._environment, check=False,
-            stdout=self._out, stderr=subprocess.STDOUT,
-        ).returncode  # fmt: skip
+        with subprocess.Popen(
+            whole, cwd=folder, env=self._environment, stdout=self._out, stderr=subprocess.STDOUT,
+            start_new_session=True,
+        ) as process, _ended_with_this(process):  # fmt: skip
+            try:
+                return process.wait(LIMIT_S)
+            except subprocess.TimeoutExpired:
+                self._say(f"== ended after {LIMIT_S:.0f} s, as it hangs")
+                return HANGS
+
+
+HANGS = 124
+"""The exit code of a check that was ended, as of timeout(1)."""
+_running: set[int] = set()
+
+
+@contextmanager
+def _ended_with_this(process: subprocess.Popen[bytes]) -> Iterator[None]:
+    """Whatever a check has started in its session ends with it."""
+    _running.add(process.pid)
+    try:
+        yield
+    finally:
+        _running.discard(process.pid)
+        _end(process.pid)
+
+
+def _end(group: int) -> None:
+    with suppress(ProcessLookupError):
+        os.killpg(group, signal.SIGKILL)
+
+
+def _interrupted(number: int, _frame: FrameType | None) -> None:
+    for group in tuple(_running):
+        _end(group)
+    os._exit(128 + number)
 
 
 def last_failed(name: str) -> list[str]:
@@ -172,6 +212,8 @@ def last_failed(name: str) -> list[str]:
 
 def main() -> int:
     """Run the checks; the exit code is the number of those that failed."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupted)
     shutil.rmtree(ROOT / ".pytest_cache", ignore_errors=True)
     runner = Runner(sys.stdout)
     run_quick(runner)

@@ -11,6 +11,8 @@ import os
 import platform
 import sys
 
+VIRTUAL_PRIORITY = "SERVODECK_VIRTUAL_PRIORITY"
+"""Environment variable with the SCHED_FIFO priority of processes that stand for hardware."""
 _PR_SET_TIMERSLACK = 29
 _SYS_SCHED_SETATTR = {"x86_64": 314, "aarch64": 274, "riscv64": 274}
 SHORT_SLICE_NS = 100_000
@@ -50,6 +52,17 @@ def real_time(priority: int) -> bool:
     except OSError:
         return False
     return True
+
+
+def virtual_priority() -> bool:
+    """SCHED_FIFO for a process that stands for hardware, where the environment asks for it.
+
+    A real drive answers however busy the engineer's computer is. `VIRTUAL_PRIORITY` is set where
+    other work shares the computer with the virtual drives, as in the tests. False where nothing
+    is asked for, the value is no priority, or the system does not permit it.
+    """
+    asked = os.environ.get(VIRTUAL_PRIORITY, "")
+    return asked.isdecimal() and 0 < int(asked) < 100 and real_time(int(asked))
 
 
 def short_slice() -> bool:

@@ -22,6 +22,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
+from drivers.computer import scheduling
 from drivers.errors import DriveError
 from drivers.urls import parse_url
 from drivers.virtual.bench import AxisSpec, BenchSpec, load_bench
@@ -243,6 +244,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--folder", type=Path, required=True)
     parser.add_argument("--nvm", type=Path)
     options = parser.parse_args(argv)
+    scheduling.virtual_priority()
     try:
         wires = Wires(load_bench(options.bench), options.folder, options.nvm)
         wires.start()

@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 
+from drivers.computer import scheduling
 from drivers.computer.namespaces import (
     AVAILABLE,
     disable_ipv6,
@@ -233,6 +234,8 @@ def _main(argv: Sequence[str]) -> int:
     if argv[:1] == ["--hold"]:
         return _hold(argv[1:])
     if len(argv) > 3 and argv[0] == "--join" and argv[2] == "--":
+        # A user namespace has no right to ask for it any more.
+        scheduling.virtual_priority()
         try:
             enter(int(argv[1]))
         except NamespaceUnavailable as error:
