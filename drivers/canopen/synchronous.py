@@ -98,6 +98,7 @@ class SyncLoop:
         self._stopping = False
         self._cycle = 0
         self._sent_cycle = -1
+        self._sync_late_s = 0.0
         self._block_cycle = 0
         self._arrived: dict[int, bytes] = {}
         self._came: set[int] = set()
@@ -275,7 +276,8 @@ class SyncLoop:
                 outgoing.append(self._heartbeat)
             self._exchange(outgoing)
             with self._lock:
-                self._statistics.late(1e6 * (now_s - due_s))
+                self._sync_late_s = max(now_s - due_s, 0.0)
+                self._statistics.late(1e6 * self._sync_late_s)
                 self._statistics.cycles += 1
                 self._sent_cycle = self._cycle
                 self._cycle += 1
@@ -326,7 +328,7 @@ class SyncLoop:
         for station, axis in self.images.axes.items():
             if station in complete:
                 self._silent_s[station] = 0.0
-                axis.step(self.images.values)  # type: ignore[arg-type]
+                axis.step(self.images.values, self._sync_late_s)  # type: ignore[arg-type]
             else:
                 self._silent(station, axis)
         for station in self.images.axes:

@@ -110,6 +110,7 @@ class AxisLoop:
         self._moved_at_stop = 0
         self._cycle_s = cycle_s
         self._cycles = 0
+        self._sampled_s = 0.0
         self._speed_guard = SpeedGuard(None, None)
 
     # Commands ------------------------------------------------------------------------------
@@ -224,9 +225,13 @@ class AxisLoop:
 
     # One cycle -----------------------------------------------------------------------------
 
-    def step(self, values: Sequence[int]) -> None:
-        """Outputs of the next cycle from the inputs of this one, which must be valid."""
+    def step(self, values: Sequence[int], late_s: float = 0.0) -> None:
+        """Outputs of the next cycle from the inputs of this one, which must be valid.
+
+        ``late_s``: by how much the inputs were sampled after their place in the grid of cycles.
+        """
         self._cycles += 1
+        self._sampled_s = self._cycles * self._cycle_s + late_s
         place = self._in.get(MODE_SHOWN)
         if place is not None:
             self._mode = values[place]
@@ -259,6 +264,8 @@ class AxisLoop:
         """
         self._cycles += 1
         if self.phase is not Phase.IDLE:
+            if self.phase is not Phase.BRAKING:
+                self._age(1)
             self._advance()
         elif self.goal not in (None, State.OPERATION_ENABLED) and CONTROL in self._out:
             word = self.outputs[self._out[CONTROL]]
@@ -266,8 +273,13 @@ class AxisLoop:
                 self.outputs[self._out[CONTROL]] = self._dialect.quick_stop
 
     def skip(self, cycles: int) -> None:
-        """Cycles that the computer was too late for: time passed, and nothing was exchanged."""
+        """Cycles that the computer was too late for: time passed, and nothing was exchanged.
+
+        Setpoints grow older by all of them; an axis whose setpoints expired brakes in the next
+        cycle.
+        """
         self._cycles += cycles
+        self._life -= cycles
         self._speed_guard.gap()
 
     def _fell_out(self, word: int) -> None:
@@ -293,9 +305,7 @@ class AxisLoop:
     def _guard(self, values: Sequence[int]) -> None:
         """Envelope and expiry; a violation begins to brake in this very cycle."""
         assert self._motion is not None
-        self._life -= 1
-        if self._life < 0:
-            self.stop(Halted(HaltCause.EXPIRED))
+        if self._age(1):
             return
         limits = self._motion.limits
         position = self._value(values, ACTUAL_POSITION)
@@ -307,9 +317,8 @@ class AxisLoop:
                 self.stop(Halted.beyond("position", position, limits.position_max))
                 return
         velocity = self._value(values, ACTUAL_VELOCITY)
-        at_s = self._cycles * self._cycle_s
         place = None if position is None else round(position)
-        halt = self._speed_guard.look(place, velocity, at_s)
+        halt = self._speed_guard.look(place, velocity, self._sampled_s)
         if halt is not None:
             self.stop(halt)
             return
@@ -322,6 +331,14 @@ class AxisLoop:
             error = self._following_error(values)
             if abs(error) > limits.following_error_max:
                 self.stop(Halted.beyond("following error", error, limits.following_error_max))
+
+    def _age(self, cycles: int) -> bool:
+        """Whether setpoints that nobody renewed are too old now; the axis then brakes."""
+        self._life -= cycles
+        expired = self._life < 0
+        if expired:
+            self.stop(Halted(HaltCause.EXPIRED))
+        return expired
 
     def _no_faster_than_it_turns(self, values: Sequence[int]) -> None:
         """What does not follow (a blocked axis) is braked from its own speed, not that of the ramp.

@@ -111,6 +111,7 @@ class CyclicLoop:
         self._invalid_run = 0
         self._phase = GridPhase(cycle_ns)
         self._late_ns = 0
+        self._sampled_late_s = 0.0
         self._resynced = 0
         self._lockstep = lockstep
         self._real_next_ns = 0
@@ -210,8 +211,19 @@ class CyclicLoop:
             self._resynced = RESYNCED
         late_us = late // 1000
         self._late_ns = late
+        self._sampled_late_s = self._sampling_delay_ns(late % self.cycle_ns) * 1e-9
         self.counters.late[min(late_us.bit_length(), _LATE_BINS - 1)] += 1
         self.counters.late_max_us = max(self.counters.late_max_us, late_us)
+
+    def _sampling_delay_ns(self, late: int) -> int:
+        """How much later than the grid the inputs of a late frame were sampled.
+
+        By SYNC0 they are sampled with the grid, half a cycle before the frame; a frame that passes
+        after the next SYNC0 gets the sample of that one. Without SYNC0 the frame samples.
+        """
+        if not self.dc:
+            return late
+        return self.cycle_ns if 2 * late > self.cycle_ns else 0
 
     def _exchange(self) -> int:
         self._segment.discard_late_frames()
@@ -242,7 +254,7 @@ class CyclicLoop:
     def _decide(self, image: Image, slave: object, *, valid: bool) -> None:
         axis = image.axis
         if valid and not image.lost:
-            axis.step(image.unpack(image.inputs))
+            axis.step(image.unpack(image.inputs), self._sampled_late_s)
         else:
             axis.blind()
         try:

@@ -24,17 +24,17 @@ RELEASED = Halted(HaltCause.COMMANDED)
 class Bench:
     """An axis whose drive does at once what its control word says."""
 
-    def __init__(self, position: int = 500) -> None:
+    def __init__(self, position: int = 500, cycle_s: float = CYCLE_S) -> None:
         self.reported: list[str] = []
         self.axis = AxisLoop(
-            1, inputs=IN, outputs=OUT, output_count=6, cycle_s=CYCLE_S,
+            1, inputs=IN, outputs=OUT, output_count=6, cycle_s=cycle_s,
             report=lambda _station, text: self.reported.append(text),
         )  # fmt: skip
         self.status, self.position, self.speed, self.torque, self.mode = DISABLED, position, 0, 0, 8
 
-    def step(self, cycles: int = 1) -> None:
+    def step(self, cycles: int = 1, late_s: float = 0.0) -> None:
         for _ in range(cycles):
-            self.axis.step((self.status, self.position, self.speed, self.torque, self.mode))
+            self.axis.step((self.status, self.position, self.speed, self.torque, self.mode), late_s)
 
     def obey(self, cycles: int = 6) -> None:
         for _ in range(cycles):
@@ -422,6 +422,46 @@ def test_cycles_that_were_skipped_are_no_speed_beyond_its_limit(last: int) -> No
         bench.step()
     assert bench.axis.halted is None
     assert bench.axis.phase is Phase.PLAYING
+
+
+@pytest.mark.parametrize("dated", [True, False])
+def test_a_late_exchange_makes_no_speed(dated: bool) -> None:
+    """5000 inc/s at a limit of 5050; for 20 of 40 cycles of 8 ms the samples are 7 ms late."""
+    cycle_s = 0.008
+    bench = Bench(cycle_s=cycle_s).enabled()
+    bench.play(
+        [500 + 40 * n for n in range(300)],
+        limits=Limits(speed_max=5050.0, feedback=FeedbackScale(1.0, 50.0)),
+        renew=300,
+    )
+    bench.speed = 5000
+    for cycle in range(250):
+        late_s = 0.007 if cycle // 20 % 2 else 0.0
+        bench.position = 500 + round(5000 * (cycle * cycle_s + late_s))
+        bench.step(late_s=late_s if dated else 0.0)
+    assert (bench.axis.halted is None) is dated, "undated, the position seems to run too fast"
+
+
+def test_setpoints_expire_in_cycles_without_trusted_inputs_too() -> None:
+    bench = Bench().enabled()
+    bench.play(list(range(500, 5000, 10)), renew=50)
+    bench.step(10)
+    for _ in range(39):
+        bench.axis.blind()
+    assert bench.axis.halted is None
+    bench.axis.blind()
+    bench.axis.blind()
+    assert bench.axis.halted == Halted(HaltCause.EXPIRED)
+    assert bench.axis.phase is Phase.BRAKING
+
+
+def test_setpoints_grow_older_over_skipped_cycles() -> None:
+    bench = Bench().enabled()
+    bench.play(list(range(500, 5000, 10)), renew=50)
+    bench.step(10)
+    bench.axis.skip(40)
+    bench.step()
+    assert bench.axis.halted == Halted(HaltCause.EXPIRED)
 
 
 def test_an_axis_that_braked_without_trusted_inputs_is_commanded_to_quick_stop() -> None:
