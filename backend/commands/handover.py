@@ -15,7 +15,7 @@ from backend.commands.options import Json, Profile, Server, Station, Url, place
 from backend.commands.printing import note, print_text, words_of
 from backend.commands.session import run
 from backend.commands.values import bytes_of
-from backend.handover.conflicts import Verdict, changed_since
+from backend.handover.conflicts import Conflict, Verdict, changed_since
 from backend.handover.conflicts import compare as compared
 from backend.handover.files import (
     FORMATS,
@@ -31,6 +31,7 @@ from backend.handover.read import read_list
 from backend.parameters.set_file import ParameterSet, parse
 from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
+from drivers.texts.message import joined, language
 from profiles import load_profile
 from profiles.schema import Raw
 
@@ -116,11 +117,11 @@ def _show_export(
     for axis in axes:
         place = f"{axis.name}: " if len(axes) > 1 else ""
         for each in axis.left_out:
-            print_text("printed.left-out", place=place, key=each.key, reason=str(each.reason))
-        for words in axis.notes:
-            print_text("printed.note", words=f"{place}{words}")
+            print_text("printed.left-out", place=place, key=each.key, reason=each.reason)
+        for heeded in axis.notes:
+            print_text("printed.note", words=joined([place, heeded], "") if place else heeded)
     for remark in remarks(axes, form):
-        print_text("printed.note", words=str(remark))
+        print_text("printed.note", words=remark)
     print(f"sha256: {digest(files[out.name])}")
 
 
@@ -175,17 +176,26 @@ def _same_family(content: ParameterSet | None, now: Now) -> None:
         )
 
 
+def _conflict(conflict: Conflict) -> dict[str, object]:
+    return asdict(conflict) | {"sentence": conflict.sentence.words(language())}
+
+
 def _show(verdict: Verdict, form: str, *, as_json: bool) -> None:
     if as_json:
-        print(json.dumps({"format": form, **asdict(verdict)}, indent=1))
+        found = {"format": form, **asdict(verdict)}
+        found["conflicts"] = [_conflict(each) for each in verdict.conflicts]
+        found["findings"] = [
+            asdict(each) | {"text": each.text.words(language())} for each in verdict.findings
+        ]
+        print(json.dumps(found, indent=1))
         return
     for conflict in verdict.conflicts:
         both = ""
         if conflict.drive is not None:
             both = f" {words_of('printed.drive-now', value=str(conflict.drive))}"
-        print(f"{conflict.consequence}: {conflict.sentence}{both}")
+        print(f"{conflict.consequence}: {conflict.sentence.words(language())}{both}")
     for finding in verdict.findings:
-        print(f"{finding.kind}: {finding.text}")
+        print(f"{finding.kind}: {finding.text.words(language())}")
     if verdict.unknown_here:
         keys = ", ".join(verdict.unknown_here)
         print_text("printed.not-compared", keys=keys)
@@ -217,11 +227,11 @@ def watch(
         changes = changed_since(now.profile, ours, now.raws)
         unread = sorted(key for key in ours if now.raws.get(key) is None)
         if as_json:
-            found = {"changed": [asdict(each) for each in changes], "not_read": unread}
+            found = {"changed": [_conflict(each) for each in changes], "not_read": unread}
             print(json.dumps(found, indent=1))
             return
         for each in changes:
-            print(f"{each.consequence}: {each.sentence}")
+            print(f"{each.consequence}: {each.sentence.words(language())}")
         _show_unread(unread)
         print_text("printed.changed-since", name=now.name, changed=len(changes), count=len(ours))
 

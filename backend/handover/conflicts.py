@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal, Protocol
 
 from backend.handover.model import (
@@ -19,11 +20,30 @@ from backend.handover.read import ControllerList, Listed
 from backend.motion.classes import motion_of
 from drivers.codec import decode, encode, size_of
 from drivers.errors import DriveError
+from drivers.texts.message import Param, Text, text
 from profiles.schema import Parameter, Profile, Raw
 
 Defect = Literal[
     "unknown", "read_only", "size", "range", "twice", "order", "state", "energises", "locks"
 ]
+_DEFECTS: dict[Defect, str] = {
+    "unknown": "handover.defect-unknown",
+    "read_only": "handover.defect-read-only",
+    "size": "handover.defect-size",
+    "range": "handover.defect-range",
+    "twice": "handover.defect-twice",
+    "order": "handover.defect-order",
+    "state": "handover.defect-state",
+    "energises": "handover.defect-energises",
+    "locks": "handover.defect-locks",
+}
+_OVERWRITES: dict[Consequence, str] = {
+    "gain": "handover.overwrites-gain",
+    "limit": "handover.overwrites-limit",
+    "unit": "handover.overwrites-unit",
+    "motion": "handover.overwrites-motion",
+    "other": "handover.overwrites-other",
+}
 #: On the way up, with the mailbox working (ETG.1000.6); empty where the format states none.
 _STATES = ("IP", "PS", "SO", "")
 
@@ -42,7 +62,7 @@ class Conflict:
     ours: Raw | None
     drive: Raw | None
     consequence: Consequence
-    sentence: str
+    sentence: Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +72,7 @@ class Finding:
     kind: Defect
     key: str
     place: str
-    text: str
+    text: Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +169,7 @@ def changed_since(
             continue
         name = " ".join(parameter.name.split())
         before, after = shown(parameter, raw), shown(parameter, now)
-        sentence = f"{name} ({key}) was handed over as {before} and is {after} now"
+        sentence = text("handover.changed-since", name=name, key=key, before=before, after=after)
         kind = consequence(profile, parameter)
         found.append(Conflict(key, name, now, raw, now, kind, sentence))
     return tuple(found)
@@ -177,17 +197,11 @@ def _conflict(
     before = ours if ours is not None else drive
     assert before is not None
     name = " ".join(parameter.name.split())
-    change = f"{shown(parameter, before)} becomes {shown(parameter, raw)}"
-    sentences: dict[Consequence, str] = {
-        "gain": f"the controller will undo your tuning of {name} ({parameter.key}): {change}",
-        "limit": f"the controller will change the limit {name} ({parameter.key}): {change}",
-        "unit": f"the controller will change units or gearing, {name} ({parameter.key}): {change}; "
-        "every position and speed then means something else",
-        "motion": f"the controller will write {name} ({parameter.key}), which can move the motor: "
-        f"{change}",
-        "other": f"the controller will overwrite {name} ({parameter.key}): {change}",
-    }
-    return Conflict(parameter.key, name, raw, ours, drive, kind, sentences[kind])
+    sentence = text(
+        _OVERWRITES[kind],
+        name=name, key=parameter.key, before=shown(parameter, before), after=shown(parameter, raw),
+    )  # fmt: skip
+    return Conflict(parameter.key, name, raw, ours, drive, kind, sentence)
 
 
 def diagnose(profile: Profile, listed: ControllerList) -> tuple[Finding, ...]:
@@ -198,49 +212,52 @@ def diagnose(profile: Profile, listed: ControllerList) -> tuple[Finding, ...]:
     for write in listed.writes:
         parameter = profile.by_key.get(write.key)
 
-        def note(kind: Defect, text: str, at: Listed = write) -> None:
-            found.append(Finding(kind, at.key, at.place, f"{at.place}: {at.key}: {text}"))
-
+        note = partial(_noted, found, write)
         if write.key in seen:
-            note("twice", f"written before at {seen[write.key]}; the last value counts")
+            note("twice", before=seen[write.key])
         seen.setdefault(write.key, write.place)
         if write.transition not in _STATES:
-            note("state", f"written at {write.transition[:10]}, which is not on the way up")
+            note("state", transition=write.transition[:10])
         if parameter is None:
-            note("unknown", f"{profile.title} has no such object")
+            note("unknown", title=profile.title)
             continue
         _check(profile, parameter, write, note)
         place = rank(profile, parameter)
         if listed.ordered and place <= 0 < highest:
-            note("order", f"units or gearing are written after {before}, which depends on them")
+            note("order", before=before)
         if place > highest:
             highest, before = place, write.key
     return tuple(found)
 
 
+def _noted(found: list[Finding], at: Listed, kind: Defect, /, **facts: Param) -> None:
+    words = text(_DEFECTS[kind], place=at.place, key=at.key, **facts)
+    found.append(Finding(kind, at.key, at.place, words))
+
+
 class _Note(Protocol):
     """The function that notes a finding."""
 
-    def __call__(self, kind: Defect, text: str) -> None: ...
+    def __call__(self, kind: Defect, /, **facts: Param) -> None: ...
 
 
 def _check(profile: Profile, parameter: Parameter, write: Listed, note: _Note) -> None:
     if parameter.access == "ro":
-        note("read_only", "it is read only; the drive refuses and the controller stays in Pre-Op")
+        note("read_only")
         return
     if motion_of(parameter) == "energises":
-        note("energises", "writing it can move the motor; it has no place in a start-up list")
+        note("energises")
     size = size_of(parameter.type)
     if size is None:
         return
     if size != len(write.data):
-        note("size", f"{len(write.data)} bytes for a {parameter.type} of {size}")
+        note("size", length_bytes=len(write.data), type=parameter.type, size_bytes=size)
         return
     raw = decode(parameter.type, write.data)
     if locks(profile, parameter, raw):
-        note("locks", "it locks every other parameter; the drive refuses what follows")
+        note("locks")
     low, high = parameter.raw_limits
     if not isinstance(raw, str) and (
         (low is not None and raw < low) or (high is not None and raw > high)
     ):
-        note("range", f"{raw} is outside {low} to {high}")
+        note("range", raw=raw, low=low, high=high)

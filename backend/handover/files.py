@@ -14,6 +14,7 @@ from backend.handover.esi import controller_of
 from backend.handover.model import AxisHandover
 from backend.parameters.set_file import BadSet
 from drivers.errors import NotAllowed
+from drivers.texts.message import Text, text
 
 Format = Literal["twincat", "codesys", "eni", "lcec", "ros2", "igh", "dcf", "csv", "python"]
 FORMATS: tuple[str, ...] = get_args(Format)
@@ -67,17 +68,13 @@ def fitting(axis: AxisHandover, form: Format) -> AxisHandover:
     return ros2_files.carried(axis) if form == "ros2" else axis
 
 
-def remarks(axes: Sequence[AxisHandover], form: Format) -> tuple[str, ...]:
+def remarks(axes: Sequence[AxisHandover], form: Format) -> tuple[Text, ...]:
     """What a person must know of this very format before the file is used."""
     found = []
     if form == "eni" and not is_complete(axes):
-        found.append(
-            "no master can run this ENI: it has no mailbox addresses, registers and frames; "
-            "give each drive's ESI file"
-        )
+        found.append(text("handover.note-incomplete-eni"))
     found += [
-        f"{axis.name}: the vendor ID of the set is 0, which no drive has on EtherCAT: a controller "
-        "that compares identities finds no such drive"
+        text("handover.note-no-vendor", drive=axis.name)
         for axis in axes
         if form in _WITH_IDENTITY and axis.vendor_id == 0 and axis.profile.link("ethercat")
     ]

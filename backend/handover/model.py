@@ -14,6 +14,7 @@ from backend.motion.classes import motion_of
 from backend.parameters.set_file import ParameterSet
 from drivers.codec import encode, size_of
 from drivers.errors import DriveError, NotAllowed
+from drivers.texts.message import Text, joined, prose, text
 from profiles.schema import DataType, Parameter, Profile, Raw
 
 Transition = Literal["PS", "SO"]
@@ -23,6 +24,13 @@ Choice = Literal["all", "tuned", "not_default"]
 #: CoE start-up values are written from Pre-Operational to Safe-Operational (ETG.1000.6: SDO works
 #: from Pre-Operational on), before process data flow. No profile names an object that needs later.
 DEFAULT_TRANSITION: Transition = "PS"
+#: Code of the note that names the values which process data overwrite.
+OVERWRITTEN = "handover.note-process-data-overwrite"
+#: By when a written value acts, of those that do not act at once: the code of the note.
+_ACT_AFTER = {
+    "power_cycle": "handover.note-act-after-power-cycle",
+    "write_settings": "handover.note-act-after-write-settings",
+}
 #: Cycle that is proposed where the profile prints no longer minimum.
 PROPOSED_CYCLE_US = 1000
 #: SYNC0 without SYNC1 (ETG.1020 AssignActivate); the drive's ESI file has the last word.
@@ -65,7 +73,7 @@ class LeftOut:
     """A row of the set that is not handed over, and why."""
 
     key: str
-    reason: str
+    reason: Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +111,7 @@ class AxisHandover:
     pdos: tuple[MappedPdo, ...]
     cycle_us: int
     distributed_clock: bool
-    notes: tuple[str, ...] = ()
+    notes: tuple[Text, ...] = ()
     controller: SlaveController | None = None
     """Of the drive's ESI file, where one was given."""
 
@@ -221,19 +229,19 @@ def hand_over(
             continue
         why = _why_not(parameter, row.raw, motor_individual=motor_individual)
         if row.key in seen:
-            why = "given twice in the set; the first one counts"
+            why = text("handover.left-out-twice")
         if parameter and row.raw is not None and locks(profile, parameter, row.raw):
-            why = "locks every other parameter: the drive would refuse the list at the next start"
+            why = text("handover.left-out-locks")
         seen.add(row.key)
-        if why or parameter is None or row.raw is None:
-            left.append(LeftOut(row.key, row.problem or why))
+        if row.problem or why is not None or parameter is None or row.raw is None:
+            bad = prose(row.problem) if row.problem else text("handover.left-out-bad-row")
+            left.append(LeftOut(row.key, bad if row.problem or why is None else why))
             continue
         writes.append(write_of(parameter, row.raw))
     if not writes:
-        raise NotAllowed(
-            "handover.nothing-to-hand-over",
-            why=f" ({left[0].key}: {left[0].reason})" if left else "",
-        )
+        if left:
+            raise NotAllowed("handover.nothing-but-left-out", key=left[0].key, why=left[0].reason)
+        raise NotAllowed("handover.nothing-to-hand-over")
     writes.sort(key=lambda w: (rank(profile, profile.by_key[w.key]), w.index, w.subindex))
     return _axis(content, profile, writes, left)
 
@@ -248,48 +256,50 @@ def write_of(parameter: Parameter, raw: Raw, transition: Transition = "PS") -> S
     )  # fmt: skip
 
 
-def _why_not(parameter: Parameter | None, raw: Raw | None, *, motor_individual: bool) -> str:
-    """Why a row has no place in a start-up list; empty where it has."""
+def _why_not(
+    parameter: Parameter | None, raw: Raw | None, *, motor_individual: bool
+) -> Text | None:
+    """Why a row has no place in a start-up list; None where it has."""
     if parameter is None:
-        return "the family has no such parameter"
+        return text("handover.left-out-no-parameter")
     if raw is None:
-        return "the row of the set is bad"
+        return text("handover.left-out-bad-row")
     if parameter.index is None:
-        return "only Modbus reaches it: a start-up list of objects cannot write it"
+        return text("handover.left-out-modbus")
     if parameter.access == "ro":
-        return "read only"
+        return text("handover.left-out-read-only")
     if motion_of(parameter) == "energises":
-        return "writing it can move the motor: it has no place in a start-up list"
+        return text("handover.left-out-energises")
     if parameter.motor_individual and not motor_individual:
-        return "belongs to one motor; --motor-individual includes it"
+        return text("handover.left-out-motor")
     if size_of(parameter.type) is None:
-        return "text and octets have no fixed size"
+        return text("handover.left-out-no-size")
     low, high = parameter.raw_limits
     try:
         encode(parameter.type, raw)
     except DriveError as error:
-        return error.message
+        return error.text
     if not isinstance(raw, str) and (
         (low is not None and raw < low) or (high is not None and raw > high)
     ):
-        return f"{raw} is outside {low} to {high}"
-    return ""
+        return text("handover.left-out-range", raw=raw, low=low, high=high)
+    return None
 
 
 def _axis(
     content: ParameterSet, profile: Profile, writes: list[StartupWrite], left: list[LeftOut]
 ) -> AxisHandover:
-    notes: list[str] = []
+    notes: list[Text] = []
     quirk = profile.quirk("write_settings")
     if quirk is not None:
-        notes.append(f"{quirk.key}: {' '.join(quirk.help.split())}")
+        notes.append(joined([prose(quirk.key or ""), prose(" ".join(quirk.help.split()))], ": "))
     late: dict[str, list[str]] = {}
     for write in writes:
         effective = profile.by_key[write.key].effective
-        if effective in ("power_cycle", "write_settings"):
+        if effective in _ACT_AFTER:
             late.setdefault(effective, []).append(write.key)
     for when, keys in late.items():
-        notes.append(f"act only after {when.replace('_', ' ')}: {', '.join(keys)}")
+        notes.append(text(_ACT_AFTER[when], keys=", ".join(keys)))
     ident = profile.identity
     pdo = profile.pdo
     pdos = _pdos(profile)
@@ -298,7 +308,7 @@ def _axis(
     }
     cyclic = sorted({write.key for write in writes} & mapped)
     if cyclic:
-        notes.append(f"process data overwrite in every cycle: {', '.join(cyclic)}")
+        notes.append(text(OVERWRITTEN, keys=", ".join(cyclic)))
     return AxisHandover(
         name=content.drive_name or profile.title,
         profile=profile,

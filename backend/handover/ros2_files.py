@@ -10,6 +10,7 @@ from xml.sax.saxutils import escape
 from backend.handover.model import AxisHandover, LeftOut, MappedEntry, StartupWrite
 from backend.handover.text_lists import line_of, number_type
 from drivers.errors import NotAllowed
+from drivers.texts.message import text
 
 #: ethercat_driver_ros2 reads each value into a C++ `int` and casts it to the type that is named.
 _INT_LOW, _INT_HIGH = -(1 << 31), (1 << 31) - 1
@@ -43,12 +44,12 @@ def carried(axis: AxisHandover) -> AxisHandover:
     wired = axis.profile.link("ethercat") is not None
     writes, left = [], []
     for write in axis.writes:
-        why = ""
+        why = None
         if wired and value_of(write) is None:
-            why = "ethercat_driver_ros2 reads values of 32 bits with a sign; this one is larger"
+            why = text("handover.left-out-larger-32-bits")
         if not wired and write.type == "REAL32":
-            why = "bus.yml of ros2_canopen carries whole numbers alone"
-        if why:
+            why = text("handover.left-out-no-real")
+        if why is not None:
             left.append(LeftOut(write.key, why))
         else:
             writes.append(write)

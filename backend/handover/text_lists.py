@@ -81,7 +81,7 @@ def igh(axis: AxisHandover) -> bytes:
     lines = [
         "#!/bin/sh",
         f"# Start-up values of {line_of(axis.name)}, to be written in Pre-Operational.",
-        *(f"# {line_of(note)}" for note in axis.notes),
+        *(f"# {line_of(note.words())}" for note in axis.notes),
         'POS="${1:?usage: $0 POSITION}"',
         "set -eu",
         "# The state is left as it is: taking a running axis out of Operational would stop it.",
@@ -220,8 +220,9 @@ def sheet(axis: AxisHandover) -> bytes:
         + ", ".join(f"{line_of(e.name)} ({e.bits} bits)" for e in pdo.entries)
         for pdo in axis.pdos
     ]
-    lines += ["", "To heed", *(f"  {line_of(note)}" for note in axis.notes or ("nothing",))]
-    lines += ["", "Left out", *(f"  {e.key}: {line_of(e.reason)}" for e in axis.left_out)]
+    notes = [note.words() for note in axis.notes] or ["nothing"]
+    lines += ["", "To heed", *(f"  {line_of(note)}" for note in notes)]
+    lines += ["", "Left out", *(f"  {e.key}: {line_of(e.reason.words())}" for e in axis.left_out)]
     return "\n".join([*lines, ""]).encode()
 
 

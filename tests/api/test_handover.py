@@ -206,6 +206,19 @@ def check_segment(station: Station, x: str, y: str, held: str) -> None:
     assert nobody.status_code == 404
 
 
+def test_reasons_are_in_the_language_that_is_asked_for(station: Station, x: str, held: str) -> None:
+    asked = {"set_file": held, "format": "twincat", "file": "start.xml"}
+    answer = station.http.post(
+        f"/drives/{x}/handover", json=asked, headers={"Accept-Language": "zh-CN"}
+    )
+    reasons = {row["reason"] for row in station.ok(answer)["left_out"]}
+    assert reasons
+    assert all(any("\u4e00" <= letter <= "\u9fff" for letter in reason) for reason in reasons)
+    english = {row["reason"] for row in export(station, x, held)["left_out"]}
+    assert len(english) == len(reasons)
+    assert not english & reasons
+
+
 def test_the_script_writes_over_the_api(
     station: Station, x: str, held: str, tmp_path: Path
 ) -> None:

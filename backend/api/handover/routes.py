@@ -38,7 +38,7 @@ from backend.parameters.set_file import BadSet, ParameterSet
 from backend.people.identity import acting_person
 from backend.station.bench import Bench
 from drivers.errors import NotAllowed
-from drivers.texts.message import text
+from drivers.texts.message import language, text
 from profiles.schema import Profile, Raw
 
 router = APIRouter()
@@ -130,13 +130,17 @@ async def _export(
         ],
         writes=sum(len(axis.writes) for axis in axes),
         left_out=[
-            LeftOutRow(drive=axis.name, key=each.key, reason=each.reason)
+            LeftOutRow(drive=axis.name, key=each.key, reason=each.reason.words(language()))
             for axis in axes
             for each in axis.left_out
         ],
         notes=[
-            *(f"{axis.name}: {note}" if several else note for axis in axes for note in axis.notes),
-            *remarks(axes, request.format),
+            *(
+                f"{axis.name}: {note.words(language())}" if several else note.words(language())
+                for axis in axes
+                for note in axis.notes
+            ),
+            *(remark.words(language()) for remark in remarks(axes, request.format)),
         ],
     )
 
@@ -202,7 +206,9 @@ async def compare_handover(
         format=listed.format,
         conflicts=[_conflict(drive.profile, each) for each in verdict.conflicts],
         defects=[
-            HandoverDefect(kind=each.kind, key=each.key, place=each.place, text=each.text)
+            HandoverDefect(
+                kind=each.kind, key=each.key, place=each.place, text=each.text.words(language())
+            )
             for each in verdict.findings
         ],
         not_written=list(verdict.not_written),
@@ -271,5 +277,5 @@ def _conflict(profile: Profile, each: Conflict) -> HandoverConflict:
         key=each.key, name=each.name, unit=parameter.unit, controller=each.controller,
         ours=each.ours, drive=each.drive, controller_value=value(each.controller),
         ours_value=value(each.ours), drive_value=value(each.drive),
-        consequence=each.consequence, sentence=each.sentence,
+        consequence=each.consequence, sentence=each.sentence.words(language()),
     )  # fmt: skip

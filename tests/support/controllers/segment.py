@@ -10,7 +10,7 @@ from defusedxml.ElementTree import fromstring
 
 from backend.handover.eni import eni
 from backend.handover.esi import controller_of
-from backend.handover.model import AxisHandover, hand_over
+from backend.handover.model import OVERWRITTEN, AxisHandover, hand_over
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.wires.ethercat.segment import Segment
 from drivers.virtual.wires.ethercat.slave import Slave
@@ -67,8 +67,8 @@ class Rig:
             now = values(device, settings(profile))
             different = {w.key for w in axis.writes if now[w.key] != w.raw}
             # What is mapped takes the controller's cyclic values, and the hand-over says so.
-            named = {key for note in axis.notes if "overwrite in every" in note for key in different
-                     if key in note}  # fmt: skip
+            named = {key for note in axis.notes if note.code == OVERWRITTEN for key in different
+                     if key in str(note.params["keys"])}  # fmt: skip
             assert different == named
 
 
@@ -106,5 +106,9 @@ def _commands(writes: Iterable[tuple[int, int, bytes, str]]) -> Iterable[Element
 
 def in_every_cycle(axis: AxisHandover) -> set[str]:
     """Keys that process data overwrite, as the hand-over names them."""
-    notes = [note for note in axis.notes if "overwrite in every" in note]
-    return {write.key for write in axis.writes if any(write.key in note for note in notes)}
+    notes = [note for note in axis.notes if note.code == OVERWRITTEN]
+    return {
+        write.key
+        for write in axis.writes
+        if any(write.key in str(note.params["keys"]) for note in notes)
+    }

@@ -100,7 +100,7 @@ def test_thirty_planted_conflicts_are_all_found_and_none_is_invented() -> None:
     assert {kinds[key] for key in LIMITS if key in kinds} == {"limit"}
     for each in verdict.conflicts:
         if each.consequence == "gain":
-            assert each.sentence.startswith("the controller will undo your tuning of ")
+            assert each.sentence.words().startswith("the controller will undo your tuning of ")
 
 
 @pytest.mark.parametrize("form", ["lcec", "codesys", "csv", "igh", "ros2", "eni", "dcf"])

@@ -99,7 +99,7 @@ def test_a_modbus_parameter_is_left_out_with_its_reason() -> None:
     axis = axis_of("ds_c")
     modbus = [each for each in axis.left_out if each.key.startswith("PA_")]
     assert modbus
-    assert all("Modbus" in each.reason for each in modbus)
+    assert all(each.reason.code == "handover.left-out-modbus" for each in modbus)
 
 
 def test_motor_data_needs_consent() -> None:

@@ -49,7 +49,7 @@ def test_what_no_int_holds_is_left_out_and_named() -> None:
     axis = fitting(one("UINT64", 2**40), "ros2")
     assert len(axis.writes) == 1
     assert [each.key for each in axis.left_out][-1:] == ["6072:00"]
-    assert "32 bits" in axis.left_out[-1].reason
+    assert axis.left_out[-1].reason.code == "handover.left-out-larger-32-bits"
     alone = one("INT64", 2**40)
     with pytest.raises(NotAllowed, match="6072:00"):
         fitting(replace(alone, writes=alone.writes[1:]), "ros2")
@@ -118,6 +118,6 @@ def test_a_vendor_of_zero_is_named() -> None:
     from backend.handover.files import remarks
 
     axis = replace(axis_of("mms7"), vendor_id=0)
-    assert any("vendor ID" in note for note in remarks([axis], "lcec"))
+    assert [note.code for note in remarks([axis], "lcec")] == ["handover.note-no-vendor"]
     assert remarks([axis], "twincat") == ()
     assert remarks([axis_of("mms7")], "lcec") == ()

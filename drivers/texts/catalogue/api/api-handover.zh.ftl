@@ -6,5 +6,5 @@ api-handover_esi-file-not-base64 = ESI 文件不是 base64 编码
     .remedy = 请重新发送
 api-handover_larger-bytes = { $file } 大于 { $max_bytes } 字节
     .remedy = 请选择其他文件
-api-handover_no-hand-over = { $drive_name } 没有交接记录 { $value }
+api-handover_no-hand-over = { $drive_name } 没有移交记录 { $value }
     .remedy = 请从列表中选择
