@@ -23,7 +23,7 @@ from __future__ import annotations
 from enum import Enum
 
 from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted
-from drivers.texts.message import Param, Text, as_text, cause_of, joined, prose, text
+from drivers.texts.message import Param, Text, as_text, joined, prose, reason_of, text
 
 
 class DriveError(Exception):
@@ -119,7 +119,7 @@ def internal_error(error: Exception) -> Text:
 
 def why_of(error: Exception) -> Text:
     """What an error says, as a message: of ours its code, of others the words they made."""
-    return error.text if isinstance(error, DriveError) else cause_of(error)
+    return error.text if isinstance(error, DriveError) else reason_of(error)
 
 
 def with_remedy(error: DriveError) -> Text:

@@ -10,7 +10,7 @@ from backend.library.measurements import BadMeasurement, Measurement
 from backend.response_import import stored as response_import
 from backend.tools.registry import BY_KIND
 from backend.tools.sweep import evaluation as sweep_evaluation
-from drivers.texts.message import cause_of
+from drivers.texts.message import reason_of
 
 #: Numbers nearer than this share are the same: another computer sums in another order.
 _SAME = 1e-6
@@ -65,7 +65,7 @@ def recompute(measurement: Measurement) -> dict[str, object]:
         ValueError, KeyError, TypeError, IndexError, AttributeError, ArithmeticError, MemoryError,
     ) as error:  # fmt: skip
         raise BadMeasurement(
-            "station.measurement-not-complete", value=measurement.kind, cause=cause_of(error)
+            "station.measurement-not-complete", value=measurement.kind, cause=reason_of(error)
         ) from error
     raise BadMeasurement("station.measurement-kind-nothing-evaluate", value=measurement.kind)
 

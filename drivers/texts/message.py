@@ -131,11 +131,6 @@ class Unsuitable(ValueError):
         return self.why.words()
 
 
-def cause_of(error: Exception) -> Text:
-    """What an error says: its message, or the words that a library or Python made."""
-    return error.why if isinstance(error, Unsuitable) else prose(str(error))
-
-
 def prose(words: str) -> Text:
     """Words that others made, such as a drive, an operating system or a person."""
     return Text(PROSE, {"words": words})

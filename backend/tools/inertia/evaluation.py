@@ -17,7 +17,7 @@ from backend.tools.measuring.recording import Recording
 from backend.tools.sweep.quiet_velocity import quiet_velocity
 from backend.tools.tool import Arrays, Meta
 from drivers.errors import NotAllowed
-from drivers.texts.message import cause_of
+from drivers.texts.message import reason_of
 
 Scheme = Literal["free", "limited", "taught"]
 
@@ -75,7 +75,7 @@ def evaluate(recording: Recording, settings: InertiaSettings, facts: AxisFacts) 
         raise NotAllowed(
             "inertia.moves-too-short-evaluated",
             limit=f"{settings.envelope.travel_rev:g} rev",
-            cause=cause_of(error),
+            cause=reason_of(error),
         ) from error
     reference = _reference_inertia(facts)
     if found.load_ratio is None and reference and np.isfinite(found.inertia_kgm2.value):

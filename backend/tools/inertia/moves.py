@@ -30,7 +30,7 @@ from backend.tools.sweep import profile_speed
 from drivers.cia402 import Mode
 from drivers.errors import EnvelopeExceeded, NotAllowed, OutOfRange, exceeded
 from drivers.halt import HaltCause
-from drivers.texts.message import cause_of
+from drivers.texts.message import reason_of
 
 _TURN = 2 * np.pi
 #: A ramp shorter than this excites the machine's resonances more than its inertia.
@@ -336,7 +336,7 @@ def _moves(
         )  # fmt: skip
     except ValueError as error:
         raise OutOfRange(
-            "inertia.envelope-not-allow-moves", axis_drive=axis.drive.name, cause=cause_of(error)
+            "inertia.envelope-not-allow-moves", axis_drive=axis.drive.name, cause=reason_of(error)
         ) from error
     duration_s = trajectory.velocity_rad_s.size / rate
     if duration_s > envelope.time_s:

@@ -47,7 +47,7 @@ from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, exceeded
 from drivers.halt import HaltCause
-from drivers.texts.message import cause_of, text
+from drivers.texts.message import reason_of, text
 
 _TURN = 2 * np.pi
 #: Where the notch is tried: share of the sample rate, and limits in Hz.
@@ -219,7 +219,7 @@ def _sequence(
             base=not still,
         )
     except ValueError as error:
-        raise NotAllowed("notch.envelope-not-allow-measure", cause=cause_of(error)) from error
+        raise NotAllowed("notch.envelope-not-allow-measure", cause=reason_of(error)) from error
     # Another period tells no more: tried on axes that turn and on such that tremble.
     return _one_period(made[0])
 

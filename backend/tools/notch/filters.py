@@ -30,7 +30,7 @@ from backend.tools.measuring.temporary import write_settings
 from backend.tools.notch.meaning import NotchMeaning
 from backend.tools.notch.steps import attenuation_steps, hz_steps, level_steps
 from drivers.errors import NotAllowed, OutOfRange
-from drivers.texts.message import Text, Unsuitable, cause_of, text
+from drivers.texts.message import Text, Unsuitable, reason_of, text
 from profiles.schema import NotchSlot, NotchSpec, Parameter, Profile
 
 #: Depth shown for families whose manual prints none; the effect has to be measured.
@@ -137,7 +137,7 @@ def encode(
                 drive=drive,
                 value=f"{notch.center_hz:g} Hz",
                 number=number + 1,
-                cause=cause_of(error),
+                cause=reason_of(error),
             ) from error
     raw |= _enable(profile, slot, notch is not None, enable_now)
     _require_meant(profile, drive, number, notch, raw, meaning)
@@ -298,7 +298,7 @@ async def _read(
     try:
         return _decoded(drive.profile, spec, slot, number, raw, enabled, meaning)
     except ValueError as error:
-        return SlotState(number, enabled, None, None, raw, cause_of(error) if enabled else None)
+        return SlotState(number, enabled, None, None, raw, reason_of(error) if enabled else None)
 
 
 def _decoded(

@@ -41,7 +41,7 @@ from backend.tools.sweep.run import filters_off
 from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed
-from drivers.texts.message import cause_of
+from drivers.texts.message import reason_of
 
 _TURN = 2.0 * np.pi
 #: Whatever a notch may be, the loop's sensitivity stays below this while it is tried.
@@ -122,7 +122,7 @@ class _Beside:
             )
         except ValueError as error:
             raise NotAllowed(
-                "notch.loop-not-identified", drive=name, cause=cause_of(error)
+                "notch.loop-not-identified", drive=name, cause=reason_of(error)
             ) from error  # fmt: skip
         self._loop, self._path = found.loop.controller, found.loop.path
         fixed = gains.loops_of(self.axis.drive, replace(facts, torque_filter_hz=None))

@@ -20,7 +20,7 @@ from backend.tools.sweep import speed_injection
 from backend.tools.sweep.evaluation import Loop, SweepSettings
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts import limits
-from drivers.texts.message import cause_of
+from drivers.texts.message import reason_of
 
 _TURN = 2 * np.pi
 
@@ -173,7 +173,7 @@ def sequences_of(setup: Setup, settings: SweepSettings) -> tuple[excite.Sequence
             base=settings.base_motion, waveform=settings.excitation,
         )  # fmt: skip
     except ValueError as error:
-        raise OutOfRange("sweep.envelope-not-allow-measurement", cause=cause_of(error)) from error
+        raise OutOfRange("sweep.envelope-not-allow-measurement", cause=reason_of(error)) from error
 
 
 def _reference_size(setup: Setup, position: bool) -> tuple[float, float]:

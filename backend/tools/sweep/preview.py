@@ -19,7 +19,7 @@ from backend.tools.measuring import excite
 from backend.tools.measuring.waveform import Band
 from backend.tools.sweep.evaluation import SweepSettings
 from drivers.errors import OutOfRange
-from drivers.texts.message import cause_of
+from drivers.texts.message import reason_of
 
 _TURN = 2 * np.pi
 #: Points of the curve that a page draws; each is the extreme of its stretch.
@@ -69,7 +69,7 @@ async def preview(axis: Axis, settings: SweepSettings, sample_rate_hz: float) ->
         raise OutOfRange(
             "sweep.envelope-not-allow-measurement-widen-travel",
             drive=axis.drive.name,
-            cause=cause_of(error),
+            cause=reason_of(error),
         ) from error
     factor = 100.0 / rated if settings.kind == "mechanics" else _SHOWN[settings.kind][1]
     unit = "% of rated torque" if settings.kind == "mechanics" else _SHOWN[settings.kind][0]

@@ -39,7 +39,7 @@ from backend.work.jobs import Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed, exceeded
 from drivers.halt import HaltCause
-from drivers.texts.message import cause_of, text
+from drivers.texts.message import reason_of, text
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 
@@ -124,7 +124,7 @@ async def sweep(
         return await meanwhile(evaluated, back())
     except ValueError as error:
         raise NotAllowed(
-            "sweep.recording-cannot-evaluated", drive=axis.drive.name, cause=cause_of(error)
+            "sweep.recording-cannot-evaluated", drive=axis.drive.name, cause=reason_of(error)
         ) from error
 
 
