@@ -143,8 +143,8 @@ class Link(Protocol):
     def attach(self, station: int, profile: Profile) -> None:
         """Say which family answers at ``station``: word order, block limits, process data."""
 
-    def unreachable(self, station: int, address: Address) -> str:
-        """Why the link cannot carry this value of the attached family; empty where it can."""
+    def unreachable(self, station: int, address: Address) -> Text | None:
+        """Why the link cannot carry this value of the attached family; None where it can."""
 
     async def scan(
         self,

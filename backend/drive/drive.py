@@ -110,16 +110,16 @@ class Drive:
             why=self.unreachable_why(parameter),
         )
 
-    def unreachable_why(self, parameter: Parameter) -> str:
-        """Empty when some port carries the parameter, else a sentence."""
+    def unreachable_why(self, parameter: Parameter) -> Text | None:
+        """None when some port carries the parameter, else why none does."""
         if any(port.carries(parameter) for port in self.ports):
-            return ""
+            return None
         for port in self.ports:
             if carries(port.link.traits, parameter):
                 return port.why_not(parameter)
-        kinds = " and ".join(sorted({port.link.kind for port in self.ports})) or "no link"
+        kinds = sorted({port.link.kind for port in self.ports})
         needed = "Modbus" if parameter.index is None else "CANopen"
-        return f"it exists only over {needed}, and the drive is connected over {kinds}"
+        return text("drive.exists-only-over", needed=needed, kinds=", ".join(kinds) or "—")
 
     def quality(self) -> LinkQuality:
         """Counters of the first port."""
@@ -258,7 +258,7 @@ class Drive:
                 (i for i, port in enumerate(self.ports) if port.carries(parameter)), None
             )
             if position is None or parameter.access == "wo":
-                why = self.unreachable_why(parameter) or "it can only be written"
+                why = self.unreachable_why(parameter) or text("drive.write-only")
                 result[parameter.key] = Reading(parameter.key, None, None, None, why)
             else:
                 groups.setdefault(position, []).append(parameter)
@@ -306,7 +306,7 @@ class Drive:
 
     def _failed(self, parameter: Parameter, error: DriveError) -> Reading:
         unused = isinstance(error, NotInUse)
-        return Reading(parameter.key, None, None, time.time(), error.message, unused)
+        return Reading(parameter.key, None, None, time.time(), error.text, unused)
 
     def _reading(self, parameter: Parameter, data: bytes) -> Reading:
         raw = decode(parameter.type, data)

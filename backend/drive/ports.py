@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from drivers.link import Address, Link, LinkTraits
+from drivers.texts.message import Text
 from profiles.schema import LinkSpec, Parameter
 
 #: Addresses per call where the link lets a write go between two requests of a batch, and where
@@ -34,10 +35,10 @@ class Port:
 
     def carries(self, parameter: Parameter) -> bool:
         """Whether this port can transport the parameter."""
-        return carries(self.link.traits, parameter) and not self.why_not(parameter)
+        return carries(self.link.traits, parameter) and self.why_not(parameter) is None
 
-    def why_not(self, parameter: Parameter) -> str:
-        """What the link itself has against a parameter that its kind could carry; else empty."""
+    def why_not(self, parameter: Parameter) -> Text | None:
+        """Why the link does not carry a parameter that its kind could carry; None where it does."""
         return self.link.unreachable(self.station, address_of(parameter))
 
 

@@ -17,9 +17,15 @@ class Reading:
     value: Raw | None
     time: float | None
     """Seconds since the epoch, None when never read."""
-    error: str = ""
+    problem: Text | None = None
+    """Why there is no value."""
     unused: bool = False
-    """The drive's own count leaves it out, as ``error`` says: there is nothing to be read."""
+    """The drive's own count leaves it out, as ``problem`` says: there is nothing to be read."""
+
+    @property
+    def error(self) -> str:
+        """The problem in English words; empty where there is none."""
+        return "" if self.problem is None else self.problem.words()
 
 
 @dataclass(frozen=True, slots=True)

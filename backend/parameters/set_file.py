@@ -255,8 +255,9 @@ def _difference(
         return Difference(None, row.key, row.raw, None, "not_in_drive", row.problem or text)
     if row.raw is None:
         return Difference(parameter, row.key, None, now, "invalid", row.problem)
-    if (why := drive.unreachable_why(parameter)) or (ours is not None and ours.error):
-        problem = why or (ours.error if ours else "")
+    why = drive.unreachable_why(parameter)
+    if why is not None or (ours is not None and ours.error):
+        problem = why.words() if why is not None else ours.error if ours else ""
         return Difference(parameter, row.key, row.raw, None, "not_in_drive", problem)
     if parameter.access == "ro":
         return Difference(parameter, row.key, row.raw, now, "read_only")

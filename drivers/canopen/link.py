@@ -48,7 +48,7 @@ from drivers.link import (
     Unsubscribe,
     lists_nothing,
 )
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 from profiles.schema import LinkKind, Profile
 
 T = TypeVar("T")
@@ -143,10 +143,10 @@ class CanopenLink:
         self._cyclic.set_modes(station, profile.supported_modes)
         self._cyclic.speak(station, dialect_of(profile))
 
-    def unreachable(self, station: int, address: Address) -> str:
+    def unreachable(self, station: int, address: Address) -> Text | None:
         """See `drivers.link.Link.unreachable`; SDO transfers carry every object."""
         del station
-        return "" if address.index is not None else f"{address} is no object"
+        return None if address.index is not None else text("link.no-object", address=str(address))
 
     async def enumerate(self, station: int, progress: Progress) -> list[Described]:
         """See `drivers.link.Link.enumerate`: a node may carry its EDS instead (1021h)."""

@@ -31,6 +31,7 @@ from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.listing import Item, fitted, object_of, read_list
 from drivers.flight.segment import SegmentRecorder
 from drivers.link import Address, Cyclic, Found, Link, LinkEvent, LinkQuality, Progress, Unsubscribe
+from drivers.texts.message import Text, text
 from profiles.schema import LinkKind, Profile
 
 _SCHEME = "ethercat://"
@@ -213,10 +214,10 @@ class EthercatLink:
         """See `drivers.link.Link.attach`: the limits of its process data."""
         self._profiles[station] = profile
 
-    def unreachable(self, station: int, address: Address) -> str:
+    def unreachable(self, station: int, address: Address) -> Text | None:
         """See `drivers.link.Link.unreachable`; the mailbox carries every object."""
         del station
-        return "" if address.index is not None else f"{address} is no object"
+        return None if address.index is not None else text("link.no-object", address=str(address))
 
     async def enumerate(self, station: int, progress: Progress) -> list[Described]:
         """The drive's own dictionary, by the SDO information service."""

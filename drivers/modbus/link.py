@@ -115,13 +115,13 @@ class RegisterLink:
         self._plans.clear()
         self._refused_blocks.clear()
 
-    def unreachable(self, station: int, address: Address) -> str:
+    def unreachable(self, station: int, address: Address) -> Text | None:
         """See `drivers.link.Link.unreachable`."""
         try:
             self._layout.place(station, address)
         except NotAllowed as error:
-            return error.message
-        return ""
+            return error.text
+        return None
 
     async def enumerate(self, station: int, progress: Progress) -> list[Described]:
         """See `drivers.link.Link.enumerate`: no drive lists anything over registers."""

@@ -11,6 +11,7 @@ from drivers.codec import size_of
 from drivers.errors import DriveError, Rejected
 from drivers.link import Address, Found, LinkEvent, LinkQuality, Progress, Unsubscribe
 from drivers.modbus.registers import Place, to_bytes, to_words
+from drivers.texts.message import Text
 from drivers.urls import bus_kind
 from drivers.virtual.device import SdoAbort
 from drivers.virtual.firmware.factory import make_device
@@ -131,6 +132,6 @@ class FirmwareLink:
         """The family is known here."""
         del station, facts
 
-    def unreachable(self, station: int, address: Address) -> str:
+    def unreachable(self, station: int, address: Address) -> Text | None:
         del station, address
-        return ""
+        return None

@@ -17,6 +17,7 @@ from drivers.link import (
     Unsubscribe,
     lists_nothing,
 )
+from drivers.texts.message import Text
 from drivers.urls import bus_kind
 from profiles.schema import LinkKind, Profile
 
@@ -40,8 +41,8 @@ class MemoryLink:
 
     def attach(self, station: int, profile: Profile) -> None: ...
 
-    def unreachable(self, station: int, address: Address) -> str:
-        return ""
+    def unreachable(self, station: int, address: Address) -> Text | None:
+        return None
 
     async def enumerate(self, station: int, progress: Progress) -> list[Described]:
         raise lists_nothing(self.kind, station)

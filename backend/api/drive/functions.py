@@ -23,7 +23,7 @@ from backend.api.drive.models_functions import (
     WatchUpdate,
 )
 from backend.api.drive.models_parameters import ParameterValue
-from backend.api.errors import NotFound
+from backend.api.errors import NotFound, message_or_none, words_of
 from backend.api.models import JobInfo
 from backend.audit.asked import note_before
 from backend.axis.axis import Envelope
@@ -125,7 +125,8 @@ def _frozen(reading: Reading) -> ParameterValue:
         raw=reading.raw,
         value=reading.value,
         time=convert.moment(reading.time) if reading.time else None,
-        error=reading.error,
+        error=words_of(reading.problem),
+        error_message=message_or_none(reading.problem),
     )
 
 

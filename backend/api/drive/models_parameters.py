@@ -48,6 +48,9 @@ class ParameterInfo(Message):
     notes: str
     reachable: bool = Field(description="False when no connected port can carry it")
     unreachable_why: str = ""
+    unreachable_why_message: MessageInfo | None = Field(
+        default=None, description="of unreachable_why"
+    )
 
 
 class ParameterValue(Message):
@@ -58,6 +61,7 @@ class ParameterValue(Message):
     value: Raw | None = Field(description="in the parameter's unit")
     time: datetime | None
     error: str = ""
+    error_message: MessageInfo | None = Field(default=None, description="of error")
     unused: bool = Field(
         default=False, description="the drive's own count leaves it out: not asked for"
     )

@@ -234,7 +234,7 @@ def test_values_come_as_json_and_with_their_unit() -> None:
     read = [
         (speed, Reading("2005:03", 1500, 150.0, 0.0)),
         (status, Reading("6041:00", 0x0250, 0x0250, 0.0)),
-        (speed, Reading("2005:03", None, None, None, error="no answer")),
+        (speed, Reading("2005:03", None, None, None, prose("no answer"))),
     ]
     out = io.StringIO()
     with redirect_stdout(out):

@@ -45,6 +45,7 @@ from drivers.link import (
 from drivers.motion.interpolation import interpolation_period
 from drivers.motion.playback import AxisLoop
 from drivers.motion.setpoint_plan import Motion, limits_of
+from drivers.texts.message import Text
 from drivers.urls import bus_kind
 from drivers.virtual.device import Device, SdoAbort
 from drivers.virtual.firmware.factory import make_device
@@ -180,8 +181,8 @@ class DirectLink:
     def attach(self, station: int, profile: Profile) -> None:
         pass
 
-    def unreachable(self, station: int, address: Address) -> str:
-        return ""
+    def unreachable(self, station: int, address: Address) -> Text | None:
+        return None
 
     @property
     def cyclic(self) -> DirectLink:

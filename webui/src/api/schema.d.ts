@@ -8256,6 +8256,8 @@ export interface components {
              * @default
              */
             unreachable_why: string;
+            /** @description of unreachable_why */
+            unreachable_why_message?: components["schemas"]["MessageInfo"] | null;
         };
         /**
          * ParameterValue
@@ -8267,6 +8269,8 @@ export interface components {
              * @default
              */
             error: string;
+            /** @description of error */
+            error_message?: components["schemas"]["MessageInfo"] | null;
             /** Key */
             key: string;
             /**

@@ -8,6 +8,7 @@ import { Editor } from '../pages/parameters/Detail'
 import { setEdit, useEdits, writeEdits } from '../pages/parameters/edits'
 import { editable } from '../pages/parameters/Grid'
 import { readingText } from '../pages/parameters/GridRow'
+import { Said } from './Said'
 import { ProblemNote } from './ProblemNote'
 import { Original } from './profile-text/ProfileText'
 import { useRows } from './profile-text/rows'
@@ -160,7 +161,11 @@ function Field({ drive, row }: { drive: string; row: ShownRow }) {
           )}
         </div>
       </div>
-      {reading.error && <p className="note warn">{reading.error}</p>}
+      {reading.error && (
+        <p className="note warn">
+          <Said message={reading.error_message} words={reading.error} />
+        </p>
+      )}
     </>
   )
 }

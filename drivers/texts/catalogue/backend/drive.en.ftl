@@ -42,3 +42,5 @@ drive_written = { $drive }: { $parameter } { $key } can only be written
     .remedy = it has no value to read; writing to it runs what it is for
 drive_interrupted = interrupted; the drive may hold either value
 drive_another-serial = { $drive } had serial number { $known }; the drive that answers here now has { $serial }
+drive_exists-only-over = it exists only over { $needed }, and the drive is connected over { $kinds }
+drive_write-only = it can only be written

@@ -42,3 +42,5 @@ drive_written = { $drive }：{ $parameter } { $key } 只能写入
     .remedy = 它没有可读的值；写入即执行其功能
 drive_interrupted = 已中断；驱动器可能保持其中任一值
 drive_another-serial = { $drive } 的序列号曾为 { $known }；现在应答的驱动器为 { $serial }
+drive_exists-only-over = 仅可通过 { $needed } 访问，而驱动器通过 { $kinds } 连接
+drive_write-only = 只能写入

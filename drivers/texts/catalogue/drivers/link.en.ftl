@@ -31,3 +31,4 @@ link_terminal-servodeck-itself-runs = { $value } is the terminal that servodeck 
 link_wire-running-demo = { $bus } is a wire that only a running demo has
     .remedy = start 'servodeck demo', or give the path of a real or virtual port
 link_write-it-like = write it like { $example }
+link_no-object = { $address } is no object

@@ -31,3 +31,4 @@ link_terminal-servodeck-itself-runs = { $value } 是 servodeck 自身运行的�
 link_wire-running-demo = { $bus } 是只有运行中的演示才有的线路
     .remedy = 请启动 'servodeck demo'，或给出真实或虚拟端口的路径
 link_write-it-like = 请写成 { $example }
+link_no-object = { $address } 不是对象

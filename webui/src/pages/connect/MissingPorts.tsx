@@ -4,6 +4,7 @@ import { api, ask } from '../../api/client'
 import type { DriveSummary, MissingPort } from '../../api/schema'
 import { useT } from '../../i18n'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { useSay } from '../../widgets/profile-text/texts'
 import { useAction } from '../../widgets/useAction'
 
 const NAMES = { ethercat: 'EtherCAT', canopen: 'CANopen', modbus: 'Modbus', mlink: 'MLink' }
@@ -40,8 +41,10 @@ function Missing({ drive, port }: { drive: DriveSummary; port: MissingPort }) {
     )
   // Only a comparison of settings names a parameter.
   const differs = connect.problem?.status === 409 && connect.problem.parameter
+  const say = useSay(drive.id)
   const groups =
-    port.groups.slice(0, GROUPS_SHOWN).join(', ') + (port.groups.length > GROUPS_SHOWN ? ', …' : '')
+    port.groups.slice(0, GROUPS_SHOWN).map(say).join(', ') +
+    (port.groups.length > GROUPS_SHOWN ? ', …' : '')
   return (
     <details>
       <summary className={port.parameters > 0 ? 'warn-text' : ''}>

@@ -13,6 +13,7 @@ import { bitFields, getField } from '../../widgets/parse'
 import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { useRows } from '../../widgets/profile-text/rows'
 import { useSay } from '../../widgets/profile-text/texts'
+import { Said } from '../../widgets/Said'
 import { useFetched, useFunctions } from '../../widgets/useFunctions'
 import { ForcingPanel } from './ForcingPanel'
 import { probeKeys } from './probe'
@@ -135,7 +136,11 @@ function Bits({ drive, row }: { drive: string; row: ParameterRow }) {
         {row.key} {raw !== null && hexadecimal(raw, row.type)}{' '}
         {t('io.at', { time: clock(reading.time) })}
       </p>
-      {reading.error && <p className="note fault">{reading.error}</p>}
+      {reading.error && (
+        <p className="note fault">
+          <Said message={reading.error_message} words={reading.error} />
+        </p>
+      )}
       <ul className="io-bits">
         {fields.map((field) => {
           const value = raw === null ? null : getField(raw, field)

@@ -11,6 +11,7 @@ import { Icon } from '../../widgets/Icon'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useRows } from '../../widgets/profile-text/rows'
+import { Said } from '../../widgets/Said'
 import { useAction } from '../../widgets/useAction'
 import { setRecord, useRecord } from '../../widgets/useFunctions'
 import { readingText } from '../parameters/GridRow'
@@ -122,7 +123,12 @@ function Watched({
     <li className={old ? 'stale' : ''}>
       <span className="grow">
         {row.name} <small className="dim mono">{row.number ?? row.key}</small>
-        {reading.error && <small className="fault-text"> {reading.error}</small>}
+        {reading.error && (
+          <small className="fault-text">
+            {' '}
+            <Said message={reading.error_message} words={reading.error} />
+          </small>
+        )}
       </span>
       <strong className="num">
         {readingText(row, reading, false)} <span className="unit">{row.unit}</span>

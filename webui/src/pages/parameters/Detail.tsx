@@ -10,6 +10,7 @@ import { ProblemNote } from '../../widgets/ProblemNote'
 import { type BitField, bitFields, getField, parseTyped, setField } from '../../widgets/parse'
 import { Original } from '../../widgets/profile-text/ProfileText'
 import type { ShownRow } from '../../widgets/profile-text/shown-row'
+import { Said } from '../../widgets/Said'
 import { useAction } from '../../widgets/useAction'
 import { setRecord, useRecord } from '../../widgets/useFunctions'
 import { setEdit, useEdits, writeEdits } from './edits'
@@ -77,12 +78,20 @@ export function Detail({
           ? t('parameters.readAt', { time: dateTime(reading.time) })
           : t('parameters.notRead')}
       </p>
-      {reading.error && <p className={reading.unused ? 'note' : 'note fault'}>{reading.error}</p>}
+      {reading.error && (
+        <p className={reading.unused ? 'note' : 'note fault'}>
+          <Said message={reading.error_message} words={reading.error} />
+        </p>
+      )}
       {reading.pending && (
         <p className="note info">{t(`effective.${pendingKey(reading.pending)}`)}</p>
       )}
       {reading.unsaved && <p className="note info">{t('parameters.unsavedHelp')}</p>}
-      {!row.reachable && <p className="note warn">{row.unreachable_why}</p>}
+      {!row.reachable && (
+        <p className="note warn">
+          <Said message={row.unreachable_why_message} words={row.unreachable_why} />
+        </p>
+      )}
       {editable(row) && <Editor drive={drive} row={row} />}
       {row.motion === 'energises' && <OtherDoor drive={drive} row={row} />}
       <div className="row">

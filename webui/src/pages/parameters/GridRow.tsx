@@ -1,6 +1,6 @@
 import { memo, useEffect, useRef, useState } from 'react'
 import type { ParameterRow, ParameterValue, Problem } from '../../api/schema'
-import { useT } from '../../i18n'
+import { useSay, useT } from '../../i18n'
 import { useReading } from '../../live/store'
 import { hexadecimal, isInteger, shown, toValue } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
@@ -119,8 +119,14 @@ export function readingText(row: ParameterRow, reading: ParameterValue, asRaw: b
 
 function ValueCell({ row, edit, asRaw, reading, onBegin }: Props & { reading: ParameterValue }) {
   const t = useT()
+  const say = useSay()
   const text = readingText(row, reading, asRaw)
-  if (!editable(row)) return <span title={row.unreachable_why || text}>{text}</span>
+  if (!editable(row))
+    return (
+      <span title={say.message(row.unreachable_why_message, row.unreachable_why) || text}>
+        {text}
+      </span>
+    )
   return (
     <button
       type="button"
@@ -230,6 +236,7 @@ export function editText(row: ParameterRow, reading: ParameterValue, asRaw: bool
 
 function Marks({ row, edit, problem, differs, reading }: Props & { reading: ParameterValue }) {
   const t = useT()
+  const say = useSay()
   return (
     <>
       {problem && (
@@ -250,7 +257,10 @@ function Marks({ row, edit, problem, differs, reading }: Props & { reading: Para
         </span>
       )}
       {reading.error && (
-        <span className={reading.unused ? 'mark quiet' : 'mark refused'} title={reading.error}>
+        <span
+          className={reading.unused ? 'mark quiet' : 'mark refused'}
+          title={say.message(reading.error_message, reading.error)}
+        >
           {t(reading.unused ? 'mark.unused' : 'mark.unread')}
         </span>
       )}
@@ -262,7 +272,10 @@ function Marks({ row, edit, problem, differs, reading }: Props & { reading: Para
         </span>
       )}
       {!row.reachable && (
-        <span className="mark quiet" title={row.unreachable_why}>
+        <span
+          className="mark quiet"
+          title={say.message(row.unreachable_why_message, row.unreachable_why)}
+        >
           {t('mark.unreachable')}
         </span>
       )}

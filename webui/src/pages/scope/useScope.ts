@@ -1,9 +1,10 @@
-import { useCallback, useEffect, useRef, useState } from 'react'
+import { useCallback, useEffect, useMemo, useRef, useState } from 'react'
 import { api, ask, problemOf } from '../../api/client'
 import type { NamedSetup, Problem, ScopeSetup, SnapshotInfo } from '../../api/schema'
 import * as live from '../../live/live'
 import { contents, useLink, useStore } from '../../live/store'
 import type { ScopeFrame, ScopeView } from '../../live/worker-messages'
+import { useSayOf } from '../../widgets/profile-text/texts'
 import { configOf, EMPTY, type Infos, storedSetup, storeSetup, triggerOf } from './setup'
 
 /** Another set-up, or what becomes of the present one. */
@@ -25,7 +26,22 @@ export function useSetup(): [ScopeSetup, ChangeSetup, boolean] {
 }
 
 export const useScopeInfo = () => useStore('scopeInfo', () => contents.scopeInfo)
-export const useScopeChannels = () => useStore('scopeInfo', () => contents.scopeChannels)
+
+/** What can be drawn, by drive and key, with names in the page's language. */
+export function useScopeChannels(): Infos {
+  const channels = useStore('scopeInfo', () => contents.scopeChannels)
+  const say = useSayOf()
+  return useMemo(
+    () =>
+      new Map(
+        [...channels].map(([place, info]) => {
+          const drive = place.slice(0, place.lastIndexOf(' '))
+          return [place, { ...info, name: say(drive, info.name) }]
+        }),
+      ),
+    [channels, say],
+  )
+}
 
 /**
  * Samples what the set-up names while the page shows, and beyond that while a trigger is armed:

@@ -1,7 +1,7 @@
-import { useEffect, useSyncExternalStore } from 'react'
+import { useCallback, useEffect, useSyncExternalStore } from 'react'
 import { api, ask } from '../../api/client'
 import { useLanguage } from '../../i18n'
-import { useDrive, useLink } from '../../live/store'
+import { useDrive, useDrives, useLink } from '../../live/store'
 
 /** English text of a profile to its translation; null until the server has said it. */
 export type Texts = ReadonlyMap<string, string> | null
@@ -69,4 +69,29 @@ export function setOriginal(shown: boolean): void {
   original = shown
   globalThis.localStorage?.setItem(ORIGINAL, shown ? 'yes' : 'no')
   changed()
+}
+
+/** As `useSay`, for texts of several drives at once; another function once more texts are known. */
+export function useSayOf(): (drive: string, text: string) => string {
+  const language = useLanguage()
+  const { open } = useLink()
+  const drives = useDrives()
+  const chinese = language === 'zh'
+  const wanted = [...new Set(chinese ? drives?.map((drive) => drive.profile) : [])].sort().join(' ')
+  useEffect(() => {
+    if (open) for (const profile of wanted.split(' ').filter(Boolean)) load(profile)
+  }, [wanted, open])
+  const known = useSyncExternalStore(subscribe, () =>
+    wanted
+      .split(' ')
+      .filter((profile) => loaded.has(profile))
+      .join(' '),
+  )
+  return useCallback(
+    (drive, text) => {
+      const profile = drives?.find((each) => each.id === drive)?.profile ?? ''
+      return (known.split(' ').includes(profile) ? loaded.get(profile)?.get(text) : null) ?? text
+    },
+    [drives, known],
+  )
 }
