@@ -25,6 +25,10 @@ _MOST_DB = 60.0
 #: A prediction is not known better than this where it is not measured: logarithm of its size, and
 #: seconds of delay (half of the shortest loop period in use, 62.5 µs).
 _SIZE, _LATE_S = 0.05, 30e-6
+#: Beyond the measured band a model is known the worse the further away: logarithm of its size for
+#: each octave above the last line. Nothing there was measured: sampling, filters and the current
+#: loop are those that were assumed.
+_PER_OCTAVE = 0.1
 #: Where no line tells it: loop periods of 62.5 to 250 µs, where 50 µs are assumed, and 1.5 dB.
 _UNSEEN, _UNSEEN_S = 0.17, 200e-6
 #: Fewer lines say nothing of margins.
@@ -202,14 +206,15 @@ def judge(
     coverage: Coverage = "measured" if last <= top else "predicted"
     if coverage == "predicted" and shown_gain_db is not None:
         coverage = "gain_steps"
-    beyond = _beyond(frequency_hz, possible, _moved_once(frequency_hz, nominal, gain, delay), top)
+    nominal_only = _moved_once(frequency_hz, nominal, gain, delay)
+    beyond = _beyond(frequency_hz, possible, nominal_only, top, shown_gain_db)
     sound = bool(np.all(stable(possible)))
     designed = beyond
     if beside is not None and shown_gain_db is not None:
         others = _moved(frequency_hz, beside, gain, delay)
         others = others[np.asarray(stable(others * 10 ** (shown_gain_db / 20.0)))]
-        nominal_only = _moved_once(frequency_hz, nominal, gain, delay)
-        beyond = _beyond(frequency_hz, np.concatenate([possible, others]), nominal_only, top)
+        every = np.concatenate([possible, others])
+        beyond = _beyond(frequency_hz, every, nominal_only, top, shown_gain_db)
     stated, worst = _worst(measured, beyond)
     return LoopVerdict(
         measured, beyond, last, coverage, shown_gain_db, stated, worst, sound,
@@ -326,14 +331,26 @@ def _moved_once(
 
 
 def _beyond(
-    frequency_hz: FloatArray, possible: ComplexArray, nominal: ComplexArray, from_hz: float
+    frequency_hz: FloatArray,
+    possible: ComplexArray,
+    nominal: ComplexArray,
+    from_hz: float,
+    shown_gain_db: float | None,
 ) -> BandVerdict | None:
-    """Margins above what was measured: of the nominal loop, and the worst that is possible."""
+    """Margins above what was measured: of the nominal loop, and the worst that is possible.
+
+    A gain margin that is stated without being shown is less certain with every octave; one that a
+    raised gain has shown is certain.
+    """
     use: BoolArray = frequency_hz >= from_hz
     if np.count_nonzero(use) < 2:
         return None
     f = frequency_hz[use]
     worst, mean = worst_of(possible[:, use]), worst_of(nominal[:, use])
+    octaves = np.log2(f / from_hz) if from_hz > 0.0 else np.zeros(f.size)
+    larger = np.exp(_PER_OCTAVE * octaves)
+    least_db = max(worst_of(possible[:, use] * larger).gain_margin_db, shown_gain_db or 0.0)
+    least_db = min(worst.gain_margin_db, least_db)
     peak = sensitivity_peak(nominal[:, use])
     over = np.abs(possible[:, use]) > 1.0
     crosses = bool(np.any(over[:, 1:] != over[:, :-1]))
@@ -342,9 +359,9 @@ def _beyond(
         if crosses
         else None
     )
-    gain = Interval(mean.gain_margin_db, worst.gain_margin_db, mean.gain_margin_db)
+    gain = Interval(mean.gain_margin_db, least_db, mean.gain_margin_db)
     return BandVerdict(
-        float(f[0]), float(f[-1]), phase, gain if worst.gain_margin_db < _MOST_DB else None,
+        float(f[0]), float(f[-1]), phase, gain if least_db < _MOST_DB else None,
         Interval(peak, peak, max(worst.ms, peak)),
     )  # fmt: skip
 
