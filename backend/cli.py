@@ -16,7 +16,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from backend import __version__
-from drivers.texts.message import Language, language_of, speak
+from drivers.texts.message import Language, language, language_of, speak
 
 COMMANDS = {
     "serve": ("start:serve", "Start the server and the web page."),
@@ -138,7 +138,23 @@ COMMANDS = {
 }
 """Name of a command to where it is, below `backend.commands`, and what the list says of it."""
 
+
+class _Servodeck(TyperGroup):
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        _translate(self)
+        super().format_help(ctx, formatter)
+
+
+def _translate(command: TyperCommand | TyperGroup) -> None:
+    """Help in the chosen language; the file of texts is read for that alone."""
+    if language() == "zh":
+        from backend.commands.help_texts import translate
+
+        translate(command)
+
+
 app = typer.Typer(
+    cls=_Servodeck,
     help="Servo-drive commissioning in a browser.",
     no_args_is_help=True,
     add_completion=False,
@@ -153,7 +169,10 @@ def _later(name: str, where: str) -> type[TyperCommand]:
         def make_context(
             self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
         ) -> Any:
-            return imported(name, where).make_context(info_name, args, parent, **extra)
+            command = imported(name, where)
+            if not args or "--help" in args:
+                _translate(command)
+            return command.make_context(info_name, args, parent, **extra)
 
     return Later
 
@@ -190,6 +209,12 @@ def _speak_any_letter() -> None:
             stream.reconfigure(encoding=None if stream.isatty() else "utf-8", errors="replace")
 
 
+def _speak(wanted: Language | None) -> Language | None:
+    if wanted is not None:
+        speak(wanted)
+    return wanted
+
+
 def _print_version(wanted: bool) -> None:
     if wanted:
         print(f"servodeck {__version__}")
@@ -201,16 +226,16 @@ def _whole(
     *,
     language: Annotated[
         Language | None,
-        typer.Option(help="of errors, progress and reports; by default that of the system"),
+        typer.Option(help="of errors, progress and reports; by default that of the system",
+                     callback=_speak, is_eager=True),
     ] = None,
-    version: Annotated[  # noqa: ARG001 - the option acts by its callback
+    version: Annotated[
         bool,
         typer.Option("--version", help="print the version and end", callback=_print_version,
                      is_eager=True),
     ] = False,
 ) -> None:  # fmt: skip
-    if language is not None:
-        speak(language)
+    """Options of every command."""
 
 
 def _language_of_locale() -> Language:
