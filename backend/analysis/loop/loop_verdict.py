@@ -25,10 +25,10 @@ _MOST_DB = 60.0
 #: A prediction is not known better than this where it is not measured: logarithm of its size, and
 #: seconds of delay (half of the shortest loop period in use, 62.5 µs).
 _SIZE, _LATE_S = 0.05, 30e-6
-#: Beyond the measured band a model is known the worse the further away: logarithm of its size for
-#: each octave above the last line. Nothing there was measured: sampling, filters and the current
-#: loop are those that were assumed.
-_PER_OCTAVE = 0.1
+#: Beyond the measured band a stated gain margin is known the worse the further away: logarithm of
+#: a size for each octave above the last line. Sampling, filters and the current loop are assumed
+#: there: of a drive with another loop period (62.5 to 250 µs) it was 5 dB off two octaves above.
+_PER_OCTAVE = 0.3
 #: Where no line tells it: loop periods of 62.5 to 250 µs, where 50 µs are assumed, and 1.5 dB.
 _UNSEEN, _UNSEEN_S = 0.17, 200e-6
 #: Fewer lines say nothing of margins.
@@ -207,14 +207,14 @@ def judge(
     if coverage == "predicted" and shown_gain_db is not None:
         coverage = "gain_steps"
     nominal_only = _moved_once(frequency_hz, nominal, gain, delay)
-    beyond = _beyond(frequency_hz, possible, nominal_only, top, shown_gain_db)
+    designed = _beyond(frequency_hz, possible, nominal_only, top)
     sound = bool(np.all(stable(possible)))
-    designed = beyond
+    every = possible
     if beside is not None and shown_gain_db is not None:
         others = _moved(frequency_hz, beside, gain, delay)
         others = others[np.asarray(stable(others * 10 ** (shown_gain_db / 20.0)))]
         every = np.concatenate([possible, others])
-        beyond = _beyond(frequency_hz, every, nominal_only, top, shown_gain_db)
+    beyond = _beyond(frequency_hz, every, nominal_only, top, _PER_OCTAVE, shown_gain_db)
     stated, worst = _worst(measured, beyond)
     return LoopVerdict(
         measured, beyond, last, coverage, shown_gain_db, stated, worst, sound,
@@ -335,12 +335,13 @@ def _beyond(
     possible: ComplexArray,
     nominal: ComplexArray,
     from_hz: float,
-    shown_gain_db: float | None,
+    per_octave: float = 0.0,
+    shown_gain_db: float | None = None,
 ) -> BandVerdict | None:
     """Margins above what was measured: of the nominal loop, and the worst that is possible.
 
-    A gain margin that is stated without being shown is less certain with every octave; one that a
-    raised gain has shown is certain.
+    A gain margin is less certain by ``per_octave`` (logarithm); what a raised gain has shown is
+    certain.
     """
     use: BoolArray = frequency_hz >= from_hz
     if np.count_nonzero(use) < 2:
@@ -348,7 +349,7 @@ def _beyond(
     f = frequency_hz[use]
     worst, mean = worst_of(possible[:, use]), worst_of(nominal[:, use])
     octaves = np.log2(f / from_hz) if from_hz > 0.0 else np.zeros(f.size)
-    larger = np.exp(_PER_OCTAVE * octaves)
+    larger = np.exp(per_octave * octaves)
     least_db = max(worst_of(possible[:, use] * larger).gain_margin_db, shown_gain_db or 0.0)
     least_db = min(worst.gain_margin_db, least_db)
     peak = sensitivity_peak(nominal[:, use])

@@ -66,6 +66,26 @@ def test_a_loop_whose_crossover_is_not_seen_is_predicted_by_what_its_lines_tell(
     assert unknown.worst.phase_margin_deg == pytest.approx(90.0 - 0.36 * 118.5 * 0.7, abs=0.5)
 
 
+def test_a_gain_margin_far_above_the_band_is_less_certain_down_to_what_was_shown() -> None:
+    """It passes -180° at 1 kHz, with 31.6 µs more delay at 888 Hz: 1.83 octaves above 250 Hz.
+
+    0.3 for each octave are e^0.55, 4.76 dB. The true gain margin is 24.4 dB.
+    """
+    found = verdict_of(60.0, 0.25e-3, 250.0)
+    assert found.predicted is not None
+    assert found.designed is not None
+    stated, counted = found.predicted.gain_margin_db, found.designed.gain_margin_db
+    assert stated is not None
+    assert counted is not None
+    assert stated.value == counted.value == pytest.approx(20 * np.log10(1000 / 60), abs=0.2)
+    assert counted.low - stated.low == pytest.approx(4.76, abs=0.05)
+    assert found.worst.gain_margin_db == stated.low
+    shown = verdict_of(60.0, 0.25e-3, 250.0, shown_db=21.0).predicted
+    assert shown is not None
+    assert shown.gain_margin_db is not None
+    assert shown.gain_margin_db.low == 21.0
+
+
 def test_a_crossover_above_the_band_keeps_no_design() -> None:
     found = verdict_of(474.0, 0.1e-3, 246.0)
     assert found.coverage == "predicted"
