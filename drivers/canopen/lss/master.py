@@ -16,6 +16,8 @@ from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
 
 _ANSWER_S = 0.1
 """CiA 305 leaves it open; slaves answer within some ms, and each bit of a scan takes as long."""
+_LATE_ANSWER_S = 0.5
+"""For a scan that lost its node: an adapter or a computer that is late answers within this time."""
 _STORE_S = 2.0
 _OUT_OF_RANGE, _NOT_SUPPORTED = 1, 1
 _PARTS = 4
@@ -24,9 +26,15 @@ _PARTS = 4
 class LssMaster:
     """One master on one bus; ``send`` puts a frame with the master's identifier on it."""
 
-    def __init__(self, send: Callable[[bytes], None], answer_s: float = _ANSWER_S) -> None:
+    def __init__(
+        self,
+        send: Callable[[bytes], None],
+        answer_s: float = _ANSWER_S,
+        late_answer_s: float = _LATE_ANSWER_S,
+    ) -> None:
         self._send = send
         self._answer_s = answer_s
+        self._late_answer_s = late_answer_s
         self._answers: SimpleQueue[bytes] = SimpleQueue()
         self._turn = threading.Lock()
 
@@ -56,23 +64,33 @@ class LssMaster:
             LinkLost: the adapter is gone.
         """
         with self._turn:
-            self._wait_all()
-            if not self._ask(codes.fastscan(0, codes.RESET_SCAN, 0, 0), codes.IDENTIFIED):
-                return None
-            parts: list[int] = []
-            for part in range(_PARTS):
-                number = 0
-                for bit in range(31, -1, -1):
-                    progress((part * 32 + 31 - bit) / (32 * _PARTS))
-                    if not self._ask(codes.fastscan(number, bit, part, part), codes.IDENTIFIED):
-                        number |= 1 << bit
-                following = (part + 1) % _PARTS
-                if not self._ask(codes.fastscan(number, 0, part, following), codes.IDENTIFIED):
-                    self._wait_all()
-                    raise LinkTimeout("canopen.lss-scan-lost", part=part + 1)
-                parts.append(number)
-            self._wait_all()
-            return LssIdentity(*parts)
+            try:
+                return self._scan(progress, self._answer_s)
+            except LinkTimeout:
+                # No answer is a bit of the number: one that came late made it a wrong number.
+                return self._scan(progress, self._late_answer_s)
+
+    def _scan(self, progress: Callable[[float], None], answer_s: float) -> LssIdentity | None:
+        def recognised(number: int, bit: int, part: int, following: int) -> bool:
+            request = codes.fastscan(number, bit, part, following)
+            return bool(self._ask(request, codes.IDENTIFIED, within_s=answer_s))
+
+        self._wait_all()
+        if not recognised(0, codes.RESET_SCAN, 0, 0):
+            return None
+        parts: list[int] = []
+        for part in range(_PARTS):
+            number = 0
+            for bit in range(31, -1, -1):
+                progress((part * 32 + 31 - bit) / (32 * _PARTS))
+                if not recognised(number, bit, part, part):
+                    number |= 1 << bit
+            if not recognised(number, 0, part, (part + 1) % _PARTS):
+                self._wait_all()
+                raise LinkTimeout("canopen.lss-scan-lost", part=part + 1)
+            parts.append(number)
+        self._wait_all()
+        return LssIdentity(*parts)
 
     def only_node(self) -> tuple[LssIdentity, int | None] | None:
         """Identity and node-ID of the only node with these services; None where there is none.

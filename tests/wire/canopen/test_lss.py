@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import threading
 import time
 from collections.abc import AsyncIterator, Iterator
 
@@ -15,15 +16,19 @@ from typer.testing import CliRunner
 from backend import cli
 from drivers.canopen.link import CanopenLink
 from drivers.canopen.lss.codes import LssIdentity
+from drivers.canopen.lss.master import LssMaster
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
 from drivers.link import Address
 from drivers.virtual.wires.can_wire import CanWire, PythonCanSide
 from drivers.virtual.wires.canopen import CanopenNode
+from drivers.virtual.wires.lss import LssSlave
 from tests.wire.canopen.conftest import Bench, until
 from tests.wire.canopen.small_device import SmallDevice
 
 _numbers = itertools.count()
 STATUS = Address(0x6041, 0, "UINT16")
+#: Few bits that are one: each of them takes a scan as long as a missing answer.
+SERIAL = 0x10000001
 
 
 def quiet(_share: float, _step: object) -> None:
@@ -38,7 +43,7 @@ def made(node: int, serial: int) -> CanopenNode:
 def bench() -> Iterator[Bench]:
     """A node without number, and node 5."""
     channel = f"lss-{next(_numbers)}"
-    nodes = [made(255, 0x1234ABCD), made(5, 42)]
+    nodes = [made(255, SERIAL), made(5, 42)]
     with CanWire(PythonCanSide(can.Bus(interface="virtual", channel=channel)), nodes) as wire:
         yield Bench(wire, f"canopen://virtual/{channel}?timeout_ms=100")
 
@@ -143,15 +148,37 @@ async def test_a_bit_rate_counts_after_a_power_cycle(bench: Bench, link: Canopen
 async def test_of_several_without_number_each_is_found_in_turn(
     bench: Bench, link: CanopenLink
 ) -> None:
-    bench.wire.do(lambda: bench.wire.nodes.append(made(255, 0x1234ABCE)))
+    bench.wire.do(lambda: bench.wire.nodes.append(made(255, SERIAL + 1)))
     serials = []
     for number in (10, 11):
         found = await link.lss.search(quiet)
         assert found is not None
         serials.append(found.identity.serial)
         await link.lss.set_node(found.identity, number, store=True)
-    assert serials == [0x1234ABCD, 0x1234ABCE]
+    assert serials == [SERIAL, SERIAL + 1]
     await until(lambda: {node.node_id for node in bench.wire.nodes} == {10, 5, 11})
+
+
+def test_an_answer_that_comes_late_does_not_lose_the_node() -> None:
+    """The bit that it belongs to is read as one, and the node confirms no such number."""
+    slave = LssSlave(LssIdentity(0x1234, 0x56, 3, SERIAL), 255)
+    late_s, requests = 0.03, itertools.count()
+    timers: list[threading.Timer] = []
+
+    def send(data: bytes) -> None:
+        answer = slave.take(data)
+        if answer is None:
+            return
+        if next(requests) == 5:
+            timers.append(threading.Timer(late_s, master.deliver, [answer]))
+            timers[-1].start()
+        else:
+            master.deliver(answer)
+
+    master = LssMaster(send, answer_s=0.001, late_answer_s=0.1)
+    found = master.find(lambda _share: None)
+    timers[0].join()
+    assert found == slave.identity
 
 
 def test_an_independent_master_finds_and_names_the_virtual_node(bench: Bench) -> None:
