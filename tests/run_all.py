@@ -161,7 +161,7 @@ class Runner:
         whole = [*self._before, *command]
         with subprocess.Popen(
             whole, cwd=folder, env=self._environment, stdout=self._out, stderr=subprocess.STDOUT,
-            start_new_session=True,
+            process_group=0,
         ) as process, _ended_with_this(process):  # fmt: skip
             try:
                 return process.wait(LIMIT_S)
@@ -177,7 +177,10 @@ _running: set[int] = set()
 
 @contextmanager
 def _ended_with_this(process: subprocess.Popen[bytes]) -> Iterator[None]:
-    """Whatever a check has started in its session ends with it."""
+    """Whatever a check has started in its group ends with it.
+
+    A group, not a session: Linux shares the processor between sessions before priorities count.
+    """
     _running.add(process.pid)
     try:
         yield
