@@ -5,8 +5,10 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from importlib import import_module
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from fluent.syntax import ast as ftl
@@ -70,29 +72,54 @@ def _entries(language: Language) -> dict[str, set[str]]:
 
 
 ENGLISH, CHINESE = _entries("en"), _entries("zh")
+ERRORS = {each.__name__ for each in _kinds_of(DriveError)}
+#: Functions that make a message of a code.
+_MAKERS = {"text", "Text", "print_text", "note", "words_of", *ERRORS}
 
 
-def _strings() -> Iterator[str]:
+class _Source(NamedTuple):
+    """A module of the product: its tree, and of all its nodes the two kinds that are asked for."""
+
+    name: str
+    tree: ast.Module
+    calls: list[ast.Call]
+    strings: set[str]
+
+
+@cache
+def _sources() -> list[_Source]:
+    """Every module once: walking all of them takes seconds."""
+    found = []
     for folder in ("backend", "drivers", "profiles"):
-        for file in (ROOT / folder).rglob("*.py"):
-            for node in ast.walk(ast.parse(file.read_text("utf-8"))):
-                if isinstance(node, ast.Constant) and isinstance(node.value, str):
-                    yield node.value
+        for file in sorted((ROOT / folder).rglob("*.py")):
+            tree = ast.parse(file.read_text("utf-8"))
+            calls: list[ast.Call] = []
+            strings: set[str] = set()
+            for node in ast.walk(tree):
+                if isinstance(node, ast.Call):
+                    calls.append(node)
+                elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                    strings.add(node.value)
+            found.append(_Source(str(file.relative_to(ROOT)), tree, calls, strings))
+    return found
 
 
-def _first_arguments() -> Iterator[str]:
+def _raised() -> set[str]:
+    return {words for source in _sources() for words in source.strings if is_code(words)}
+
+
+def _shown() -> set[str]:
     """What errors and messages are made of: `NotAllowed("…")`, `text("…")`."""
-    for folder in ("backend", "drivers", "profiles"):
-        for file in (ROOT / folder).rglob("*.py"):
-            for node in ast.walk(ast.parse(file.read_text("utf-8"))):
-                if not isinstance(node, ast.Call) or not node.args:
-                    continue
-                name = getattr(node.func, "id", getattr(node.func, "attr", ""))
-                first = node.args[0]
-                if not isinstance(first, ast.Constant) or not isinstance(first.value, str):
-                    continue
-                if name in ("text", "Text", "print_text", "note", "words_of") or name in ERRORS:
-                    yield first.value
+    firsts = (
+        node.args[0]
+        for source in _sources()
+        for node in source.calls
+        if node.args and _called(node) in _MAKERS
+    )
+    return {
+        node.value for node in firsts
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and is_code(node.value)
+    }  # fmt: skip
 
 
 def test_a_room_has_one_file() -> None:
@@ -100,26 +127,19 @@ def test_a_room_has_one_file() -> None:
     assert len({each.name for each in found}) == len(found), "one would hide the other"
 
 
-ERRORS = {each.__name__ for each in _kinds_of(DriveError)}
-RAISED = {words for words in _strings() if is_code(words)}
-SHOWN = {words for words in _first_arguments() if is_code(words)}
-
-
 def test_every_code_has_words() -> None:
-    assert len(SHOWN) > 500
-    assert not SHOWN - set(ENGLISH), "in no file of texts/catalogue"
+    shown = _shown()
+    assert len(shown) > 500
+    assert not shown - set(ENGLISH), "in no file of texts/catalogue"
 
 
 def _calls() -> Iterator[tuple[str, ast.Call, str]]:
     """Every call that begins with a code: where it stands, the call, the code."""
-    for folder in ("backend", "drivers", "profiles"):
-        for file in (ROOT / folder).rglob("*.py"):
-            for node in ast.walk(ast.parse(file.read_text("utf-8"))):
-                if isinstance(node, ast.Call):
-                    for each in node.args:
-                        if isinstance(each, ast.Constant) and each.value in ENGLISH:
-                            place = f"{file.relative_to(ROOT)}:{node.lineno}"
-                            yield place, node, str(each.value)
+    for source in _sources():
+        for node in source.calls:
+            for each in node.args:
+                if isinstance(each, ast.Constant) and each.value in ENGLISH:
+                    yield f"{source.name}:{node.lineno}", node, str(each.value)
 
 
 def test_every_message_is_given_the_facts_of_its_text() -> None:
@@ -138,7 +158,7 @@ def test_every_message_is_given_the_facts_of_its_text() -> None:
 
 def test_every_text_is_shown_by_somebody() -> None:
     made = {code for code in ENGLISH if _MADE.fullmatch(code) or code.startswith(tuple(TABLES))}
-    unused = {code for code in ENGLISH if REMEDY not in code} - RAISED - made
+    unused = {code for code in ENGLISH if REMEDY not in code} - _raised() - made
     assert not unused, "nobody raises these"
 
 
@@ -227,14 +247,15 @@ def _called(node: ast.AST) -> str:
 def test_no_error_carries_a_sentence() -> None:
     """What an error says and advises comes from the catalogue, so that it has both languages."""
     found = []
-    for folder in ("backend", "drivers", "profiles"):
-        for file in (ROOT / folder).rglob("*.py"):
-            tree = ast.parse(file.read_text("utf-8"))
-            kinds = [n for n in ast.walk(tree) if isinstance(n, ast.ClassDef) and n.name in ERRORS]
-            own = [n for kind in kinds for n in ast.walk(kind) if _called(n) == "__init__"]
-            for node in (*(n for n in ast.walk(tree) if _called(n) in ERRORS), *own):
-                assert isinstance(node, ast.Call)
-                advice = [each.value for each in node.keywords if each.arg == "remedy"]
-                if any(_is_sentence(each) for each in (*node.args[:1], *advice)):
-                    found.append(f"{file.relative_to(ROOT)}:{node.lineno}")
+    for source in _sources():
+        kinds = (node for node in ast.walk(source.tree) if isinstance(node, ast.ClassDef))
+        own = (
+            node for kind in kinds if kind.name in ERRORS
+            for node in ast.walk(kind) if _called(node) == "__init__"
+        )  # fmt: skip
+        for node in (*(each for each in source.calls if _called(each) in ERRORS), *own):
+            assert isinstance(node, ast.Call)
+            advice = [each.value for each in node.keywords if each.arg == "remedy"]
+            if any(_is_sentence(each) for each in (*node.args[:1], *advice)):
+                found.append(f"{source.name}:{node.lineno}")
     assert not found, "\n".join(found)
