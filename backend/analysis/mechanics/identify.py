@@ -56,54 +56,11 @@ from backend.analysis.response.uncertainty import uncertainty as joint_uncertain
 from backend.analysis.signals.arrays import ComplexArray
 from backend.analysis.signals.line_spectra import Quantity, Record, loop_spectra, speed_lag_s
 from backend.analysis.signals.transient_removal import settled
+from backend.analysis.thresholds import identify as threshold
 
-#: A model whose median relative misfit is larger, and larger than the noise, corrects nothing.
-TRUSTED_ERROR = 0.03
+TRUSTED_ERROR = threshold.TRUSTED_ERROR
 
-#: A path that leaves more cycles of delay than this is uncertaintyed.
-_LEFT_LATE = 0.3
-#: Paths whose criteria differ by less are both possible.
-_UNDECIDED = 80.0
-#: At most this many rounds of refining loop, path and mechanics against each other.
-_PASSES = 4
-#: A mode whose part in the response is not known to this (logarithm, one deviation) is tried
-#: without; it stays where that is worse by so much.
-_UNSURE, _WORTH_A_MODE = 0.25, 80.0
-#: A line is hidden by friction where that may move it by so much; so many are more than a few.
-_HIDDEN, _HIDDEN_SHARE = 0.1, 0.03
-#: Rounds of friction by the balance of torques and mechanics by what that leaves.
-_BALANCES = 2
-#: Realisations are as alike as before up to this multiple of what they differ by.
-_AS_ALIKE = 1.02
-#: What is left of a distortion along one axis of the complex plane, two draws averaged.
-_AVERAGED = 0.5
-#: Path parameters are moved by this much (cycles, logarithm) to see what they do, moved at all
-#: where torque and motion together put them further off than this share of their deviation, and
-#: by no more than two deviations or this at once.
-_STEP, _SETTLED, _LONGEST_STEP = 0.02, 0.2, 0.1
-#: A path by the motion alone is taken where the criterion is better by so much and the misfit is
-#: smaller than this share: chosen by hand on a few axes of `benchmarks.rough_campaign`, where
-#: filtered or copied torques left about 1.4 to 10 times the misfit. Those that leave less than 1.3
-#: times are not noticed by this; what right ones leave was not tabulated.
-_BY_MOTION, _CLEARLY = 60.0, 0.77
-#: So much better, and so much smaller, it is taken before the path by the torque is fitted anew.
-_BY_FAR, _FAR_CLEARLY = 600.0, 0.4
-_MOTION_PASSES = 3
-#: A median misfit (relative) that a path by the motion leaves where it is right.
-_EXPLAINED = 0.0035
 _HOLDS: tuple[Hold, ...] = ("zero", "linear")
-#: Current loops are within these, and one behind a low-pass of the torque begins about here, in Hz.
-_ORDINARY_HZ, _SLOW_HZ = (450.0, 1600.0), 300.0
-#: A torque that is the mechanics' leaves less delay (s) than this, and less of itself
-#: unexplained by hold, corner and delay (relative RMS; rounding to 0.1 % leaves 0.001 to 0.005 on
-#: the axes of `benchmarks.tune_accuracy`).
-_LEFT_BY_TORQUE_S, _TORQUE_LEFT, _ROUNDED = 60e-6, 0.02, 0.005
-#: Lines whose phase is beyond ±90° by more than this, and their share, are not those of a passive
-#: axis; lines that take part.
-_PASSIVE_DEG, _PASSIVE_SHARE, _COHERENT, _FEW = 12.0, 0.1, 0.9, 12
-#: What half a cycle of delay weighs, in the criterion's units, is half of this; and what a cycle
-#: by which a drive would report too early does.
-_FRACTION, _EARLY = 100.0, 2e3
 
 
 @dataclass(frozen=True)
@@ -192,18 +149,18 @@ def identify_with_path(
     task, found = task.balanced(task.refined(best, again))
     uncertainty = task.uncertainty(found, corner_known)
     by_torque = found.path
-    for _ in range(_PASSES if np.all(np.isfinite(uncertainty.path_step)) else 0):
-        if np.all(np.abs(uncertainty.path_step) < _SETTLED * uncertainty.path_std):
+    for _ in range(threshold.PASSES if np.all(np.isfinite(uncertainty.path_step)) else 0):
+        if np.all(np.abs(uncertainty.path_step) < threshold.SETTLED * uncertainty.path_std):
             break
         found = task.moved(found, uncertainty)
         uncertainty = task.uncertainty(found, corner_known, by_torque)
     found, uncertainty = task.with_sure_modes(found, uncertainty, corner_known)
-    alike = [t for t in trials[1:] if _rank(t) < _rank(best) + _UNDECIDED]
+    alike = [t for t in trials[1:] if _rank(t) < _rank(best) + threshold.UNDECIDED]
     made = _undecided(_identification(task, found, uncertainty), best, alike)
     unexplained_torque = (
         not closed
         and all(record.torque is not None for record in records)
-        and torque_left(settled(records), made.fit.path) > _TORQUE_LEFT
+        and torque_left(settled(records), made.fit.path) > threshold.TORQUE_LEFT
     )
     return replace(made, torque_dropped=dropped, torque_unexplained=unexplained_torque)
 
@@ -230,21 +187,23 @@ def _by_motion(
     likeliest = trials[0].path if trials else paths[0]
     reported = likeliest.current_bandwidth_hz if corner_known else None
     found: list[_Trial] = []
-    for corner in (reported or USUAL_CURRENT_HZ, _SLOW_HZ):
+    for corner in (reported or USUAL_CURRENT_HZ, threshold.SLOW_HZ):
         begun = replace(likeliest, current_bandwidth_hz=corner)
         found += [alone.at_cycles(begun, hold) for hold in _HOLDS]
         found.sort(key=_rank)
         found[0] = alone.by_motion(found[0])
-        if found[0].fit.error < _EXPLAINED:
+        if found[0].fit.error < threshold.EXPLAINED:
             break
     found.sort(key=_rank)
     best = found[0].fit
     if not trials:
         begun_there = [task.trial(each, None, None, found[0].solution) for each in paths]
-        if _explains(best, min(begun_there, key=_rank).fit, _BY_FAR, _FAR_CLEARLY):
+        if _explains(
+            best, min(begun_there, key=_rank).fit, threshold.BY_FAR, threshold.FAR_CLEARLY
+        ):
             return alone, found, True
         trials = task.trials(paths)
-    if _explains(best, trials[0].fit, _BY_MOTION, _CLEARLY):
+    if _explains(best, trials[0].fit, threshold.BY_MOTION, threshold.CLEARLY):
         return alone, found, True
     return task, trials, False
 
@@ -259,18 +218,18 @@ def _odd(task: _Task, path: SignalPath, corner_known: bool) -> bool:
     if any(record.torque is None for record in task.records):
         return False
     corner = path.current_bandwidth_hz or USUAL_CURRENT_HZ
-    odd = not corner_known and not _ORDINARY_HZ[0] < corner < _ORDINARY_HZ[1]
+    odd = not corner_known and not threshold.ORDINARY_HZ[0] < corner < threshold.ORDINARY_HZ[1]
     left = torque_left(task.records, path)
     # Parts of a cycle are no reason where they explain the torque to its rounding.
-    parts = not at_whole_cycles(path) and left > _ROUNDED
-    return odd or parts or left > _TORQUE_LEFT
+    parts = not at_whole_cycles(path) and left > threshold.ROUNDED
+    return odd or parts or left > threshold.TORQUE_LEFT
 
 
 def _suspect(task: _Task, trial: _Trial, corner_known: bool) -> bool:
     """Whether the motion shows that the reported torque may be another than what drives it."""
     if any(record.torque is None for record in task.records):
         return False
-    late = abs(trial.fit.delay_s) > _LEFT_BY_TORQUE_S
+    late = abs(trial.fit.delay_s) > threshold.LEFT_BY_TORQUE_S
     return late or _odd(task, trial.path, corner_known) or _beyond_passive(trial)
 
 
@@ -281,11 +240,16 @@ def _beyond_passive(trial: _Trial) -> bool:
     """
     frf = trial.views.position or trial.views.velocity
     late = trial.fit.position_delay_s if trial.views.position else trial.fit.delay_s
-    use = (frf.frequency_hz < DIRECT_SHARE * frf.sample_rate_hz) & (frf.coherence > _COHERENT)
-    if np.count_nonzero(use) < _FEW:
+    use = (frf.frequency_hz < DIRECT_SHARE * frf.sample_rate_hz) & (
+        frf.coherence > threshold.COHERENT
+    )
+    if np.count_nonzero(use) < threshold.FEW:
         return False
     true = frf.response[use] / delay_response(frf.frequency_hz[use], late)
-    return float(np.mean(np.abs(np.degrees(np.angle(true))) > 90.0 + _PASSIVE_DEG)) > _PASSIVE_SHARE
+    return (
+        float(np.mean(np.abs(np.degrees(np.angle(true))) > 90.0 + threshold.PASSIVE_DEG))
+        > threshold.PASSIVE_SHARE
+    )
 
 
 @dataclass(frozen=True)
@@ -334,7 +298,7 @@ class _Task:
         """
         first = [p for p in paths if at_whole_cycles(p)] or list(paths)
         tried = sorted((self.trial(p) for p in first), key=_rank)
-        if abs(tried[0].fit.delay_s) * paths[0].sample_rate_hz > _LEFT_LATE:
+        if abs(tried[0].fit.delay_s) * paths[0].sample_rate_hz > threshold.LEFT_LATE:
             tried += [self.trial(p) for p in paths if p not in first]
         return sorted(tried, key=_rank)
 
@@ -354,11 +318,11 @@ class _Task:
 
     def by_motion(self, trial: _Trial) -> _Trial:
         """The same with a path that only the motion moves, from where it is usual."""
-        for _ in range(_MOTION_PASSES):
+        for _ in range(threshold.MOTION_PASSES):
             uncertainty = self.uncertainty(trial, corner_known=False)
             finite = np.all(np.isfinite(uncertainty.path_step))
             if not finite or np.all(
-                np.abs(uncertainty.path_step) < _SETTLED * uncertainty.path_std
+                np.abs(uncertainty.path_step) < threshold.SETTLED * uncertainty.path_std
             ):
                 break
             moved = self.moved(trial, uncertainty)
@@ -383,7 +347,7 @@ class _Task:
     def refined(self, first: _Trial, path_of: Callable[[SampledFit], SignalPath]) -> _Trial:
         """Loop, path and mechanics in turn: each is needed to take the images out of the others."""
         last = first
-        for _ in range(_PASSES if self.quantity == "torque_injection" else 0):
+        for _ in range(threshold.PASSES if self.quantity == "torque_injection" else 0):
             path = path_of(last.fit)
             change = abs(self._loop(path, last.fit).c0 / last.fit.loop.c0 - 1.0)
             if _alike(path, last.path) and change < 0.003:
@@ -401,7 +365,7 @@ class _Task:
         best = task, last
         lag_s = speed_lag_s(self.records, trial.path)
         motion = trial.fit if self.quantity == "torque_injection" else None
-        for n in range(_BALANCES):
+        for n in range(threshold.BALANCES):
             if last.fit.error > max(TRUSTED_ERROR, 1.5 * last.fit.noise):
                 break
             friction_nm = last.views.velocity.coulomb_nm
@@ -412,7 +376,7 @@ class _Task:
             anew = n == 0 and _hidden_by_friction(trial)
             last = task.trial(trial.path, None, motion, None if anew else last.solution)
             least = best[1].views.velocity.scatter_left
-            if last.views.velocity.scatter_left < _AS_ALIKE * least:
+            if last.views.velocity.scatter_left < threshold.AS_ALIKE * least:
                 best = task, last
         return best
 
@@ -427,14 +391,14 @@ class _Task:
         while trial.fit.error <= TRUSTED_ERROR and _unsure(trial, uncertainty):
             task = replace(self, max_modes=len(trial.fit.model.modes) - 1)
             fewer = task.trial(trial.path, trial.views.velocity.coulomb_nm, motion)
-            if fewer.fit.score > trial.fit.score + _WORTH_A_MODE:
+            if fewer.fit.score > trial.fit.score + threshold.WORTH_A_MODE:
                 break
             trial, uncertainty = fewer, task.uncertainty(fewer, corner_known)
         return trial, uncertainty
 
     def moved(self, trial: _Trial, uncertainty: Uncertainty) -> _Trial:
         """The same mechanics refined on the path that torque and motion together would have."""
-        most = np.maximum(2.0 * uncertainty.path_std, _LONGEST_STEP)
+        most = np.maximum(2.0 * uncertainty.path_std, threshold.LONGEST_STEP)
         step = np.clip(uncertainty.path_step, -most, most)
         path = moved_path(trial.path, float(step[0]), float(step[1]) if step.size > 1 else 0.0)
         motion = trial.fit if self.quantity == "torque_injection" else None
@@ -455,14 +419,14 @@ class _Task:
         problem = trial.solution.problem
         shifted = []
         for n in range(len(covariance)):
-            path = moved_path(trial.path, _STEP * (n == 0), _STEP * (n == 1))
+            path = moved_path(trial.path, threshold.STEP * (n == 0), threshold.STEP * (n == 1))
             other = self.views(path, trial.views.velocity.coulomb_nm)
             seen = views_of(other.velocity, other.position, path, trial.fit.loop)
             views = tuple(
                 replace(v, g=o.g, sampler=o.sampler)
                 for v, o in zip(problem.views, seen, strict=True)
             )
-            shifted.append(Shifted(views, _STEP))
+            shifted.append(Shifted(views, threshold.STEP))
         moved = path_between(by_torque or trial.path, trial.path)[: len(covariance)]
         return joint_uncertainty(problem, trial.solution.x, shifted, covariance, moved)
 
@@ -497,7 +461,7 @@ def _implausible(fit: SampledFit) -> float:
     first_s = min(fit.delay_s, fit.position_delay_s)
     early = max(-first_s * path.sample_rate_hz - 0.1, 0.0)
     cycles = cycles_of(path)
-    return _EARLY * early + _FRACTION * abs(cycles - round(cycles))
+    return threshold.EARLY * early + threshold.FRACTION * abs(cycles - round(cycles))
 
 
 def _identification(task: _Task, trial: _Trial, uncertainty: Uncertainty) -> Identification:
@@ -524,7 +488,9 @@ def _identification(task: _Task, trial: _Trial, uncertainty: Uncertainty) -> Ide
     direct = [widened(p.lines, p.factor, 1.0, p.direct) for p in parts]
     corrected = [without_images(p.lines, p.factor, task.jitter_s, p.corrected) for p in parts]
     # Play changes stiffness, and so everything above the frequency where it shows most.
-    share = np.maximum.accumulate(spoilt.share) if spoilt.play else _AVERAGED * spoilt.share
+    share = (
+        np.maximum.accumulate(spoilt.share) if spoilt.play else threshold.AVERAGED * spoilt.share
+    )
     best, lines = (everywhere(distorted(pooled(parts), share)) for parts in (corrected, direct))
     if spoilt.play:
         lines = lines.cut(lines.valid_band_hz[1])
@@ -541,14 +507,17 @@ def _identification(task: _Task, trial: _Trial, uncertainty: Uncertainty) -> Ide
 def _hidden_by_friction(trial: _Trial) -> bool:
     """Whether lines were so uncertain by friction that other mechanics may have been there."""
     uncertainty = trial.views.velocity.friction
-    return uncertainty is not None and float(np.mean(np.abs(uncertainty) > _HIDDEN)) > _HIDDEN_SHARE
+    return (
+        uncertainty is not None
+        and float(np.mean(np.abs(uncertainty) > threshold.HIDDEN)) > threshold.HIDDEN_SHARE
+    )
 
 
 def _unsure(trial: _Trial, uncertainty: Uncertainty) -> bool:
     """Whether a mode within the band has a part in the response that may be nothing."""
     low, high = trial.views.velocity.frequency_hz[0], trial.fit.valid_band_hz[1]
     pairs = zip(trial.fit.model.modes, _mode_uncertainties(trial, uncertainty), strict=True)
-    return any(d.residue > _UNSURE and low < m.frequency_hz < high for m, d in pairs)
+    return any(d.residue > threshold.UNSURE and low < m.frequency_hz < high for m, d in pairs)
 
 
 def _mode_uncertainties(trial: _Trial, uncertainty: Uncertainty) -> tuple[ModeUncertainty, ...]:

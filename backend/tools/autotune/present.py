@@ -31,6 +31,7 @@ from backend.tools.measuring.temporary import write_settings
 from backend.tools.notch import filters as notch_tool
 from backend.tools.notch.effect import unknown
 from backend.tools.notch.meaning import meaning_of
+from backend.tools.thresholds import autotune_present as threshold
 from backend.work.jobs import Progress
 from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import Text, text
@@ -38,8 +39,6 @@ from drivers.texts.message import Text, text
 _TURN = 2.0 * np.pi
 #: Said where nothing was changed.
 KEPT = text("autotune.kept-as-it-was")
-#: A design whose speed gain is this much below what the axis has is slower.
-_SLOWER = 0.9
 
 
 @dataclass(frozen=True)
@@ -55,7 +54,10 @@ class Present:
         now, then = self.candidate and self.candidate.bandwidth_hz, design.bandwidth_hz
         if now and then and then > now:
             return False
-        return self.speed_nms is not None and design.gains.speed_nms < _SLOWER * self.speed_nms
+        return (
+            self.speed_nms is not None
+            and design.gains.speed_nms < threshold.SLOWER * self.speed_nms
+        )
 
     def reported(self, design: Candidate, tried: bool) -> Text | None:
         """That a design is slower than what the axis had, and why it is taken all the same."""

@@ -17,12 +17,8 @@ from backend.tools.health.result import (
     HealthValue,
     Quantity,
 )
+from backend.tools.thresholds import health_evaluate as threshold
 from backend.tools.tool import Arrays, Meta
-
-#: So many of a kind are followed, the lowest ones: they are the stiffness of the drive train.
-_FOLLOWED = 3
-#: Speeds of both directions belong together within this share.
-_SAME_SPEED = 0.03
 
 
 def resonances(found: Iterable[Resonance]) -> list[HealthValue]:
@@ -31,7 +27,7 @@ def resonances(found: Iterable[Resonance]) -> list[HealthValue]:
     kinds: tuple[Quantity, ...] = ("resonance", "antiresonance")
     rows = sorted(found, key=lambda row: row.frequency_hz)
     for kind in kinds:
-        own = [row for row in rows if row.kind == kind][:_FOLLOWED]
+        own = [row for row in rows if row.kind == kind][: threshold.FOLLOWED]
         for number, row in enumerate(own, 1):
             low, high = row.frequency_ci95_hz or (None, None)
             values.append(
@@ -53,7 +49,7 @@ def friction(points: Sequence[FrictionPoint]) -> HealthValue | None:
             (each for each in points if each.speed_rpm < 0),
             key=lambda each: abs(each.speed_rpm + ahead.speed_rpm), default=None,
         )  # fmt: skip
-        if back is None or abs(back.speed_rpm / ahead.speed_rpm + 1.0) > _SAME_SPEED:
+        if back is None or abs(back.speed_rpm / ahead.speed_rpm + 1.0) > threshold.SAME_SPEED:
             continue
         halves.append(0.5 * (ahead.torque_percent - back.torque_percent))
         deviations = [
