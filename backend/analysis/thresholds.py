@@ -728,9 +728,6 @@ class foreign:
     855a6a86."""
     FEWEST_EMPTY = 8
     """[count] Empty lines that tell distortion, at least. Origin: 855a6a86."""
-    CLIPPED = 0.01
-    """[ratio] Share of samples at the extreme value from which a signal counts as clipped. Origin:
-    855a6a86."""
 
 
 class frf:

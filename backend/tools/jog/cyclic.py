@@ -219,10 +219,6 @@ async def jog_cyclic(
             reason = await _while_held(axis, session, hold)
             if reason:
                 break
-            if not isinstance(session.cyclic, bus.Pauses):
-                hold.release("no sign of life from the page for 200 ms")
-                reason = hold.ended()
-                break
             await session.cyclic.pause(station)
             if reason := await _alive(axis, session, hold):
                 break

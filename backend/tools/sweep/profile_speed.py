@@ -25,7 +25,7 @@ from backend.tools.thresholds import sweep_profile_speed as threshold
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, exceeded
 from drivers.halt import HaltCause
-from drivers.link import Link, TakesSpeeds
+from drivers.link import Link
 
 CONSENT = (
     "the drive has no watchdog that ends a speed when this computer falls silent: if the cable is "
@@ -43,7 +43,8 @@ def needed(drive: Drive, link: Link) -> bool:
     target = drive.profile.by_role.get("velocity_target")
     mapped = target is not None and target.pdo in ("rx", "rxtx")
     only_profile = Mode.PV in modes and not modes & {Mode.CSP, Mode.CSV, Mode.CST}
-    return mapped and only_profile and isinstance(link.cyclic, TakesSpeeds)
+    cyclic = link.cyclic
+    return mapped and only_profile and cyclic is not None and cyclic.speeds is not None
 
 
 def require_consent(session: CyclicSession, drive: Drive, consent: bool) -> None:
