@@ -339,10 +339,18 @@ class Drive:
             Rejected: the drive refused.
             LinkTimeout: the outcome is unknown, and reading back failed as well.
         """
-        self._refuse_energising(key, value)
-        parameter, value = self._to_be_written(key, value, raw=raw)
+        parameter, value = self.check_write(key, value, raw=raw)
         await self._require_harmless(parameter)
         return await self._written(parameter, value)
+
+    def check_write(self, key: str, value: Raw, *, raw: bool = True) -> tuple[Parameter, Raw]:
+        """What `write` refuses by the profile, before a byte leaves; the parameter and raw value.
+
+        Raises:
+            NotGranted, NotAllowed, OutOfRange: as `write`.
+        """
+        self._refuse_energising(key, value)
+        return self._to_be_written(key, value, raw=raw)
 
     async def energise(self, key: str, raw: Raw, grant: Grant) -> Reading:
         """Like `write`, of a raw value to an object that can put energy into the motor.
