@@ -257,7 +257,7 @@ class friction:
 
 
 class identify:
-    """`mechanics/identify.py`."""
+    """`mechanics/identify.py`, `mechanics/identification_trials.py`."""
 
     TRUSTED_ERROR = 0.03
     """[ratio] A model whose median relative misfit is larger, and larger than the noise, corrects

@@ -265,6 +265,17 @@ class brake_evaluate:
     """[ratio] Below this share of what it was the torque counts as gone. Origin: ca58f5df."""
 
 
+class brake_texts:
+    """`brake/texts.py`."""
+
+    CREPT = 0.05
+    """[ratio] Slip below this share of the limit is what an encoder and a settling hub show.
+    Origin: ca58f5df."""
+    SHORT = 0.95
+    """[ratio] Share of the test torque below which the held torque is shown as less than it.
+    Origin: ca58f5df."""
+
+
 class brake_run:
     """`brake/run.py`."""
 

@@ -10,6 +10,8 @@ from benchmarks import thresholds as script
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("backend/analysis", "backend/tools")
+#: Folders whose numbers still stand in their modules.
+NOT_YET = ("backend/analysis/duty/", "backend/tools/cycle/", "backend/tools/safety_check/")
 #: Numbers that follow from a definition: no one chose them, or they are part of an interface.
 DEFINED = {
     "TURN": "2π",
@@ -68,7 +70,7 @@ def test_chosen_numbers_stand_in_the_table_only(package):
     outside = [
         f"{path.relative_to(ROOT)}: {name}"
         for path in sorted((ROOT / package).rglob("*.py"))
-        if path.name != "thresholds.py"
+        if path.name != "thresholds.py" and not str(path.relative_to(ROOT)).startswith(NOT_YET)
         for name, value in _assigned(ast.parse(path.read_text()))
         if name.isupper() and name not in DEFINED and _numeric(value)
     ]
@@ -81,9 +83,9 @@ def test_each_number_has_a_unit_an_origin_and_a_reader(package):
     source = table.read_text()
     for space in (node for node in ast.parse(source).body if isinstance(node, ast.ClassDef)):
         words = ast.get_docstring(space) or ""
-        module = re.fullmatch(r"`(.+\.py)`\.", words)
-        assert module, f"{space.name} names no module"
-        code = (ROOT / package / module[1]).read_text()
+        modules = re.findall(r"`(.+?\.py)`", words)
+        assert modules, f"{space.name} names no module"
+        code = "".join((ROOT / package / module).read_text() for module in modules)
         assert f"import {space.name} as threshold" in code
         for number, words_of in zip(space.body[1::2], space.body[2::2], strict=True):
             assert isinstance(number, ast.Assign)
