@@ -3,10 +3,10 @@
 One namespace for each module, which imports it as ``threshold``. Behind each number stands its
 unit in brackets ("ratio" and "count" have none), what it decides, and its origin: the commit that
 set it, with the benchmark or page of figures that the commit changed, where it changed one.
-"Halved" and "doubled" say what `python -m benchmarks.thresholds` measured with the number changed
-on the axes that it names; a number without them was not measured.
-Numbers that follow from a definition (95 % of a normal distribution, counts of model parameters,
-coefficients of a drive's format) stand in their modules.
+`python -m benchmarks.thresholds` halves and doubles the numbers of the analysis; what half and
+twice of those here do was not measured, as each case would need a whole tool on a virtual drive.
+Numbers that follow from a definition (bits of a status word, the range of an object) stand in
+their modules.
 """
 
 from __future__ import annotations
