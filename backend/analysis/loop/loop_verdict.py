@@ -122,8 +122,10 @@ class LoopVerdict:
         if self.stated.ms > promised.ms * ms_ratio:
             found.append(Missed("peak_sensitivity", self.stated.ms, promised.ms))
         reported = {each.what for each in found}
-        ends = (*_short(self.measured, "measured", promised),
-                *_short(self.designed, "predicted", promised))  # fmt: skip
+        ends = (
+            *_short(self.measured, "measured", promised),
+            *_short(self.designed, "predicted", promised),
+        )
         return (*found, *(each for each in ends if each.what not in reported))
 
 

@@ -110,17 +110,19 @@ def fit_effect_in_loop(
     """
     f = np.asarray(frequency_hz, np.float64)
     controller = (
-        loop.response(f) * lag_response(f, path.current_bandwidth_hz)
+        loop.response(f)
+        * lag_response(f, path.current_bandwidth_hz)
         * delay_response(f, path.loop_delay_s)
-    )  # fmt: skip
+    )
     forward = plain.torque + controller * plain.velocity
     own = controller * notched.velocity
     driven = forward - own
     size = np.abs(controller)
     noise = np.sqrt(
-        plain.torque_deviation**2 + notched.torque_deviation**2
+        plain.torque_deviation**2
+        + notched.torque_deviation**2
         + size**2 * (plain.velocity_deviation**2 + notched.velocity_deviation**2)
-    )  # fmt: skip
+    )
     deviation = noise / np.maximum(np.abs(driven), 1e-12)
     good = deviation < threshold.KNOWN_TO
     if np.count_nonzero(good) < threshold.LEAST_LINES:

@@ -138,7 +138,7 @@ def identify_with_path(
         known = replace(path, hold=fit.path.hold)
         return find_paths(
             task.records, known, loop_closed=True, hold_known=True, motion=fit, controller=task.loop
-        )[0]  # fmt: skip
+        )[0]
 
     task, found = task.balanced(task.refined(best, again))
     uncertainty = task.uncertainty(found, corner_known)
@@ -248,9 +248,7 @@ def _identification(task: Task, trial: Trial, uncertainty: Uncertainty) -> Ident
     """The estimates with what the fit found taken out."""
     views, path, fit = trial.views, trial.path, trial.fit
     spoilt = distortion(task.records, path, task.quantity, views.velocity)
-    by_place = inertia_by_place(
-        task.records, fit.path, task.quantity, views.velocity.coulomb_nm
-    )  # fmt: skip
+    by_place = inertia_by_place(task.records, fit.path, task.quantity, views.velocity.coulomb_nm)
 
     def everywhere(frf: Frf) -> Frf:
         return frf if by_place is None else by_place.charged(frf)

@@ -50,9 +50,11 @@ def with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
     measured = view.g[lines].astype(np.complex64)
     top = float(view.f[-1])
     grid_hz = np.concatenate(
-        [np.geomspace(threshold.LOWEST_TRIED * float(f[0]), 0.8 * top, 26),
-         np.geomspace(0.8 * top, HIGHEST_TRIED * top, 20)]
-    )  # fmt: skip
+        [
+            np.geomspace(threshold.LOWEST_TRIED * float(f[0]), 0.8 * top, 26),
+            np.geomspace(0.8 * top, HIGHEST_TRIED * top, 20),
+        ]
+    )
     worst_hz = _worst_hz(view, found)
     places = range(1 + (found.x.size - RIGID_PARAMETERS) // LOAD_PARAMETERS)
     trials: list[_Trial] = []
@@ -69,10 +71,11 @@ def with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
         kept, inertia, stiffness, _ = new[best].T
         frequencies, ratios = np.log(stiffness / inertia) / 2, np.log(inertia / kept)
         trials += [
-            _Trial(float(costs[i]), place, frequency, ratio, new[i], float(gain[i]),
-                   float(cycles[i]))
+            _Trial(
+                float(costs[i]), place, frequency, ratio, new[i], float(gain[i]), float(cycles[i])
+            )
             for i, frequency, ratio in zip(best, frequencies, ratios, strict=True)
-        ]  # fmt: skip
+        ]
     ranked = sorted(trials, key=lambda t: t.cost)
     edges = np.log(TURN * np.array([0.0, 0.3 * top, 0.7 * top, np.inf]) + 1e-12)
     chosen = ranked[:1]
@@ -145,8 +148,9 @@ def with_one_more_mode(problem: Problem, found: Found) -> list[FloatArray]:
             model.gain,
             np.array([*(m.frequency_hz for m in model.modes), hz[best]]),
             np.array([*(max(m.residue, 1e-9) for m in model.modes), residue]),
-            float(np.exp(found.x[1])), USUAL_DAMPING,
-        )  # fmt: skip
+            float(np.exp(found.x[1])),
+            USUAL_DAMPING,
+        )
     except ValueError:
         return []
     x[2:RIGID_PARAMETERS] = found.x[2:RIGID_PARAMETERS]

@@ -52,9 +52,10 @@ class ModeUncertainty:
         frequency = (self.frequency, mode.damping * phase, 0.5 * place)
         damping = (self.damping, phase, place)
         return replace(
-            self, frequency=float(np.linalg.norm(frequency)),
+            self,
+            frequency=float(np.linalg.norm(frequency)),
             damping=float(np.linalg.norm(damping)),
-        )  # fmt: skip
+        )
 
     def damping_interval(self, damping: float, deviations: float) -> tuple[float, float]:
         """Within so many deviations of a damping ratio."""

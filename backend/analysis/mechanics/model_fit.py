@@ -163,8 +163,9 @@ def _rigid_start(view: View, delay: float) -> FloatArray:
     """A single inertia, from the low lines, where every chain moves as one."""
     low = slice(0, max(3, view.f.size // 6))
     inertia = 1.0 / float(np.median(np.abs(view.g[low]) * TURN * view.f[low]))
-    return np.array([np.log(inertia), np.log(0.02 * TURN * view.f[0] * inertia), delay, delay,
-                     USUAL_CORNER])  # fmt: skip
+    return np.array(
+        [np.log(inertia), np.log(0.02 * TURN * view.f[0] * inertia), delay, delay, USUAL_CORNER]
+    )
 
 
 def _grown(problem: Problem, start: FloatArray, max_modes: int) -> Found:

@@ -17,9 +17,11 @@ _CI95 = 1.96
 
 
 def resonance_table(
-    model: MechanicalModel, lines_hz: FloatArray, highest_hz: float,
+    model: MechanicalModel,
+    lines_hz: FloatArray,
+    highest_hz: float,
     uncertainties: tuple[ModeUncertainty, ...] = (),
-) -> tuple[Resonance, ...]:  # fmt: skip
+) -> tuple[Resonance, ...]:
     """Resonances and antiresonances that the lines show, ascending; heights are local, in dB.
 
     A mode that hardly rises, or that no line shows because it is narrower than what lies between

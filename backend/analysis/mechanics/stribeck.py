@@ -68,9 +68,10 @@ class SpeedModel:
         values = np.array([each.values[index] for each in self.alike])
         spread = times * np.array([each.deviations[index] for each in self.alike])
         return (
-            float(self.best.values[index]), float(np.min(values - spread)),
+            float(self.best.values[index]),
+            float(np.min(values - spread)),
             float(np.max(values + spread)),
-        )  # fmt: skip
+        )
 
     def stribeck_speed(self) -> tuple[float, float, float]:
         """Where the Stribeck curve has fallen to 1/e, with its 95 % interval.

@@ -128,9 +128,9 @@ def mechanical_model(found: ForeignResponse, filter_hz: float | None) -> Mechani
         for i, other in enumerate(poles):
             w = TURN * other.frequency_hz
             root = _root(other.frequency_hz, other.damping)
-            factor = (s - root.conjugate()) if i == skip else (
-                s * s + 2 * other.damping * w * s + w * w
-            )  # fmt: skip
+            factor = (
+                (s - root.conjugate()) if i == skip else (s * s + 2 * other.damping * w * s + w * w)
+            )
             out *= w**2 / factor
         return out
 

@@ -196,8 +196,10 @@ class PathFit:
             return self._path_of(x, hold), cost
         end = scipy.optimize.minimize_scalar(
             lambda corner: float(np.sum(self._rows(np.array([x[0], corner]), hold) ** 2)),
-            bounds=(x[1] - 0.5, x[1] + 0.5), method="bounded", options={"maxiter": 12},
-        )  # fmt: skip
+            bounds=(x[1] - 0.5, x[1] + 0.5),
+            method="bounded",
+            options={"maxiter": 12},
+        )
         return self._path_of(np.array([x[0], end.x]), hold), min(cost, float(end.fun))
 
     def _refined(self, x0: FloatArray, hold: Hold) -> tuple[FloatArray, float]:

@@ -78,9 +78,11 @@ def model_of(x: FloatArray, like: ProductModel) -> ProductModel:
         for i, p in enumerate(like.pairs)
     )
     return ProductModel(
-        float(np.sign(like.gain) * np.exp(x[0])), float(x[1]) / 1e3,
-        tuple(float(np.exp(v)) for v in x[2 : 2 + real]), pairs,
-    )  # fmt: skip
+        float(np.sign(like.gain) * np.exp(x[0])),
+        float(x[1]) / 1e3,
+        tuple(float(np.exp(v)) for v in x[2 : 2 + real]),
+        pairs,
+    )
 
 
 def log_ratio(response: ComplexArray, model: ProductModel, f: FloatArray) -> ComplexArray:
@@ -146,11 +148,13 @@ def _with_real(
         tried = [
             _refined(
                 replace(best, gain=sign * best.gain, poles_hz=(*best.poles_hz, corner)),
-                f, response, w,
+                f,
+                response,
+                w,
             )
             for corner in (float(f[0]) / 3.0, float(np.sqrt(f[0] * f[-1])), float(f[-1]))
             for sign in (1.0, -1.0)
-        ]  # fmt: skip
+        ]
         more = min(tried, key=lambda each: _cost(each, f, response, w))
         if _cost(more, f, response, w) > threshold.WORTH_REAL * _cost(best, f, response, w):
             break
@@ -203,8 +207,10 @@ def _left(left: ComplexArray, w: FloatArray) -> float:
 def _bounds(model: ProductModel, f: FloatArray) -> tuple[FloatArray, FloatArray]:
     real, pairs = len(model.poles_hz), len(model.pairs)
     corner = (np.log(1e-3 * f[0]), np.log(20.0 * f[-1]))
-    pair = ((np.log(f[0] / threshold.BEYOND), np.log(threshold.DAMPING[0])),
-            (np.log(f[-1] * threshold.BEYOND), np.log(threshold.DAMPING[1])))  # fmt: skip
+    pair = (
+        (np.log(f[0] / threshold.BEYOND), np.log(threshold.DAMPING[0])),
+        (np.log(f[-1] * threshold.BEYOND), np.log(threshold.DAMPING[1])),
+    )
     late = 1e3 * 2.0 / float(f[-1])
     low = [-60.0, -0.05 * late, *[corner[0]] * real, *list(pair[0]) * pairs]
     high = [60.0, late, *[corner[1]] * real, *list(pair[1]) * pairs]

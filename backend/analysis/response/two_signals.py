@@ -87,6 +87,8 @@ def _without_first_image(velocity: Way, position: Way, fit: SampledFit) -> Way:
         distortion=both(one.distortion, other.distortion),
     )
     return Way(
-        lines, mixed(velocity.factor, position.factor),
-        wider(velocity.corrected, position.corrected), wider(velocity.direct, position.direct),
-    )  # fmt: skip
+        lines,
+        mixed(velocity.factor, position.factor),
+        wider(velocity.corrected, position.corrected),
+        wider(velocity.direct, position.direct),
+    )

@@ -66,10 +66,11 @@ async def bus_doctor(
         examined = await doctor.examination(number)
         found.append(
             StationDiagnosis(
-                station=number, reached=examined.reached,
+                station=number,
+                reached=examined.reached,
                 causes=[_cause(each) for each in examined.causes],
             )
-        )  # fmt: skip
+        )
     return found
 
 

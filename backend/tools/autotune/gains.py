@@ -63,8 +63,9 @@ async def read_gains(axis: Axis, facts: AxisFacts | None = None) -> GainState:
     facts = facts or await read_facts(axis)
     keys = [k for k in (spec.position, spec.speed, spec.integral) if k is not None]
     raw = {key: await drive.raw(key) for key in keys}
-    values = {key: si_value(drive.parameter(key), _engineering(drive, key, r))
-              for key, r in raw.items()}  # fmt: skip
+    values = {
+        key: si_value(drive.parameter(key), _engineering(drive, key, r)) for key, r in raw.items()
+    }
     table, level = _table(drive), None
     if table is not None and table.mode_key is not None:
         raw[table.mode_key] = await drive.raw(table.mode_key)
@@ -261,8 +262,9 @@ def loops_of(drive: Drive, facts: AxisFacts) -> DriveLoops:
     if spec.speed is not None:
         _low, high = drive.parameter(spec.speed).raw_limits
         if high is not None:
-            highest = si_value(drive.parameter(spec.speed),
-                               _engineering(drive, spec.speed, int(high)))  # fmt: skip
+            highest = si_value(
+                drive.parameter(spec.speed), _engineering(drive, spec.speed, int(high))
+            )
     return DriveLoops(
         current_bandwidth_hz=facts.current_bandwidth_hz,
         delay_s=threshold.LOOP_PERIOD_S,

@@ -95,9 +95,11 @@ async def present(
     if notches and meaning_of(drive) is None and unknown(drive):
         return reported
     gains = Gains(
-        now.speed_nms, now.integral_hz or 0.0, now.position_1_s or 0.0,
+        now.speed_nms,
+        now.integral_hz or 0.0,
+        now.position_1_s or 0.0,
         now.speed_nms / (_TURN * inertia_kgm2),
-    )  # fmt: skip
+    )
     try:
         candidate, sound = await asyncio.to_thread(
             judged, axis, facts, plant, gains, tuple(notches),
@@ -186,9 +188,11 @@ class Trials:
         async def softer(candidate: Candidate, share: float) -> Candidate | None:
             g = candidate.gains
             gains = Gains(
-                share * g.speed_nms, share * g.integral_hz, share * g.position_1_s,
+                share * g.speed_nms,
+                share * g.integral_hz,
+                share * g.position_1_s,
                 share * g.speed_bandwidth_hz,
-            )  # fmt: skip
+            )
             made, sound = await asyncio.to_thread(
                 judged, self.axis, self.check.facts, plant, gains, candidate.notches,
                 candidate.filters, self.promised,

@@ -236,9 +236,10 @@ def restless(step: step_evaluation.StepResult) -> Text | None:
 
 
 def _joined(
-    first: sweep_evaluation.SweepResult, read: dict[str, float | bool | None],
+    first: sweep_evaluation.SweepResult,
+    read: dict[str, float | bool | None],
     more: sweep_evaluation.SweepResult,
-) -> tuple[sweep_evaluation.SweepResult, dict[str, float | bool | None]]:  # fmt: skip
+) -> tuple[sweep_evaluation.SweepResult, dict[str, float | bool | None]]:
     """A loop measured again with more realisations, and what to read from both.
 
     The bandwidth is that of the mean over all of them. What they differ by blurs lines, so margins
@@ -305,9 +306,11 @@ def unseen(last_hz: float | None, verified: Verified) -> Text | None:
             return None
         top = 0.0 if verdict.measured is None else verdict.measured.high_hz
         return text(
-            "autotune.margins-bounded", crossover_hz=verdict.last_crossover_hz, measured_hz=top,
+            "autotune.margins-bounded",
+            crossover_hz=verdict.last_crossover_hz,
+            measured_hz=top,
             gain_db=verdict.shown_gain_db,
-        )  # fmt: skip
+        )
     frf = verified.sweep.frf
     lines = frf.frequency_hz[frf.in_band & (frf.coherence > COHERENT)]
     if not verified.sweep.margins or last_hz is None or last_hz <= np.max(lines, initial=0.0):

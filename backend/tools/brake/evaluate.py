@@ -74,11 +74,13 @@ class Trials:
     def facts(self) -> dict[str, object]:
         """For storage, beside the arrays."""
         return {
-            "sample_rate_hz": self.sample_rate_hz, "torque_step_nm": self.torque_step_nm,
-            "test_percent": self.test_percent, "means": self.means,
+            "sample_rate_hz": self.sample_rate_hz,
+            "torque_step_nm": self.torque_step_nm,
+            "test_percent": self.test_percent,
+            "means": self.means,
             "measured_at": self.measured_at,
             "halted": [each.direction for each in self.trials if each.halted],
-        }  # fmt: skip
+        }
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> BrakeResult:
@@ -89,9 +91,11 @@ def reevaluate(arrays: Arrays, meta: Meta) -> BrakeResult:
     """
     given, facts, halted = meta.get("settings"), meta.get("facts"), meta.get("halted")
     if (
-        not isinstance(given, dict) or not isinstance(facts, dict) or "way" not in arrays
+        not isinstance(given, dict)
+        or not isinstance(facts, dict)
+        or "way" not in arrays
         or not isinstance(halted, list)
-    ):  # fmt: skip
+    ):
         raise ValueError("not the raw data of a brake test")
     way = np.asarray(arrays["way"], np.int64)
     trials = []
@@ -101,13 +105,15 @@ def reevaluate(arrays: Arrays, meta: Meta) -> BrakeResult:
         if np.any(at):
             trials.append(
                 Trial(
-                    direction, np.asarray(arrays["position_rad"], np.float64)[at],
+                    direction,
+                    np.asarray(arrays["position_rad"], np.float64)[at],
                     np.asarray(arrays["torque_nm"], np.float64)[at],
                     np.asarray(arrays["sent_nm"], np.float64)[at],
                     np.asarray(arrays["phase"], np.int64)[at],
-                    np.asarray(arrays["valid"], np.bool_)[at], direction in halted,
+                    np.asarray(arrays["valid"], np.bool_)[at],
+                    direction in halted,
                 )
-            )  # fmt: skip
+            )
     test = Trials(
         tuple(trials), float(str(meta["sample_rate_hz"])), float(str(meta["torque_step_nm"])),
         float(str(meta["test_percent"])), "supply" if meta["means"] == "supply" else "output",
@@ -119,9 +125,7 @@ def reevaluate(arrays: Arrays, meta: Meta) -> BrakeResult:
 def evaluate(test: Trials, settings: BrakeSettings, facts: AxisFacts) -> BrakeResult:
     """The verdict of both directions."""
     limit = settings.envelope.travel_rev
-    found = [
-        _Way(trial, test, facts.rated_torque_nm, limit).judged() for trial in test.trials
-    ]  # fmt: skip
+    found = [_Way(trial, test, facts.rated_torque_nm, limit).judged() for trial in test.trials]
     ways = tuple(way for way, _ in found)
     verdict = _worst([way.verdict for way in ways])
     least = min(way.torque_percent for way in ways)
@@ -174,9 +178,7 @@ class _Way:
         """The direction, and the compliance in revolutions per %."""
         phase, valid = self._trial.phase, self._trial.valid
         before = np.arange(phase.size) < self._end
-        loading = np.flatnonzero(
-            ((phase == Phase.RAMP) | (phase == Phase.TOP)) & valid & before
-        )  # fmt: skip
+        loading = np.flatnonzero(((phase == Phase.RAMP) | (phase == Phase.TOP)) & valid & before)
         ramp = loading[phase[loading] == Phase.RAMP]
         if ramp.size < 2 * threshold.PARTS:
             return self._not_closed(), 0.0

@@ -85,12 +85,14 @@ async def run(run: Run, settings: FirstPowerSettings) -> FirstPowerResult:
     seen = replace(seen, obstacle=obstacle)
     if run.keep is not None:
         run.keep(
-            "first-power", arrays_of(pulses),
+            "first-power",
+            arrays_of(pulses),
             {
-                "tool": "first-power", "settings": settings.model_dump(mode="json"),
+                "tool": "first-power",
+                "settings": settings.model_dump(mode="json"),
                 "seen": facts_of(seen),
             },
-        )  # fmt: skip
+        )
     return evaluate(seen, pulses, settings)
 
 
@@ -302,9 +304,7 @@ class _Test:
             cut = True
             await axis.standstill(threshold.SETTLES_S)
         after = await self._place()
-        pulse = Pulse(
-            direction=direction, torque_percent=percent, from_rev=before, to_rev=after
-        )  # fmt: skip
+        pulse = Pulse(direction=direction, torque_percent=percent, from_rev=before, to_rev=after)
         return pulse, cut
 
     def _around(self, place_rev: float) -> bus.Envelope:
@@ -313,20 +313,23 @@ class _Test:
         way = abs(self._units.position_raw(threshold.CUT_REV))
         assert limits.position_min is not None and limits.position_max is not None  # noqa: PT018
         return replace(
-            limits, position_min=max(limits.position_min, here - way),
+            limits,
+            position_min=max(limits.position_min, here - way),
             position_max=min(limits.position_max, here + way),
-        )  # fmt: skip
+        )
 
     def _sequence(self, percent: float) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
         rate = 1.0 / cycle_s(self._run.session)
         edge = np.linspace(0.0, 1.0, max(2, round(threshold.RAMP_S * rate)))
         shape = np.concatenate(
             [
-                np.zeros(max(1, round(threshold.LEAD_S * rate))), edge,
-                np.ones(max(1, round(threshold.PULSE_S * rate))), edge[::-1],
+                np.zeros(max(1, round(threshold.LEAD_S * rate))),
+                edge,
+                np.ones(max(1, round(threshold.PULSE_S * rate))),
+                edge[::-1],
                 np.zeros(max(1, round(threshold.AFTER_S * rate))),
             ]
-        )  # fmt: skip
+        )
         return np.array([self._units.torque_raw(percent * each) for each in shape], np.int64)
 
     async def _settled(self) -> None:

@@ -125,9 +125,11 @@ def planned(settings: FrictionSettings, room: Room, units: AxisUnits) -> Plan:
             whole = sorted([*found, *([ripple] if ripple else [])], key=lambda s: s.speed_rps)
             if whole and sum(stroke.duration_s for stroke in whole) <= room.time_s:
                 return Plan(
-                    tuple(whole), ripple.speed_rps if ripple else None,
-                    fastest < 0.95 * room.speed_rps, lowest > slowest,
-                )  # fmt: skip
+                    tuple(whole),
+                    ripple.speed_rps if ripple else None,
+                    fastest < 0.95 * room.speed_rps,
+                    lowest > slowest,
+                )
         lowest *= 1.3
         if lowest >= 0.5 * fastest:
             raise OutOfRange(

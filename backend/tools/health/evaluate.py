@@ -47,8 +47,9 @@ def friction(points: Sequence[FrictionPoint]) -> HealthValue | None:
     for ahead in (each for each in points if each.speed_rpm > 0):
         back = min(
             (each for each in points if each.speed_rpm < 0),
-            key=lambda each: abs(each.speed_rpm + ahead.speed_rpm), default=None,
-        )  # fmt: skip
+            key=lambda each: abs(each.speed_rpm + ahead.speed_rpm),
+            default=None,
+        )
         if back is None or abs(back.speed_rpm / ahead.speed_rpm + 1.0) > threshold.SAME_SPEED:
             continue
         halves.append(0.5 * (ahead.torque_percent - back.torque_percent))
@@ -70,11 +71,13 @@ def arrays_of(rounds: Sequence[HealthRound]) -> dict[str, npt.NDArray[np.generic
     """For storage: one row for each value; a missing quantity is a row without a value."""
     rows = [
         (index, QUANTITIES.index(each.quantity), each.number, each.value, each.low, each.high)
-        for index, one in enumerate(rounds) for each in one.values
+        for index, one in enumerate(rounds)
+        for each in one.values
     ] + [
         (index, QUANTITIES.index(name), 0, math.nan, None, None)
-        for index, one in enumerate(rounds) for name in one.missing
-    ]  # fmt: skip
+        for index, one in enumerate(rounds)
+        for name in one.missing
+    ]
     table = np.array(
         [[math.nan if cell is None else cell for cell in row] for row in rows], np.float64
     ).reshape(-1, 6)

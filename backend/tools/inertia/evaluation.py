@@ -178,9 +178,11 @@ def answer_of(outcome: InertiaOutcome) -> InertiaAnswer:
     """The result as page, report, files and command line have it."""
     r = outcome.result
     parts: dict[str, Interval] = {
-        "inertia_kgm2": r.inertia_kgm2, "viscous_nms": r.viscous_nms,
-        "coulomb_nm": r.coulomb_nm, "gravity_nm": r.gravity_nm,
-    }  # fmt: skip
+        "inertia_kgm2": r.inertia_kgm2,
+        "viscous_nms": r.viscous_nms,
+        "coulomb_nm": r.coulomb_nm,
+        "gravity_nm": r.gravity_nm,
+    }
     ratio, spread = r.load_ratio, None
     if ratio is not None and np.isfinite(r.inertia_kgm2.value):
         rotor = r.inertia_kgm2.value / (1.0 + ratio)

@@ -127,9 +127,8 @@ async def first_look(
         # Should it follow all at once, twice the way must still be permitted, and twice the torque.
         way_rev = 2.0 * float(np.sum(np.abs(speed))) / rate / 60.0
         cramped = (
-            way_rev > 0.8 * envelope.travel_rev
-            or 2.0 * float(np.max(np.abs(speed))) > highest_rpm
-        )  # fmt: skip
+            way_rev > 0.8 * envelope.travel_rev or 2.0 * float(np.max(np.abs(speed))) > highest_rpm
+        )
         if cramped or 2.0 * peak > 0.8 * envelope.torque_percent / 100.0:
             raise NotAllowed(
                 "inertia.moves-too-little-cramped" if cramped else "inertia.moves-too-little",

@@ -38,8 +38,10 @@ from drivers.texts.message import Text
 
 _ROLES = ("position_actual", "velocity_actual", "torque_actual", "status_word")
 _TARGET_OF = {
-    Mode.CSP: "position_target", Mode.CSV: "velocity_target", Mode.CST: "torque_target",
-}  # fmt: skip
+    Mode.CSP: "position_target",
+    Mode.CSV: "velocity_target",
+    Mode.CST: "torque_target",
+}
 
 
 @dataclass(frozen=True)

@@ -67,9 +67,11 @@ async def small_move(
             await quiet(axis)
             target = drive.parameter(drive.require("position_target"))
             trajectory = bus.Trajectory(
-                session.station(drive), address_of(target), start + path,
+                session.station(drive),
+                address_of(target),
+                start + path,
                 await _envelope(axis, settings, start),
-            )  # fmt: skip
+            )
             seen = _Seen(axis)
             leave = session.cyclic.blocks(seen.take)
             try:
@@ -89,8 +91,10 @@ async def small_move(
     scale = measured_scale(*seen.evenly(), cycle)
     axis.moved_small(moved, scale)
     return {
-        "moved_increments": moved, "raw_per_inc_s": scale, "next_most": longest_allowed(axis),
-    }  # fmt: skip
+        "moved_increments": moved,
+        "raw_per_inc_s": scale,
+        "next_most": longest_allowed(axis),
+    }
 
 
 class _Seen:
@@ -155,6 +159,8 @@ async def _envelope(axis: Axis, settings: SmallMoveSettings, start: int) -> bus.
     low, high = sorted((start, start + settings.increments))
     torque = (await axis.units()).torque_raw(settings.torque_percent)
     return bus.Envelope(
-        position_min=low - margin, position_max=high + margin, torque_max=torque,
+        position_min=low - margin,
+        position_max=high + margin,
+        torque_max=torque,
         following_error_max=margin,
-    )  # fmt: skip
+    )

@@ -198,9 +198,10 @@ def _sequence(
     """The excitation of a frequency response, one realisation, or ``part`` of its size."""
     rated = facts.rated_torque_nm
     room = excite.Room(
-        envelope.torque_percent / 100.0 * rated, part * envelope.speed_rpm * _TURN / 60.0,
+        envelope.torque_percent / 100.0 * rated,
+        part * envelope.speed_rpm * _TURN / 60.0,
         envelope.travel_rev * _TURN,
-    )  # fmt: skip
+    )
     band = excite.band_for(rate, threshold.STILL_FROM_HZ if still else 5.0, None)
     try:
         made = excite.torque_mode(
@@ -380,6 +381,7 @@ def _every_level(drive: Drive, points: list[tuple[int, float]]) -> tuple[tuple[i
 
 def path_of(rate: float, facts: AxisFacts, hold: str | None, delay_s: float) -> SignalPath:
     """The path between setpoint and torque, as a frequency response found it."""
-    path = SignalPath(rate, current_bandwidth_hz=facts.current_bandwidth_hz,
-                      command_delay_s=delay_s)  # fmt: skip
+    path = SignalPath(
+        rate, current_bandwidth_hz=facts.current_bandwidth_hz, command_delay_s=delay_s
+    )
     return replace(path, hold="linear") if hold == "linear" else path

@@ -371,9 +371,11 @@ async def write_notches(
 
 
 def combined(
-    profile: Profile, notches: Sequence[Notch], frequency_hz: FloatArray,
+    profile: Profile,
+    notches: Sequence[Notch],
+    frequency_hz: FloatArray,
     meaning: NotchMeaning | None = None,
-) -> ComplexArray:  # fmt: skip
+) -> ComplexArray:
     """All notches in series as the drive makes them."""
     total: ComplexArray = np.ones(frequency_hz.shape, dtype=np.complex128)
     for notch in notches:

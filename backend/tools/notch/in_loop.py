@@ -122,7 +122,7 @@ class _Beside:
         except ValueError as error:
             raise NotAllowed(
                 "notch.loop-not-identified", drive=name, cause=reason_of(error)
-            ) from error  # fmt: skip
+            ) from error
         self._loop, self._path = found.loop.controller, found.loop.path
         fixed = gains.loops_of(self.axis.drive, replace(facts, torque_filter_hz=None))
         lowest = safe_centre_hz(self._loop, self.plant, fixed.response)

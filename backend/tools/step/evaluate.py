@@ -80,7 +80,7 @@ def evaluate(
             window, widened = max(usual, threshold.NOISES * noise), threshold.NOISES * noise > usual
         step = step_metrics(
             time[begin:end], actual[begin:end], target=settings.size, initial=0.0, window=window
-        )  # fmt: skip
+        )
     else:
         actual = (recording.position_rad - recording.position_rad[0]) / _TURN
         noise = _noise(actual[-round(0.5 * settings.hold_s * rate) :])

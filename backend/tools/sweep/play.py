@@ -223,11 +223,12 @@ def _smaller(
     if setup.loop != "none":
         return tuple(
             replace(
-                s, excitation=scaled(s.excitation, threshold.WEAKER),
+                s,
+                excitation=scaled(s.excitation, threshold.WEAKER),
                 base=None if s.base is None else s.base * threshold.SLOWER,
             )
             for s in sequences
-        )  # fmt: skip
+        )
     share = threshold.SLOWER**attempt
     slower = replace(setup, room=replace(setup.room, speed_rad_s=share * setup.room.speed_rad_s))
     try:
@@ -266,7 +267,7 @@ async def _as_sent(
     setup: Setup,
     sent: Play,
     start: int,
-) -> excite.Sequence:  # fmt: skip
+) -> excite.Sequence:
     """The excitation as the rounded setpoints say; estimators must know what really went out."""
     if settings.kind == "mechanics" and not setup.by_speed:
         return sequence
