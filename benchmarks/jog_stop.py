@@ -71,7 +71,7 @@ def main() -> None:
         print(
             f"scope, 1 channel polled while jogging: {1e3 / np.median(gaps):.0f} samples/s, "
             f"spacing p50 {np.percentile(gaps, 50):.2f} ms, p99 {np.percentile(gaps, 99):.2f} ms"
-        )  # noqa: E501
+        )
     finally:
         station.stop()
 

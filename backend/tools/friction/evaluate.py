@@ -66,11 +66,9 @@ class Map:
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
         """For storage."""
         return {
-            "position_rad": self.position_rad,
-            "torque_nm": self.torque_nm,
-            "valid": self.valid,
+            "position_rad": self.position_rad, "torque_nm": self.torque_nm, "valid": self.valid,
             "plateau": self.plateau,
-        }
+        }  # fmt: skip
 
     def facts(self) -> dict[str, object]:
         """For storage, beside the arrays."""
@@ -126,10 +124,9 @@ def evaluate(data: Map, settings: FrictionSettings, facts: AxisFacts) -> Frictio
     step = data.torque_step_nm / facts.rated_torque_nm * 100.0
     findings: list[Finding] = []
     slow = [
-        each
-        for each in even
+        each for each in even
         if data.ripple_rpm is not None and abs(abs(each.rpm) / data.ripple_rpm - 1.0) < 0.1
-    ]
+    ]  # fmt: skip
     inertia = data.inertia_kgm2 / facts.rated_torque_nm * 100.0
     rate = data.sample_rate_hz
     ripple = _ripple(slow, settings.orders, rate, inertia, step)
@@ -235,12 +232,10 @@ def _points(
         )
         points.append(
             FrictionPoint(
-                speed_rpm=float(np.mean([each.rpm for each in same])),
-                torque_percent=torque,
-                torque_ci95_percent=(torque - half, torque + half),
-                revolutions=turns,
+                speed_rpm=float(np.mean([each.rpm for each in same])), torque_percent=torque,
+                torque_ci95_percent=(torque - half, torque + half), revolutions=turns,
             )
-        )
+        )  # fmt: skip
     return sorted(points, key=lambda point: point.speed_rpm)
 
 
@@ -347,12 +342,11 @@ def _harmonics(ripple: _Ripple | None) -> tuple[Harmonic, ...]:
         phase = float(np.degrees(np.angle(ripple.amplitude[index]))) + 90.0
         found.append(
             Harmonic(
-                order_per_rev=int(ripple.orders[index]),
-                amplitude_percent=size,
+                order_per_rev=int(ripple.orders[index]), amplitude_percent=size,
                 amplitude_ci95_percent=(max(size - half, 0.0), size + half),
                 phase_deg=(phase + 180.0) % 360.0 - 180.0,
             )
-        )
+        )  # fmt: skip
     return tuple(sorted(found, key=lambda each: -each.amplitude_percent))
 
 
