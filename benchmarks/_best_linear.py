@@ -67,11 +67,12 @@ def played_of(
     return tuple(
         Excitation(
             samples=np.asarray(arrays[f"{number}/excitation"], np.float64),
-            sample_rate_hz=rate, lines=np.asarray(arrays[f"{number}/lines"], np.int64),
+            sample_rate_hz=rate,
+            lines=np.asarray(arrays[f"{number}/lines"], np.int64),
             **{name: value for name, value in part.items() if name != "segments"},
         )
         for number, part in enumerate(structure)
-    )  # fmt: skip
+    )
 
 
 def best_linear(

@@ -211,8 +211,10 @@ def _canopen(options: argparse.Namespace) -> int:
 def _verdict(bus: str, found: Sequence[tuple[Case | CanCase, str]]) -> int:
     right = sum(reported == case.cause for case, reported in found)
     real = [(case, reported) for case, reported in found if case.how == "real"]
-    print(f"{bus}: {right} of {len(found)} first diagnoses are right "
-          f"({sum(t == c.cause for c, t in real)} of {len(real)} real ones)")  # fmt: skip
+    print(
+        f"{bus}: {right} of {len(found)} first diagnoses are right "
+        f"({sum(t == c.cause for c, t in real)} of {len(real)} real ones)"
+    )
     return 0 if right >= _NEEDED * len(found) else 1
 
 

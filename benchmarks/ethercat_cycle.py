@@ -145,11 +145,13 @@ async def ours(
             for n in range(16)
         ]
         row = (
-            _percentile(late, 0.5), _percentile(late, 0.99),
+            _percentile(late, 0.5),
+            _percentile(late, 0.99),
             int(after.details["cyclic_late_max_us"]),
             int(after.details["cyclic_overruns"]) - int(before["cyclic_overruns"]),
-            after.wkc_errors + after.lost_frames - errors, 100 * host / seconds,
-        )  # fmt: skip
+            after.wkc_errors + after.lost_frames - errors,
+            100 * host / seconds,
+        )
         await cyclic.stop()
     finally:
         work.close()

@@ -73,8 +73,10 @@ def real(file: Path) -> None:
     for name, method in METHODS.items():
         _, response, relative = method(u, y)
         far = np.abs(db(np.log(np.abs(response / found.response))))
-        print(f"  {name:24} median ±{np.median(1.96 * db(relative)):.2f} dB, from the mean of the "
-              f"periods: median {np.median(far):.2f} dB, largest {np.max(far):.1f} dB")  # fmt: skip
+        print(
+            f"  {name:24} median ±{np.median(1.96 * db(relative)):.2f} dB, from the mean of the "
+            f"periods: median {np.median(far):.2f} dB, largest {np.max(far):.1f} dB"
+        )
 
 
 def drawn(rng: np.random.Generator) -> Bench:
@@ -133,8 +135,9 @@ def figure(file: Path, out: Path) -> None:
     line = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
     ticks = "".join(
         f'<text x="{50 + 620 * np.log(t / 10) / np.log(25):.0f}" y="300" text-anchor="middle">{t}'
-        "</text>" for t in (10, 20, 50, 100, 200)
-    )  # fmt: skip
+        "</text>"
+        for t in (10, 20, 50, 100, 200)
+    )
     marks = "".join(
         f'<text x="44" y="{24 + 260 * (10 - t) / 60:.0f}" text-anchor="end">{t}</text>'
         for t in (0, -20, -40)

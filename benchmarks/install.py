@@ -177,12 +177,16 @@ def _image(walk: Walk, dist: Path, recipe: Recipe) -> Path:
     )  # fmt: skip
     made = subprocess.run(
         [str(part) for part in (*buildah, "from", "servodeck")],
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     mounted = subprocess.run(
         [str(part) for part in (*buildah, "mount", made.stdout.strip())],
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     return Path(mounted.stdout.strip())
 
 
@@ -193,8 +197,9 @@ def edge_box(walk: Walk, dist: Path) -> None:
     walk.do(
         "page: code, administrator, password (here: servodeck people add)",
         [program, "people", "add", "Anna", "--role", "administrator", "--config", state],
-        PATH=path, SERVODECK_PASSWORD="eleven blue horses",
-    )  # fmt: skip
+        PATH=path,
+        SERVODECK_PASSWORD="eleven blue horses",
+    )
     walk.do(
         "page: name and ports (here: servodeck station set-up)",
         [program, "station", "set-up", "--name", "cabinet-3", "--config", state],
@@ -245,8 +250,10 @@ def main() -> None:
     """Go each way and print its steps."""
     dist = Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else DIST
     offline = may_take_network_away()
-    print(f"installing {'without' if offline else 'with (it cannot be taken away here)'} network; "
-          f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")  # fmt: skip
+    print(
+        f"installing {'without' if offline else 'with (it cannot be taken away here)'} network; "
+        f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
+    )
     aims = []
     for name, (go, aim_s) in WAYS.items():
         with tempfile.TemporaryDirectory(prefix="servodeck-install-") as scratch:

@@ -64,10 +64,14 @@ def main() -> None:
                 latencies.append((falling[0] - released) * 1e3)
         gaps = np.concatenate(spacing) * 1e3
         p50, p99 = np.percentile(latencies, [50, 99])
-        print(f"jog: release to falling speed demand: p50 {p50:.1f} ms, p99 {p99:.1f} ms "
-              f"({RUNS} runs)")  # fmt: skip
-        print(f"scope, 1 channel polled while jogging: {1e3 / np.median(gaps):.0f} samples/s, "
-              f"spacing p50 {np.percentile(gaps, 50):.2f} ms, p99 {np.percentile(gaps, 99):.2f} ms")  # fmt: skip  # noqa: E501
+        print(
+            f"jog: release to falling speed demand: p50 {p50:.1f} ms, p99 {p99:.1f} ms "
+            f"({RUNS} runs)"
+        )
+        print(
+            f"scope, 1 channel polled while jogging: {1e3 / np.median(gaps):.0f} samples/s, "
+            f"spacing p50 {np.percentile(gaps, 50):.2f} ms, p99 {np.percentile(gaps, 99):.2f} ms"
+        )
     finally:
         station.stop()
 

@@ -143,8 +143,9 @@ async def measured(case: Case, tally: Tally) -> None:
             j = case.spec.total_inertia_kgm2
             tc = case.spec.friction.coulomb_nm + case.spec.rough_torque.drag_nm
             for name, interval, truth in (
-                ("J", found.inertia_kgm2, j / constant), ("Tc", found.coulomb_nm, tc / constant)
-            ):  # fmt: skip
+                ("J", found.inertia_kgm2, j / constant),
+                ("Tc", found.coulomb_nm, tc / constant),
+            ):
                 hold(tally, name, truth, (interval.low, interval.high))
         result = await sweep(
             d.axis, d.session, SweepSettings(WIDE, rated_torque_nm=rated), _silent()

@@ -161,12 +161,14 @@ def measure(http: httpx.Client, server: int, url: str) -> None:
         print(f"server with {count} receiving pages: {share:.0f} % of a core")
     each = float(np.polyfit([n for n, _ in costs], [share for _, share in costs], 1)[0])
     print(f"load of the machine: {os.getloadavg()[0]:.1f}")
-    print_verdict([
-        Aim(f"wire to browser p50 {p50:.0f} ms, below 60 ms", bool(p50 < 60)),
-        Aim(f"wire to browser p99 {p99:.0f} ms, below 120 ms", bool(p99 < 120)),
-        Aim(f"{rate:.0f} pictures a second, 20 or more", rate >= 19.5),
-        Aim(f"{each:.1f} % of a core for a page that joins, below 5 %", each < 5),
-    ])  # fmt: skip
+    print_verdict(
+        [
+            Aim(f"wire to browser p50 {p50:.0f} ms, below 60 ms", bool(p50 < 60)),
+            Aim(f"wire to browser p99 {p99:.0f} ms, below 120 ms", bool(p99 < 120)),
+            Aim(f"{rate:.0f} pictures a second, 20 or more", rate >= 19.5),
+            Aim(f"{each:.1f} % of a core for a page that joins, below 5 %", each < 5),
+        ]
+    )
 
 
 def main() -> None:

@@ -158,7 +158,7 @@ def fieldbus(server: int) -> dict[str, int]:
     modules = {
         "virtual segment": b"drivers.virtual.wires.ethercat",
         "host": b"drivers.ethercat.process.host",
-    }  # fmt: skip
+    }
     return {
         part: pid
         for part, module in modules.items()
@@ -385,30 +385,42 @@ def soak(http: httpx.Client, server: int, url: str, folder: Path, browsers: list
     busy = cycle_figures(http)
     samples, left_out, missing = disk_figures(folder / "state/recordings/soak.sdrec")
     rate = samples / AXES / took
-    print(f"{took:.0f} s, {AXES} axes, {len(channels)} channels at {1e6 / CYCLE_US:.0f} Hz, "
-          f"{rate:.0f} cycles a second came; browser 2 slept {SECONDS / 3:.0f} s")  # fmt: skip
-    print(f"disk: {samples} rows, {info['bytes'] / 1e6:.0f} MB, {left_out} left out by the bus, "
-          f"{missing} unaccounted for; state {info['state']}")  # fmt: skip
+    print(
+        f"{took:.0f} s, {AXES} axes, {len(channels)} channels at {1e6 / CYCLE_US:.0f} Hz, "
+        f"{rate:.0f} cycles a second came; browser 2 slept {SECONDS / 3:.0f} s"
+    )
+    print(
+        f"disk: {samples} rows, {info['bytes'] / 1e6:.0f} MB, {left_out} left out by the bus, "
+        f"{missing} unaccounted for; state {info['state']}"
+    )
     least, most = view.own_losses()
-    print(f"views: browser 1 lost {views[0]} rows, on the way to it {least} to {most} of them, "
-          f"the others the bus left out; browser 2 lost {views[1]} "
-          f"(its sleep: about {AXES * rate * SECONDS / 3:.0f})")  # fmt: skip
+    print(
+        f"views: browser 1 lost {views[0]} rows, on the way to it {least} to {most} of them, "
+        f"the others the bus left out; browser 2 lost {views[1]} "
+        f"(its sleep: about {AXES * rate * SECONDS / 3:.0f})"
+    )
     settled = memory[int(min(SETTLING_S, took * SETTLING_PART) / took * len(memory)) :]
     tenth = max(1, len(settled) // 10)
     grown = float(np.median(settled[-tenth:]) - np.median(settled[:tenth]))
     by_part = ", ".join(f"{part} {100 * s / took:.0f} %" for part, s in spent.items())
-    print(f"of a core: {by_part}; memory of the server {settled[0]:.0f} MiB settled, "
-          f"{settled[-1]:.0f} MiB at the end, {max(memory):.0f} at most")  # fmt: skip
+    print(
+        f"of a core: {by_part}; memory of the server {settled[0]:.0f} MiB settled, "
+        f"{settled[-1]:.0f} MiB at the end, {max(memory):.0f} at most"
+    )
     shares = [100 * (b - a) / took for a, b in zip(before, after, strict=True)]
     print(f"browsers: {shares[0]:.0f} % and {shares[1]:.0f} % of a core")
     print(f"scheduling of host and virtual drives: {scheduling}")
     for name, figures in (("alone", quiet), ("with all", busy)):
         late = figures.get("cyclic_late_p50_us"), figures.get("cyclic_late_p99_us")
-        print(f"cycle {name}: late p50 {late[0]} µs, p99 {late[1]} µs, "
-              f"{figures.get('cyclic_overruns')} overruns")  # fmt: skip
+        print(
+            f"cycle {name}: late p50 {late[0]} µs, p99 {late[1]} µs, "
+            f"{figures.get('cyclic_overruns')} overruns"
+        )
     p50, p99 = np.percentile(poller.times_ms, [50, 99])
-    print(f"GET /drives: p50 {p50:.1f} ms, p99 {p99:.1f} ms ({len(poller.times_ms)} requests); "
-          f"load of the machine {os.getloadavg()[1]:.1f}")  # fmt: skip
+    print(
+        f"GET /drives: p50 {p50:.1f} ms, p99 {p99:.1f} ms ({len(poller.times_ms)} requests); "
+        f"load of the machine {os.getloadavg()[1]:.1f}"
+    )
     jitter = [float(f.get("cyclic_late_p99_us", float("nan"))) for f in (quiet, busy)]
     missed = AXES * rate * SECONDS / 3
     aims = [
@@ -424,9 +436,11 @@ def soak(http: httpx.Client, server: int, url: str, folder: Path, browsers: list
     ]  # fmt: skip
     if not STEADY:  # time that follows the frames is never late
         aims.append(
-            Aim(f"lateness of the cycle p99 {jitter[0]:.0f} µs alone, {jitter[1]:.0f} µs with all",
-                jitter[1] <= JITTER_FACTOR * jitter[0] + JITTER_US)
-        )  # fmt: skip
+            Aim(
+                f"lateness of the cycle p99 {jitter[0]:.0f} µs alone, {jitter[1]:.0f} µs with all",
+                jitter[1] <= JITTER_FACTOR * jitter[0] + JITTER_US,
+            )
+        )
     print_verdict(aims)
 
 

@@ -124,20 +124,26 @@ def main() -> None:
         detail = bus["quality"]["details"]
         streams = AXES
         print(f"{SECONDS:.0f} s, {AXES} axes, {len(channels)} channels at 1 kHz")
-        print(f"per axis: {received / streams:.0f} samples, {dropped / streams:.0f} counted as "
-              f"dropped, {invalid / streams:.0f} not valid")  # fmt: skip
+        print(
+            f"per axis: {received / streams:.0f} samples, {dropped / streams:.0f} counted as "
+            f"dropped, {invalid / streams:.0f} not valid"
+        )
         whole = (received + dropped) / streams
         print(
             f"received and dropped together: {whole:.0f} cycles, {whole / SECONDS:.1f} per second"
         )
-        print(f"host: {detail.get('cyclic_overruns')} overruns, late p99 "
-              f"{detail.get('cyclic_late_p99_us')} µs")  # fmt: skip
+        print(
+            f"host: {detail.get('cyclic_overruns')} overruns, late p99 "
+            f"{detail.get('cyclic_late_p99_us')} µs"
+        )
         p50, p99 = np.percentile(poller.times_ms, [50, 99])
         print(f"GET /drives meanwhile: p50 {p50:.1f} ms, p99 {p99:.1f} ms ({len(poller.times_ms)})")
         cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-        print(f"server and this client: {100 * cpu / SECONDS:.0f} % of a core, peak memory "
-              f"{after.ru_maxrss / 1024:.0f} MiB, grown by "
-              f"{(after.ru_maxrss - before.ru_maxrss) / 1024:.0f} MiB")  # fmt: skip
+        print(
+            f"server and this client: {100 * cpu / SECONDS:.0f} % of a core, peak memory "
+            f"{after.ru_maxrss / 1024:.0f} MiB, grown by "
+            f"{(after.ru_maxrss - before.ru_maxrss) / 1024:.0f} MiB"
+        )
     finally:
         station.stop()
 

@@ -59,7 +59,7 @@ AXES: dict[str, MechanicsSpec] = {
     "noisy encoder": mechanics((1e-4, 60.0, 0.006), noise=60.0),
     "backlash": mechanics((1e-4, 200.0, 0.01), backlash=0.002),
     "limited travel": mechanics((1e-4, 200.0, 0.005), travel=(-1.5, 1.5)),
-}  # fmt: skip
+}
 
 
 def drawn(seed: int) -> MechanicsSpec:
@@ -77,11 +77,13 @@ def drawn(seed: int) -> MechanicsSpec:
         loads.append((load, stiffness, 2 * damping * 2 * np.pi * float(hz) * reduced))
         before = load
     return mechanics(
-        *loads, motor=motor, viscous=float(rng.uniform(0, 5e-4)),
+        *loads,
+        motor=motor,
+        viscous=float(rng.uniform(0, 5e-4)),
         coulomb=float(rng.uniform(0.005, 0.1)),
         gravity=float(rng.uniform(0.05, 0.3)) if seed % 5 == 4 else 0.0,
         noise=float(rng.choice([1.0, 5.0, 30.0])),
-    )  # fmt: skip
+    )
 
 
 #: Families that are measured over CANopen with SYNC.
@@ -184,7 +186,7 @@ async def _frequency(rig: Rig, spec: MechanicsSpec) -> str:
         kept: list[Raw] = []
         found = await sweep(
             axis, session, settings, _silent(), lambda _name, *raw: kept.append(raw)
-        )  # fmt: skip
+        )
     free = found.loop == "none"
     truth = _truth(spec, kept[0]) if free and any(w.backlash_rad for w in spec.load) else None
     if rig.khz >= 4:

@@ -1,7 +1,7 @@
 """What each kind of bus brings: how its URLs are written, its traits, and its link.
 
 The folder of a bus has a module ``bus`` with a `BusKind` called ``BUS``; nothing else in the
-product names a kind of bus. See ``docs/architecture.md``, "How to add a bus".
+product names a kind of bus. See ``CONTRIBUTING.md``, "Add a bus".
 """
 
 from __future__ import annotations

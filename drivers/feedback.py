@@ -149,10 +149,10 @@ class FeedbackWatch:
         time_s = newest[-1][2] - newest[0][2]
         if time_s <= 0:
             return None
-        reported = sum(
-            0.5 * (new[1] + old[1]) * (new[2] - old[2])
-            for old, new in pairwise(newest)
-        ) / time_s  # fmt: skip
+        reported = (
+            sum(0.5 * (new[1] + old[1]) * (new[2] - old[2]) for old, new in pairwise(newest))
+            / time_s
+        )
         moved = _difference(newest[-1][0], newest[0][0])
         per = self._scale.velocity_per_inc_s
         most = (abs(moved) + _COUNTS) / time_s * abs(per)

@@ -94,9 +94,11 @@ class Halted:
         note = as_text(self.note)
         if self.cause in ENVELOPE_CAUSES and self.value is not None and self.limit is not None:
             return text(
-                "motion.beyond-limit", quantity=quantity_key(self.quantity),
-                value=f"{self.value:g}", limit=f"{self.limit:g}",
-            )  # fmt: skip
+                "motion.beyond-limit",
+                quantity=quantity_key(self.quantity),
+                value=f"{self.value:g}",
+                limit=f"{self.limit:g}",
+            )
         if self.cause is HaltCause.EXPIRED:
             return text("motion.expired")
         if self.cause is HaltCause.LEFT_ENABLED:

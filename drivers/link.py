@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, runtime_checkable
+from typing import Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from drivers.cia402 import State
 from drivers.dictionary import Described
+from drivers.doctor.examined import Examines
 from drivers.errors import DriveError, NotAllowed
 from drivers.feedback import FeedbackScale
 from drivers.halt import LoopState
@@ -119,8 +120,22 @@ def lists_nothing(kind: LinkKind, station: int) -> NotAllowed:
     return NotAllowed("link.drive-cannot-list-objects", drive=f"station {station}", kind=kind)
 
 
+class RecordsFrames(Protocol):
+    """A link that keeps the last minute of its frames."""
+
+    async def flight(self, station: int | None = None) -> bytes:
+        """The frames as a pcapng file; of one station only what has to do with it.
+
+        Raises:
+            LinkLost: nothing is being recorded.
+        """
+
+
 class Link(Protocol):
-    """One opened bus. See the module docstring for byte order and threading."""
+    """One opened bus. See the module docstring for byte order and threading.
+
+    `cyclic`, `doctor` and `frames` are parts that a bus may lack, and are None then.
+    """
 
     kind: LinkKind
     url: str
@@ -129,6 +144,14 @@ class Link(Protocol):
     @property
     def cyclic(self) -> Cyclic | None:
         """Synchronous process data, where the bus has them."""
+
+    @property
+    def doctor(self) -> Examines | None:
+        """What says why a station is not in Operational."""
+
+    @property
+    def frames(self) -> RecordsFrames | None:
+        """The last minute of its frames."""
 
     async def open(self) -> None:
         """Open the adapter.
@@ -182,18 +205,6 @@ class Link(Protocol):
 
     def listen(self, listener: Callable[[LinkEvent], None]) -> Unsubscribe:
         """Be notified of events, on the event loop's thread."""
-
-
-@runtime_checkable
-class RecordsFrames(Protocol):
-    """A link that keeps the last minute of its frames."""
-
-    async def flight(self, station: int | None = None) -> bytes:
-        """The frames as a pcapng file; of one station only what has to do with it.
-
-        Raises:
-            LinkLost: nothing is being recorded.
-        """
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,8 +277,53 @@ class Trajectory:
     renew_s: float = 0.2
 
 
+class OwnsPowerState(Protocol):
+    """A loop that writes the control words, so that nobody else may."""
+
+    async def drive_to(self, station: int, goal: State, mode: int | None = None) -> None:
+        """Head for a power state; the axis brakes before it leaves Operation enabled."""
+
+    async def reset_fault(self, station: int) -> None:
+        """Reset a fault once; the axis stays disabled."""
+
+    def axis_state(self, station: int) -> LoopState:
+        """Power state, phase of the setpoints, and why the last motion was ended by force."""
+
+
+class TakesSpeeds(Protocol):
+    """An exchange that can give speeds with every cycle to a drive that has no cyclic mode."""
+
+    unguarded: frozenset[int]
+    """Stations commanded by the exchange whose drive would not notice that it ended."""
+
+    def take_speeds(self, station: int, by_profile_velocity: bool) -> None:
+        """Command ``station`` in Profile velocity from the next `configure` on, or not any more.
+
+        Where speeds of the mode CSV are asked for, the mode is then Profile velocity.
+        """
+
+
 class Cyclic(Protocol):
-    """Synchronous process data of a bus that has them (EtherCAT, CANopen with SYNC)."""
+    """Synchronous process data of a bus that has them (EtherCAT, CANopen with SYNC).
+
+    `power` and `speeds` are parts that an exchange may lack, and are None then.
+    """
+
+    @property
+    def power(self) -> OwnsPowerState | None:
+        """What commands the power states, where the loop writes the control words."""
+
+    @property
+    def speeds(self) -> TakesSpeeds | None:
+        """What gives speeds to drives without a cyclic mode."""
+
+    @property
+    def running(self) -> bool:
+        """Whether process data are exchanged."""
+
+    @property
+    def trouble(self) -> str:
+        """Why it does not run although it is wanted, while it is set up again; else empty."""
 
     @property
     def dc(self) -> bool | None:
@@ -301,64 +357,15 @@ class Cyclic(Protocol):
     async def halt(self, station: int | None = None) -> None:
         """Controlled stop now, for one station or all; setpoints end."""
 
-    def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:
-        """Deliver samples on the event loop's thread; NaN stands for inputs of a lost station."""
-
-
-@runtime_checkable
-class RecoversByItself(Protocol):
-    """A cyclic exchange that is set up again by itself after it broke off, axes disabled."""
-
-    @property
-    def trouble(self) -> str:
-        """Why it does not run although it is wanted, in words; else empty."""
-
-
-@runtime_checkable
-class TellsNewest(Protocol):
-    """An exchange whose newest process data can be had without asking the drive."""
+    async def pause(self, station: int) -> None:
+        """Brake now and hold, enabled, for the next motion; nothing where nothing moves."""
 
     def newest(self, channels: Sequence[str], within_s: float) -> dict[str, int | float]:
-        """Raw values of the last cycle; what is older than ``within_s``, came in an invalid cycle
-        or is of a station that is lost is not among them.
+        """Raw values of the last cycle, without asking the drive.
+
+        What is older than ``within_s``, came in an invalid cycle or is of a station that is lost
+        is not among them.
         """
 
-
-@runtime_checkable
-class TakesSpeeds(Protocol):
-    """An exchange that can give speeds with every cycle to a drive that has no cyclic mode."""
-
-    unguarded: frozenset[int]
-    """Stations commanded by the exchange whose drive would not notice that it ended."""
-
-    def take_speeds(self, station: int, by_profile_velocity: bool) -> None:
-        """Command ``station`` in Profile velocity from the next `configure` on, or not any more.
-
-        Where speeds of the mode CSV are asked for, the mode is then Profile velocity.
-        """
-
-
-@runtime_checkable
-class Pauses(Protocol):
-    """A cyclic exchange that can brake an axis and hold it, enabled, for the next motion."""
-
-    async def pause(self, station: int) -> None:
-        """Brake now and hold; nothing where nothing moves. The motion is over."""
-
-
-@runtime_checkable
-class OwnsPowerState(Protocol):
-    """A cyclic exchange whose loop writes the control word, so that nobody else may."""
-
-    @property
-    def running(self) -> bool:
-        """Whether process data are exchanged."""
-
-    async def drive_to(self, station: int, goal: State, mode: int | None = None) -> None:
-        """Head for a power state; the axis brakes before it leaves Operation enabled."""
-
-    async def reset_fault(self, station: int) -> None:
-        """Reset a fault once; the axis stays disabled."""
-
-    def axis_state(self, station: int) -> LoopState:
-        """Power state, phase of the setpoints, and why the last motion was ended by force."""
+    def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:
+        """Deliver samples on the event loop's thread; NaN stands for inputs of a lost station."""

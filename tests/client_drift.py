@@ -64,8 +64,10 @@ def main() -> int:
         DESCRIPTION.write_text(now, "utf-8")
         return 0
     if DESCRIPTION.read_text("utf-8") != now:
-        print("webui/openapi.json is old: run `python tests/client_drift.py --write`, "
-              "then `npm run generate` in webui/")  # fmt: skip
+        print(
+            "webui/openapi.json is old: run `python tests/client_drift.py --write`, "
+            "then `npm run generate` in webui/"
+        )
         return 1
     package = json.loads((ROOT / "webui" / "package.json").read_text("utf-8"))
     with tempfile.TemporaryDirectory() as folder:

@@ -107,10 +107,12 @@ def read(reports: Iterable[Path]) -> dict[str, Ran]:
                 one = ran.setdefault(file, Ran(set(), set(), set()))
                 kinds = {child.tag for child in case}
                 where = (
-                    one.failed if kinds & {"failure", "error"}
-                    else one.skipped if "skipped" in kinds
+                    one.failed
+                    if kinds & {"failure", "error"}
+                    else one.skipped
+                    if "skipped" in kinds
                     else one.passed
-                )  # fmt: skip
+                )
                 where.add(f"{case.get('classname')}::{case.get('name')}")
     return ran
 
@@ -149,10 +151,11 @@ def table(cells: Mapping[tuple[Row, str], str]) -> str:
         "| --- | --- |" + " --- |" * len(SYSTEMS),
         *(
             f"| {row.bus} | {row.function} | "
-            + " | ".join(cells[row, system] for system in SYSTEMS) + " |"
+            + " | ".join(cells[row, system] for system in SYSTEMS)
+            + " |"
             for row in ROWS
         ),
-    ]  # fmt: skip
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -43,9 +43,11 @@ def _groups(profile: Profile) -> Iterator[str]:
 
 def _row(p: Parameter) -> str:
     number = f" ({p.number})" if p.number else ""
-    limits = "" if p.min_raw is None and p.max_raw is None else (
-        f"{_value(p, p.min_raw)} … {_value(p, p.max_raw)}"
-    )  # fmt: skip
+    limits = (
+        ""
+        if p.min_raw is None and p.max_raw is None
+        else (f"{_value(p, p.min_raw)} … {_value(p, p.max_raw)}")
+    )
     effect = p.effective.replace("_", " ") if p.access != "ro" else ""
     cells = [
         f"`{p.key}`{number}", p.name, p.unit, limits, _value(p, p.default_raw), p.access, effect,

@@ -147,8 +147,9 @@ def build(site: Path, output: Path, version: str) -> Path:
         _put(link, f'#!/bin/sh\nexec /{PROGRAM}/bin/servodeck "$@"\n', 0o755)
         subprocess.run(
             ["dpkg-deb", "--root-owner-group", "-Zgzip", "-z1", "--build", str(root), str(file)],
-            check=True, capture_output=True,
-        )  # fmt: skip
+            check=True,
+            capture_output=True,
+        )
     return file
 
 

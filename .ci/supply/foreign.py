@@ -72,11 +72,14 @@ class System:
 
 def _linux(machine: str, processor: int) -> System:
     markers = {
-        "sys_platform": "linux", "platform_system": "Linux", "os_name": "posix",
+        "sys_platform": "linux",
+        "platform_system": "Linux",
+        "os_name": "posix",
         "platform_machine": machine,
-    }  # fmt: skip
-    return System(f"linux-{machine}", f"{machine}-manylinux_2_28", machine, markers, "elf",
-                  processor)  # fmt: skip
+    }
+    return System(
+        f"linux-{machine}", f"{machine}-manylinux_2_28", machine, markers, "elf", processor
+    )
 
 
 #: Processors by ELF's e_machine (gABI, chapter 4) and PE's Machine (PE format, Microsoft).

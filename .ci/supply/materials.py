@@ -255,12 +255,12 @@ def notice() -> str:
     parts = [
         "servodeck\n\nThis product is under the Apache License 2.0 (see LICENSE). The following is "
         "the work of others.\nMade by `make supply-chain`; do not edit.\n",
-        "Files in this product\n" + "".join(f"- {what}: {licence}, see {where}\n"
-                                            for what, licence, where in VENDORED),
+        "Files in this product\n"
+        + "".join(f"- {what}: {licence}, see {where}\n" for what, licence, where in VENDORED),
         "Packages that are installed with it; each brings its licence text\n" + _lines(python),
         "Packages that its page contains\n" + _lines(page),
         *(_licence_text(package) for package in page),
-    ]  # fmt: skip
+    ]
     return "\n".join(parts)
 
 

@@ -88,9 +88,11 @@ def build(wheels: Path, output: Path, version: str, machine: str) -> Path:
         put_texts(folder, known, [*packages, *foreign.contents(site)])
         # A stamp of the source's time would be wrong after unpacking on some file systems.
         compileall.compile_dir(
-            str(folder / "lib"), quiet=2, workers=0,
+            str(folder / "lib"),
+            quiet=2,
+            workers=0,
             invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH,
-        )  # fmt: skip
+        )
         file = output / f"{name}.tar.gz"
         with tarfile.open(file, "w:gz", compresslevel=3) as packed:
             packed.add(folder, name, filter=owned_by_root)
@@ -106,10 +108,12 @@ def lists_of(architecture: str, folder: Path) -> list[str]:
     (folder / "lists/partial").mkdir(parents=True)
     (folder / "cache/archives/partial").mkdir(parents=True)
     settings = {
-        "APT::Architecture": architecture, "APT::Architectures": architecture,
-        "Dir::State::Lists": f"{folder}/lists", "Dir::Cache": f"{folder}/cache",
+        "APT::Architecture": architecture,
+        "APT::Architectures": architecture,
+        "Dir::State::Lists": f"{folder}/lists",
+        "Dir::Cache": f"{folder}/cache",
         "Dir::State::status": "/dev/null",
-    }  # fmt: skip
+    }
     options = [part for name, value in settings.items() for part in ("-o", f"{name}={value}")]
     subprocess.run(["apt-get", *options, "--quiet=2", "update"], check=True)
     return options
@@ -134,9 +138,11 @@ def put_interpreter(root: Path, folder: Path, patchelf: Path) -> None:
     library = folder / "lib" / PYTHON
     # sitecustomize.py points to /etc.
     shutil.copytree(
-        root / "usr/lib" / PYTHON, library, symlinks=True,
+        root / "usr/lib" / PYTHON,
+        library,
+        symlinks=True,
         ignore=shutil.ignore_patterns("sitecustomize.py", "__pycache__"),
-    )  # fmt: skip
+    )
     for module in _LEFT_OUT:
         for file in (library / "lib-dynload").glob(f"{module}.cpython-*.so"):
             file.unlink()

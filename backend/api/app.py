@@ -167,7 +167,7 @@ def make_app(
     app.state.bench = bench
     app.state.recordings = recordings
     app.state.axis_store = axis_store
-    app.state.forcing = ForcingSessions(bench.jobs, bench.leases)
+    app.state.forcing = ForcingSessions(bench.jobs, bench.leases.taken_by)
     errors.install(app)
     app.state.live = live
     app.state.people = known

@@ -115,8 +115,10 @@ class Trail:
     def names(self) -> dict[str, list[str]]:
         """What can be chosen in a filter: the persons, axes and stations that occur."""
         columns = {
-            "person": AuditEntry.person, "axis": AuditEntry.axis, "station": AuditEntry.station,
-        }  # fmt: skip
+            "person": AuditEntry.person,
+            "axis": AuditEntry.axis,
+            "station": AuditEntry.station,
+        }
         with self._store.reading() as session:
             return {
                 name: [v for v in session.scalars(select(c).distinct().order_by(c)) if v]

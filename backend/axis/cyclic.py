@@ -18,10 +18,7 @@ from drivers.link import (
     CyclicSignal,
     Link,
     OwnsPowerState,
-    RecoversByItself,
     ScopeBlock,
-    TakesSpeeds,
-    TellsNewest,
     Unsubscribe,
 )
 
@@ -78,8 +75,8 @@ class CyclicSession:
             port = self._port(drive)
             self.link.attach(port.station, drive.profile)
             by_speed = drive.id in self.by_speed
-            if isinstance(self.cyclic, TakesSpeeds):
-                self.cyclic.take_speeds(port.station, by_speed)
+            if self.cyclic.speeds is not None:
+                self.cyclic.speeds.take_speeds(port.station, by_speed)
             roles = _SPEED_ROLES if by_speed else OUTPUT_ROLES
             inputs += _signals(drive, port, INPUT_ROLES, ("tx", "rxtx"))
             outputs += _signals(drive, port, roles, ("rx", "rxtx"), needed=roles[:1])
@@ -110,25 +107,24 @@ class CyclicSession:
     @property
     def running(self) -> bool:
         """Whether process data are exchanged."""
-        if self.state is None:
-            return False
-        return not isinstance(self.cyclic, OwnsPowerState) or self.cyclic.running
+        return self.state is not None and self.cyclic.running
 
     @property
     def trouble(self) -> str:
         """Why a wanted exchange does not run, while it is set up again by itself; else empty."""
-        return self.cyclic.trouble if isinstance(self.cyclic, RecoversByItself) else ""
+        return self.cyclic.trouble
 
     def power(self) -> OwnsPowerState | None:
         """The loop, where it owns the control words."""
-        return self.cyclic if isinstance(self.cyclic, OwnsPowerState) else None
+        return self.cyclic.power
 
     def unwatched(self, drive: Drive) -> bool:
         """Whether nothing in the drive ends a speed or torque when this computer falls silent."""
         port = self._port(drive)
         if port.spec is None or not port.spec.watchdog.present:
             return True
-        return isinstance(self.cyclic, TakesSpeeds) and port.station in self.cyclic.unguarded
+        speeds = self.cyclic.speeds
+        return speeds is not None and port.station in speeds.unguarded
 
     @property
     def synchronous(self) -> bool:
@@ -150,7 +146,7 @@ class CyclicSession:
 
     def newest(self, drive: Drive, keys: Sequence[str], within_s: float) -> dict[str, int | float]:
         """Raw values of the last cycle, of those keys that the drive sends with every cycle."""
-        if not self.running or not isinstance(self.cyclic, TellsNewest):
+        if not self.running:
             return {}
         reported = {drive.key(role) for role in INPUT_ROLES}
         names = {channel(drive, key): key for key in keys if key in reported}

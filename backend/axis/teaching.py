@@ -64,9 +64,10 @@ async def stated(
     """
     before = axis.taught or Taught()
     for name, value in (
-        ("counts_per_rev", counts_per_rev), ("raw_per_rpm", raw_per_rpm),
+        ("counts_per_rev", counts_per_rev),
+        ("raw_per_rpm", raw_per_rpm),
         ("raw_per_rpm_s", raw_per_rpm_s),
-    ):  # fmt: skip
+    ):
         if value is not None and not 0 < value < 1e12:
             raise OutOfRange(
                 "axis.detail",

@@ -13,7 +13,6 @@ from backend.commands.printing import print_text
 from backend.commands.session import opened, run, show_progress
 from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
-from drivers.link import RecordsFrames
 
 app = typer.Typer(no_args_is_help=True, help="What goes over the wires of a bus.")
 
@@ -56,8 +55,8 @@ async def _recorded(url: str, station: int | None, seconds: float, server: str |
             answer = await asked.raw("GET", "/buses/flight", query=query)
             return answer.content
     async with opened(url) as link:
-        if not isinstance(link, RecordsFrames):
+        if link.frames is None:
             raise NotAllowed("command.frames-not-recorded", value=url)
         await link.scan(show_progress, None)
         await asyncio.sleep(seconds)
-        return await link.flight(station)
+        return await link.frames.flight(station)

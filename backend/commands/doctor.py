@@ -13,7 +13,6 @@ from backend.commands.printing import print_text, words_of
 from backend.commands.session import opened, run, show_progress
 from backend.station.matching import match_profiles
 from drivers.doctor.diagnosis import Cause
-from drivers.doctor.examined import Examines
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import Address, CyclicSignal, Link
 from profiles import load_profile
@@ -41,7 +40,7 @@ def doctor(
             results = await _by_server(at, url, station)
         else:
             async with opened(url) as link:
-                if not isinstance(link, Examines):
+                if link.doctor is None:
                     raise NotAllowed("command.doctor-knows-not", value=url)
                 results = await _here(link, station, profile)
         _show(results, as_json=as_json)
@@ -81,7 +80,7 @@ async def examined(link: Link, station: int) -> dict[str, Any]:
         NotAllowed: the bus has no doctor, or no cyclic exchange.
     """
     cyclic = link.cyclic
-    if cyclic is None or not isinstance(link, Examines):
+    if cyclic is None or link.doctor is None:
         raise NotAllowed("command.doctor-knows-not", value=link.url)
     refusal: DriveError | None = None
     inputs = [CyclicSignal(station, Address(i, 0, k), f"{i:04X}") for i, k in _INPUTS]  # type: ignore[arg-type]
@@ -92,7 +91,7 @@ async def examined(link: Link, station: int) -> dict[str, Any]:
     except DriveError as error:
         refusal = error
     try:
-        result = await link.examination(station, refusal)
+        result = await link.doctor.examination(station, refusal)
     finally:
         if refusal is None:
             await cyclic.stop()

@@ -15,8 +15,6 @@ from backend.commands.session import drive_and_pending, drive_at, progress, show
 from backend.commands.values import Compared
 from backend.drive.drive import Drive
 from backend.library import SetLibrary
-from backend.motion.classes import motion_of
-from backend.motion.doors import refused
 from backend.parameters import set_file as parameter_set
 from backend.parameters.set_file import ParameterSet
 from backend.store.files import write_atomically
@@ -41,10 +39,7 @@ async def put(place: Place, assignments: list[str], *, raw: bool) -> None:
         wanted = [values.assignment(drive.parameter, text) for text in assignments]
         for parameter, value in wanted:
             # Everything is checked before the first byte is written.
-            known = value if raw or isinstance(value, str) else parameter.to_raw(value)
-            drive.check(parameter, known)
-            if motion_of(parameter) == "energises":
-                raise refused(drive.name, drive.profile, parameter)
+            drive.check_write(parameter.key, value, raw=raw)
         for parameter, value in wanted:
             print(values.line(parameter, await drive.write(parameter.key, value, raw=raw)))
 

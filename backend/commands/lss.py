@@ -10,7 +10,7 @@ import typer
 from backend.commands.options import Json, Url
 from backend.commands.printing import print_text, words_of
 from backend.commands.session import opened, run, show_progress
-from drivers.canopen.link import CanopenLink
+from drivers.canopen.link import CanopenLink, can_bus_of
 from drivers.canopen.lss.access import LssNode
 from drivers.canopen.lss.codes import LssIdentity
 from drivers.errors import NotAllowed, OutOfRange
@@ -119,9 +119,10 @@ async def _meant(link: CanopenLink, identity: str | None) -> LssIdentity:
 
 
 def _can(link: Link) -> CanopenLink:
-    if not isinstance(link, CanopenLink):
+    bus = can_bus_of(link)
+    if bus is None:
         raise NotAllowed("command.lss-canopen-only", value=link.url)
-    return link
+    return bus
 
 
 def _confirm(question: str, yes: bool) -> None:

@@ -106,9 +106,7 @@ def dump(
 
 
 @app.command("save")
-def save(
-    url: Url, station: Station = 1, profile: Profile = None, server: Server = None
-) -> None:  # fmt: skip
+def save(url: Url, station: Station = 1, profile: Profile = None, server: Server = None) -> None:
     """Store the drive's settings in its own memory, which wears with every storing."""
 
     async def work() -> None:
@@ -209,8 +207,10 @@ def import_(
             print(problem, file=sys.stderr)
         write_atomically(out, data)
         print_text(
-            "printed.parameters-of-list", file=str(out), count=len(found.readings),
+            "printed.parameters-of-list",
+            file=str(out),
+            count=len(found.readings),
             unused=len(found.problems),
-        )  # fmt: skip
+        )
 
     run(work)

@@ -126,9 +126,11 @@ def _show_run(run: Measured) -> None:
 def _show_histogram(name: str, histogram: Histogram) -> None:
     most = max(histogram.counts)
     print_text(
-        "printed.lateness", name=name, most_us=f"{histogram.below_us(0.999):.0f}",
+        "printed.lateness",
+        name=name,
+        most_us=f"{histogram.below_us(0.999):.0f}",
         latest_us=f"{histogram.most_us:.0f}",
-    )  # fmt: skip
+    )
     for count, edge in zip(histogram.counts, (*EDGES_US, None), strict=True):
         if count:
             limit = f"<= {edge:g}" if edge is not None else f"> {EDGES_US[-1]:g}"

@@ -124,9 +124,11 @@ def import_description(
     for finding in imported.report.findings:
         print(f"  {finding}")
     print_text(
-        "printed.profile-imported", title=imported.profile.title,
-        count=len(imported.profile.parameters), summary=str(imported.report.summary()),
-    )  # fmt: skip
+        "printed.profile-imported",
+        title=imported.profile.title,
+        count=len(imported.profile.parameters),
+        summary=str(imported.report.summary()),
+    )
     for device in imported.others:
         print_text(
             "printed.also-in-file" if device.has_control_word else "printed.also-in-file-no-drive",
@@ -161,9 +163,11 @@ def import_from_drive(
     for finding in imported.report.findings:
         print(f"  {finding}")
     print_text(
-        "printed.profile-of-drive-written", count=len(imported.profile.parameters),
-        file=str(target), name=name,
-    )  # fmt: skip
+        "printed.profile-of-drive-written",
+        count=len(imported.profile.parameters),
+        file=str(target),
+        name=name,
+    )
 
 
 @app.command("classify")
@@ -218,8 +222,10 @@ def classify_object(
     records.store.close()
     print_text(
         "printed.motion-class-safe" if now.safe_in_motion else "printed.motion-class",
-        key=now.key, name=now.name, motion=now.motion,
-    )  # fmt: skip
+        key=now.key,
+        name=now.name,
+        motion=now.motion,
+    )
 
 
 @app.command("export-eds")

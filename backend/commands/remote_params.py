@@ -74,9 +74,11 @@ async def dump(
     async with remote_drive(place) as (at, drive):
         name = f"{drive.id} {datetime.now(UTC):%Y-%m-%d %H.%M.%S}"
         body = {
-            "file": name, "author": author, "notes": notes,
+            "file": name,
+            "author": author,
+            "notes": notes,
             "include_motor_individual": motor_individual,
-        }  # fmt: skip
+        }
         kept = await at.ask("POST", f"/drives/{drive.id}/sets", StoredSet, body=body)
         data = (await at.raw("GET", f"/sets/{quote(kept.file)}")).content
     if out is None:
@@ -103,9 +105,11 @@ async def load(place: Place, file: Path, *, yes: bool, other_drive: bool) -> boo
         if not keys:
             return True
         body = {
-            "file": kept.file, "version": kept.version, "keys": keys,
+            "file": kept.file,
+            "version": kept.version,
+            "keys": keys,
             "accept_other_identity": other_drive,
-        }  # fmt: skip
+        }
         return values.loaded(await at.result(f"/drives/{drive.id}/jobs/load_set", body))
 
 

@@ -128,9 +128,11 @@ def recompute(
         made = evaluate(found)
         head = found.head
         print_text(
-            "printed.measurement-of", kind=head.kind, drive=head.drive,
+            "printed.measurement-of",
+            kind=head.kind,
+            drive=head.drive,
             saved=f"{head.saved:%Y-%m-%d %H:%M:%S %Z}",
-        )  # fmt: skip
+        )
         print(_agreement(made))
         if out is not None:
             write_atomically(out, json.dumps(made.result, indent=1).encode())

@@ -15,8 +15,10 @@ from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
 from drivers.texts import limits
 
-app = typer.Typer(help="Frequency responses from recordings of other programs. Nothing moves.",
-                  no_args_is_help=True)  # fmt: skip
+app = typer.Typer(
+    help="Frequency responses from recordings of other programs. Nothing moves.",
+    no_args_is_help=True,
+)
 
 
 class StructureName(StrEnum):
@@ -71,9 +73,7 @@ def import_(
     time_unit: Annotated[
         TimeUnit | None, typer.Option(help="else by the column's name, else seconds")
     ] = None,
-    sample_rate: Annotated[
-        float | None, typer.Option(help="Hz; instead of a time column")
-    ] = None,
+    sample_rate: Annotated[float | None, typer.Option(help="Hz; instead of a time column")] = None,
     input_unit: Annotated[
         str, typer.Option(help="Nm, mNm, A, mA, rated, percent, permille, rad/s, rpm or 1")
     ] = "1",
@@ -91,8 +91,10 @@ def import_(
     ] = None,
     structure: Annotated[
         StructureName,
-        typer.Option(help="motor_speed: torque to the speed of the same shaft; allows inertia, "
-                     "notches and gains"),
+        typer.Option(
+            help="motor_speed: torque to the speed of the same shaft; allows inertia, "
+            "notches and gains"
+        ),
     ] = StructureName.unknown,
     f_min: Annotated[float | None, typer.Option(help="Hz; lowest line")] = None,
     f_max: Annotated[float | None, typer.Option(help="Hz; highest line")] = None,
@@ -105,7 +107,7 @@ def import_(
     loop_delay: Annotated[
         float | None, typer.Option(help="s; delay of the drive's speed loop, for gains")
     ] = None,
-) -> None:  # fmt: skip
+) -> None:
     """Evaluate a recording of another program: response, band, modes. Nothing moves.
 
     The excitation (periodic, chirp or noise) is found in the input. The band, ±1.96 std, is where

@@ -110,9 +110,10 @@ def state_scales(
         where = place(url, station, profile, server)
         if where.server is not None:
             body = {
-                "counts_per_rev": counts_per_rev, "raw_per_rpm": raw_per_rpm,
+                "counts_per_rev": counts_per_rev,
+                "raw_per_rpm": raw_per_rpm,
                 "raw_per_rpm_s": raw_per_rpm_s,
-            }  # fmt: skip
+            }
             async with remote_drive(where) as (at, drive):
                 path = f"/drives/{drive.id}/scales"
                 _print_info(await at.ask("PUT", path, ScalesInfo, body=body))
@@ -213,13 +214,15 @@ def _print(scales: tuple[Scale, ...], *, as_json: bool = False) -> None:
     if as_json:
         rows = [
             {
-                "quantity": scale.quantity.value, "raw_per_unit": scale.raw_per_unit,
-                "raw_unit": scale.raw_unit, "origin": scale.origin.value,
+                "quantity": scale.quantity.value,
+                "raw_per_unit": scale.raw_per_unit,
+                "raw_unit": scale.raw_unit,
+                "origin": scale.origin.value,
                 "source": scale.source,
                 "uncertainty": scale.uncertainty and scale.uncertainty.value,
             }
             for scale in scales
-        ]  # fmt: skip
+        ]
         print(json.dumps(rows, indent=1))
         return
     for scale in scales:
@@ -230,9 +233,11 @@ def _print(scales: tuple[Scale, ...], *, as_json: bool = False) -> None:
             print(f"{'':12} {what_to_do(scale).words(language())}")
         else:
             per_unit = words_of(
-                "printed.raw-per-unit", raw=f"{scale.raw_per_unit:.9g}", unit=unit,
+                "printed.raw-per-unit",
+                raw=f"{scale.raw_per_unit:.9g}",
+                unit=unit,
                 origin=scale.origin.value,
-            )  # fmt: skip
+            )
             print(f"{scale.quantity.value:12} {per_unit}{source}")
 
 

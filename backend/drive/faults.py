@@ -98,4 +98,4 @@ def _newest_record(drive: Drive, readings: Mapping[str, Reading]) -> Fault | Non
 
 def integer(reading: Reading | None) -> int | None:
     """Raw value of an integer reading, or None."""
-    return reading.raw if reading is not None and isinstance(reading.raw, int) else None
+    return None if reading is None else reading.integer

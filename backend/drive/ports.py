@@ -6,8 +6,9 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from drivers.errors import NotAllowed
 from drivers.link import Address, Link, LinkTraits
-from drivers.texts.message import Text
+from drivers.texts.message import Text, text
 from profiles.schema import LinkSpec, Parameter
 
 #: Addresses per call where the link lets a write go between two requests of a batch, and where
@@ -65,3 +66,33 @@ def address_of(parameter: Parameter) -> Address:
         type=parameter.type,
         register=parameter.modbus_register,
     )
+
+
+def port_for(drive: str, ports: Sequence[Port], parameter: Parameter) -> Port:
+    """The first port that can carry the parameter of the drive of this name.
+
+    Raises:
+        NotAllowed: none can; the message says which link would.
+    """
+    for port in ports:
+        if port.carries(parameter):
+            return port
+    raise NotAllowed(
+        "drive.object-cannot-be-reached",
+        drive=drive,
+        parameter=parameter.key,
+        name=parameter.name,
+        why=unreachable_why(ports, parameter),
+    )
+
+
+def unreachable_why(ports: Sequence[Port], parameter: Parameter) -> Text | None:
+    """None when some port carries the parameter, else why none does."""
+    if any(port.carries(parameter) for port in ports):
+        return None
+    for port in ports:
+        if carries(port.link.traits, parameter):
+            return port.why_not(parameter)
+    kinds = sorted({port.link.kind for port in ports})
+    needed = "Modbus" if parameter.index is None else "CANopen"
+    return text("drive.exists-only-over", needed=needed, kinds=", ".join(kinds) or "—")

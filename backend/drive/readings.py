@@ -27,6 +27,11 @@ class Reading:
         """The problem in English words; empty where there is none."""
         return "" if self.problem is None else self.problem.words()
 
+    @property
+    def integer(self) -> int | None:
+        """The raw value where it is an integer; else None."""
+        return self.raw if isinstance(self.raw, int) else None
+
 
 @dataclass(frozen=True, slots=True)
 class WriteRecord:

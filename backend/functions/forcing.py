@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -19,7 +19,6 @@ from backend.drive.catalog import functions_of
 from backend.drive.drive import Drive
 from backend.drive.readings import Reading
 from backend.motion.grant import Grant
-from backend.people.lease import Leases
 from backend.work.jobs import Job, JobResult, JobRunner, Progress
 from drivers.cia402 import State
 from drivers.errors import NotAllowed, OutOfRange, Rejected
@@ -206,11 +205,14 @@ class ForcingSession:
 
 
 class ForcingSessions:
-    """All sessions of a bench; one per drive and kind."""
+    """All sessions of a bench; one per drive and kind.
 
-    def __init__(self, jobs: JobRunner, leases: Leases) -> None:
+    ``taken_by`` names the person who controls a drive by another connection than the given one.
+    """
+
+    def __init__(self, jobs: JobRunner, taken_by: Callable[[str, str | None], str | None]) -> None:
         self._jobs = jobs
-        self._leases = leases
+        self._taken_by = taken_by
         self._sessions: dict[tuple[str, str], ForcingSession] = {}
 
     def get(self, drive: str, name: str) -> ForcingSession | None:
@@ -328,10 +330,8 @@ class ForcingSessions:
             return "STOP was pressed"
         if time.monotonic() - session.renewed > SILENT_S:
             return "the page fell silent"
-        holder = self._leases.holder(session.axis.drive.id)
-        if holder is not None and holder.connection != session.connection:
-            return f"{holder.person} took control"
-        return ""
+        person = self._taken_by(session.axis.drive.id, session.connection)
+        return "" if person is None else f"{person} took control"
 
 
 def _end_for(session: ForcingSession, why: Text) -> None:

@@ -226,17 +226,20 @@ def _assignment(commands: Element, axis: AxisHandover, controller: SlaveControll
 def _process_data(data: Element, place: Place, start: int) -> None:
     axis, controller = place.axis, place.axis.controller
     for tag, at, count in (
-        ("Send", place.out_at, place.out_bytes), ("Recv", place.in_at, place.in_bytes),
-    ):  # fmt: skip
+        ("Send", place.out_at, place.out_bytes),
+        ("Recv", place.in_at, place.in_bytes),
+    ):
         part = child(data, tag)
         child(part, "BitStart", 8 * (start + at))
         child(part, "BitLength", 8 * count)
     for direction, tag, kind in (("rx", "Sm2", "Outputs"), ("tx", "Sm3", "Inputs")):
         element = child(data, tag)
         child(element, "Type", kind)
-        manager = controller.manager("outputs" if direction == "rx" else "inputs") if (
-            controller
-        ) else None  # fmt: skip
+        manager = (
+            controller.manager("outputs" if direction == "rx" else "inputs")
+            if (controller)
+            else None
+        )
         if manager is not None:
             child(element, "StartAddress", manager.start)
             child(element, "ControlByte", manager.control)

@@ -152,9 +152,7 @@ def _fmmus(commands: Element, place: Place, controller: SlaveController) -> None
         manager = controller.manager("outputs" if kind == "outputs" else "inputs")
         if manager is None or not size:
             continue
-        data = struct.pack(
-            "<IHBBHBBB3x", LOGICAL + at, size, 0, 7, manager.start, 0, way, 1
-        )  # fmt: skip
+        data = struct.pack("<IHBBHBBB3x", LOGICAL + at, size, 0, 7, manager.start, 0, way, 1)
         register = FMMU + 16 * number
         text = f"set fmmu {number} ({kind})"
         register_command(commands, ("PS",), text, _FPWR, place.address, register, data, count=1)

@@ -203,9 +203,11 @@ def sheet(axis: AxisHandover) -> bytes:
         f"  encoder counts per revolution: {units.encoder_counts_per_rev or 'read 608Fh of drive'}"
     )
     gearing = (
-        ("gear numerator", units.gear_numerator), ("gear denominator", units.gear_denominator),
-        ("feed", units.feed), ("feed revolutions", units.feed_revolutions),
-    )  # fmt: skip
+        ("gear numerator", units.gear_numerator),
+        ("gear denominator", units.gear_denominator),
+        ("feed", units.feed),
+        ("feed revolutions", units.feed_revolutions),
+    )
     by_key = {write.key: write for write in axis.writes}
     for words, key in (*gearing, *_SHEET):
         parameter = axis.profile.by_key.get(key or "")

@@ -110,9 +110,11 @@ def _matched(
     One that is missing in a round would else shift all above it.
     """
     own = [
-        each for one in baseline for each in one.values
+        each
+        for one in baseline
+        for each in one.values
         if (each.quantity, each.number) == (quantity, number) and each.value > 0
-    ]  # fmt: skip
+    ]
     if not own:
         return [], []
     logs = sorted(math.log(each.value) for each in own)
@@ -153,9 +155,7 @@ def _finding(
     direction: Direction = "higher" if shift > 0 else "lower"
     values = (math.exp(base), math.exp(_mean(now)), math.expm1(shift))
     if len(before) < LEAST_REPEATS:
-        return Finding(
-            quantity, number, "few_runs", direction, *values, looked_for=looked_for
-        )  # fmt: skip
+        return Finding(quantity, number, "few_runs", direction, *values, looked_for=looked_for)
     half = _quantile(level, len(before) - 1 + len(now) - 1) * _error(before, now)
     low, high = shift - half, shift + half
     code = "undecided"

@@ -163,9 +163,10 @@ class HealthRecords:
             raise NotAllowed("health.baseline-needs-name", parameter="person")
         with self._store.writing() as session:
             rows = [
-                row for row in _rows(session, _query().where(HealthRun.axis_key == key))
+                row
+                for row in _rows(session, _query().where(HealthRun.axis_key == key))
                 if row.id in set(runs)
-            ]  # fmt: skip
+            ]
             unknown = sorted(set(runs) - {row.id for row in rows})
             if unknown:
                 raise NotAllowed(
@@ -216,15 +217,15 @@ class HealthRecords:
 
 
 def _condition(
-    axis: AxisOf, rows: Sequence[HealthRow], baseline: Baseline | None,
+    axis: AxisOf,
+    rows: Sequence[HealthRow],
+    baseline: Baseline | None,
     since: datetime | None = None,
-) -> Condition:  # fmt: skip
+) -> Condition:
     shown = tuple(row for row in rows if since is None or row.taken >= since)
     if baseline is None:
         return Condition(axis, shown, None, (), 0, 0)
-    later = [
-        row for row in rows if row.taken > baseline.newest and row.id not in baseline.runs
-    ]  # fmt: skip
+    later = [row for row in rows if row.taken > baseline.newest and row.id not in baseline.runs]
     same = [row for row in later if row.settings_sha256 == baseline.settings_sha256]
     findings = compare(baseline.rounds, [row.round for row in same]) if baseline.intact else []
     return Condition(axis, shown, baseline, tuple(findings), len(same), len(later) - len(same))

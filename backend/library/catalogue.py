@@ -296,8 +296,10 @@ class Library:
 
     def _tell(self, action: Action, entry: Entry, **detail: Value) -> None:
         facts: dict[str, Value] = {
-            "kind": entry.kind, "version": entry.latest.number, "sha256": entry.latest.sha256,
-        }  # fmt: skip
+            "kind": entry.kind,
+            "version": entry.latest.number,
+            "sha256": entry.latest.sha256,
+        }
         self._record(
             AuditFact(
                 "file",

@@ -76,11 +76,13 @@ def _measurement(path: Path) -> Described:
     axis |= {"name": head.drive, "profile": head.meta.get("profile")}
     return Described(
         Addition(
-            axis=_axis(axis), author=str(head.meta.get("person") or ""),
+            axis=_axis(axis),
+            author=str(head.meta.get("person") or ""),
             notes=str(head.meta.get("notes") or ""),
-            saved=head.saved.astimezone(UTC), facts=facts,
+            saved=head.saved.astimezone(UTC),
+            facts=facts,
         )
-    )  # fmt: skip
+    )
 
 
 def _report(path: Path) -> Described:

@@ -70,6 +70,11 @@ class Leases:
         """The present holder, or None while the axis is free."""
         return self._holders.get(drive)
 
+    def taken_by(self, drive: str, connection: str | None) -> str | None:
+        """Who controls the drive by another connection than this one; None where nobody does."""
+        holder = self.holder(drive)
+        return None if holder is None or holder.connection == connection else holder.person
+
     def asked(self, drive: str) -> Asked | None:
         """Who asks for control and waits for an answer, or None."""
         return self._asked.get(drive)

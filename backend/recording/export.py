@@ -109,8 +109,9 @@ def _write_csv(
             progress(float(rows.time_ns[-1]) / 1e9 / duration)
 
 
-def epoch_ns(reader: RecordingReader, times_s: np.ndarray[tuple[int], np.dtype[np.float64]]) -> \
-        np.ndarray[tuple[int], np.dtype[np.int64]]:  # fmt: skip
+def epoch_ns(
+    reader: RecordingReader, times_s: np.ndarray[tuple[int], np.dtype[np.float64]]
+) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     """Nanoseconds since the epoch; a float of today's epoch holds no better than 240 ns."""
     start = round(reader.clock.epoch_s * 1e9)
     since = np.rint((times_s - reader.clock.sample_s) * 1e9).astype(np.int64)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 
 from drivers.errors import DriveError
-from drivers.link import Link, RecordsFrames
+from drivers.link import Link
 
 SUFFIX = ".pcapng"
 
@@ -20,10 +20,10 @@ async def flights(opened: Mapping[str, Link]) -> dict[str, bytes]:
     """A pcapng file of each bus that records; a bus that cannot give one is left out."""
     found: dict[str, bytes] = {}
     for url, link in list(opened.items()):
-        if not isinstance(link, RecordsFrames):
+        if link.frames is None:
             continue
         try:
-            data = await link.flight()
+            data = await link.frames.flight()
         except DriveError:
             continue
         name, number = file_name(url), 2

@@ -81,10 +81,11 @@ def _parsed(line: str) -> Change | None:
     try:
         row = json.loads(line)
         return Change(
-            datetime.fromisoformat(row["time"]), str(row["what"]),
+            datetime.fromisoformat(row["time"]),
+            str(row["what"]),
             {str(k): int(v) for k, v in row["before"].items()},
             {str(k): int(v) for k, v in row["after"].items()},
-        )  # fmt: skip
+        )
     except (ValueError, KeyError, TypeError, AttributeError):
         return None
 

@@ -285,15 +285,18 @@ def _names(head: list[str], layout: _Layout) -> tuple[str, ...]:
     """The last line before the table that names its columns, with units of a line below it."""
     rows = []
     for line in head:
-        cells = _split(line.lstrip("#%").strip() if layout.separator is None else line.lstrip("#%"),
-                       layout.separator)  # fmt: skip
+        cells = _split(
+            line.lstrip("#%").strip() if layout.separator is None else line.lstrip("#%"),
+            layout.separator,
+        )
         while len(cells) > layout.width and cells[-1] == "":
             cells.pop()
         rows.append(cells)
     fitting = [
-        cells for cells in rows[-12:]
+        cells
+        for cells in rows[-12:]
         if len(cells) == layout.width and sum(bool(c) for c in cells) * 2 >= layout.width
-    ]  # fmt: skip
+    ]
     if not fitting:
         return tuple(f"column {i + 1}" for i in range(layout.width))
     named = next((cells for cells in fitting if _tells(cells)), fitting[-1])

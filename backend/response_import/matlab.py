@@ -39,8 +39,7 @@ def read_matlab(data: bytes, name: str) -> tuple[tuple[str, ...], tuple[FloatArr
 
     try:
         file: Any = io.BytesIO(data)
-        found = loadmat(file, squeeze_me=False, struct_as_record=True,
-                        chars_as_strings=True)  # fmt: skip
+        found = loadmat(file, squeeze_me=False, struct_as_record=True, chars_as_strings=True)
     except Exception as error:
         # A damaged file makes this reader raise nearly anything; it runs in a process of its own.
         raise BadRecording("import.damaged-matlab-file", value=name, cause=str(error)) from error

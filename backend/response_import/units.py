@@ -60,8 +60,9 @@ def scale_of(
     factor, kind = _INPUT[input_unit]
     out, moved = _OUTPUT[output_unit]
     for what, value, needs in (
-        ("rated torque", rated_torque_nm, "rated"), ("torque constant", torque_constant_nm_a, "A"),
-    ):  # fmt: skip
+        ("rated torque", rated_torque_nm, "rated"),
+        ("torque constant", torque_constant_nm_a, "A"),
+    ):
         if value is None:
             continue
         if not 0.0 < value < 1e6:

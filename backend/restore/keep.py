@@ -29,10 +29,11 @@ def keep_list(
         nonlocal well
         try:
             known.write(
-                drive.pending_restores.outstanding, in_motion=in_motion(),
+                drive.pending_restores.outstanding,
+                in_motion=in_motion(),
                 identity=identity_of(drive),
                 durable=durable,
-            )  # fmt: skip
+            )
         except StorageFailed as error:
             if well:
                 failed(error)

@@ -24,8 +24,9 @@ _RESOLUTION, _RESOLUTION_REVS = "608F:01", "608F:02"
 #: The encoder that speeds are counted with, and factors of the maker's units (CiA 402-2 clause 10).
 _SPEED_RESOLUTION, _SPEED_RESOLUTION_REVS = "6090:01", "6090:02"
 _FACTORS = {
-    Quantity.VELOCITY: ("6096:01", "6096:02"), Quantity.ACCELERATION: ("6097:01", "6097:02"),
-}  # fmt: skip
+    Quantity.VELOCITY: ("6096:01", "6096:02"),
+    Quantity.ACCELERATION: ("6097:01", "6097:02"),
+}
 _ORIGINS = {"manual": Origin.MANUAL, "makers_file": Origin.MAKERS_FILE, "standard": Origin.UNKNOWN}
 #: Beyond this difference two statements of one resolution are two.
 _SAME = 1e-3

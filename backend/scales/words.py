@@ -23,9 +23,11 @@ def halt_words(halt: Halted, units: AxisUnits | None) -> Text:
         reported, seen = units.velocity(halt.value), units.velocity(halt.limit)
         return text(
             "scales.speed-contradicts-position",
-            speed=_figure(reported), from_position=_figure(seen),
-            unit=units.names["velocity"], meaning=text(_meaning(halt.value, halt.limit)),
-        )  # fmt: skip
+            speed=_figure(reported),
+            from_position=_figure(seen),
+            unit=units.names["velocity"],
+            meaning=text(_meaning(halt.value, halt.limit)),
+        )
     if halt.cause not in ENVELOPE_CAUSES:
         return halt.text
     convert, unit = {

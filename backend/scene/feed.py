@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from backend.drive.drive import Drive
 from backend.scales.gear_calculator import Mechanics
 from backend.scales.units import AxisUnits
 from backend.scene.geometry import Track, Travel, track_of, travel_of
@@ -149,7 +148,7 @@ class SceneFeed:
             travel = travel_of(mechanics)
             try:
                 units = await connected.axis.units()
-                limits = await _software_limits(connected.drive, units)
+                limits = await _software_limits(connected, units)
                 key = connected.drive.require("position_actual")
                 streams = [s for s, _ in self._bench.scope.subscribe(drive, [key], POLL_S)]
             except DriveError:
@@ -175,7 +174,7 @@ class SceneFeed:
         """Whether the limits are others now, or a silent drive answers again."""
         try:
             units = await axis.connected.axis.units()
-            limits = await _software_limits(axis.connected.drive, units)
+            limits = await _software_limits(axis.connected, units)
         except DriveError:
             return False
         if not axis.streams or units != axis.units:
@@ -227,11 +226,14 @@ def _words(axis: _Axis) -> tuple[str, str]:
     return state, f"{snapshot.state.value}, {place:.2f} {axis.travel.unit}"
 
 
-async def _software_limits(drive: Drive, units: AxisUnits) -> tuple[float, float] | None:
+async def _software_limits(
+    connected: ConnectedDrive, units: AxisUnits
+) -> tuple[float, float] | None:
     """Revolutions of the drive's own limits; None where it has none or they are switched off.
 
     A range of the whole 32 bits, or an empty one, limits nothing (CiA 402-2 clause 7, 607Dh).
     """
+    drive = connected.drive
     keys = [drive.key(role) for role in ("software_limit_min", "software_limit_max")]
     found: list[int] = []
     for key in keys:

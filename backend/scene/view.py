@@ -198,9 +198,11 @@ class SceneView:
                 pulley = scene.add_frame(name, show_axes=False, position=(x, 0.0, _HEIGHT))
                 scene.add_cylinder(f"{name}/wheel", 0.09, 0.12, color=_STEEL, wxyz=_ALONG_Y)
                 scene.add_box(
-                    f"{name}/mark", color=_MARK, dimensions=(0.02, 0.125, 0.08),
+                    f"{name}/mark",
+                    color=_MARK,
+                    dimensions=(0.02, 0.125, 0.08),
                     position=(0, 0, 0.05),
-                )  # fmt: skip
+                )
                 parts.turning.append((pulley, "y", ratio))
             for place, z in (("upper", 0.09), ("lower", -0.09)):
                 scene.add_box(
@@ -212,9 +214,11 @@ class SceneView:
         name = f"{root}/carriage"
         parts.sliding = scene.add_frame(name, show_axes=False)
         scene.add_box(
-            f"{name}/body", color=_STEEL, dimensions=(0.18, 0.26, 0.12),
+            f"{name}/body",
+            color=_STEEL,
+            dimensions=(0.18, 0.26, 0.12),
             position=(0, 0, _HEIGHT + 0.1),
-        )  # fmt: skip
+        )
         self._posts(root, look)
 
     def _posts(self, root: str, look: AxisLook) -> None:

@@ -21,7 +21,8 @@ async def search_line(
         Busy: drives of the bench use this adapter. LinkLost: the adapter is missing.
     """
     wanted = parse_url(url)
-    if bus_kind(wanted.scheme).serial is None or wanted.is_virtual or url in bench.buses.wires:
+    kind = bus_kind(wanted.scheme)
+    if kind.serial is None or wanted.is_virtual or url in bench.buses.wires:
         raise NotAllowed("station.no-baud-rate-parity", value=url)
     same = [known for known in bench.buses.opened if parse_url(known).place == wanted.place]
     users = [
@@ -33,7 +34,7 @@ async def search_line(
         raise Busy("station.used-take-drives", place=wanted.place, users=", ".join(users))
     for known in same:
         await bench.buses.close(known)
-    found = await search_line_settings(wanted, progress, stations=stations)
+    found = await search_line_settings(wanted, kind, progress, stations=stations)
     line = (
         text("journal.line-settings", place=wanted.place, url=found.url)
         if found

@@ -64,8 +64,9 @@ class Exchange:
         except DriveError as error:
             self.bench.journal.add(
                 text("journal.exchange-not-again", url=self.url, cause=error.text),
-                level="warning", drive=self.drive,
-            )  # fmt: skip
+                level="warning",
+                drive=self.drive,
+            )
 
 
 def port_of(connected: ConnectedDrive) -> Port:

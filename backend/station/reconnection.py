@@ -147,8 +147,9 @@ class Reconnection:
                     restored = what == "back"
                     line = text(
                         "journal.restored" if restored else "journal.not-restored",
-                        drive=drive.name, values=words,
-                    )  # fmt: skip
+                        drive=drive.name,
+                        values=words,
+                    )
                     bench.tell(line, connected, "warning")
             return found
 

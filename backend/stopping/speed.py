@@ -9,7 +9,6 @@ from collections import deque
 from dataclasses import dataclass
 
 from backend.axis.axis import Axis
-from backend.drive.faults import integer
 from backend.scales.units import AxisUnits
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout
@@ -86,7 +85,8 @@ class SpeedWatch:
         if len(missing) > 1 or drive.require("status_word") in missing:
             # A drive whose mailbox is mute is not asked for what the process data tell already.
             reported |= await drive.read_many(missing)
-        word, position, velocity = (integer(reported.get(drive.key(role) or "")) for role in roles)
+        readings = (reported.get(drive.key(role) or "") for role in roles)
+        word, position, velocity = (None if r is None else r.integer for r in readings)
         if word is None or (position is None and velocity is None):
             problem = next((r.error for r in reported.values() if r.error), "no answer")
             raise LinkTimeout(problem, drive=drive.name)

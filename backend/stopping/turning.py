@@ -96,5 +96,7 @@ def turning_message(name: str, turning: Turning) -> Text:
     powered = turning.kind is not TurnKind.DISABLED
     return text(
         "stopping.turns-with-power" if powered else "stopping.turns-without-power",
-        drive=name, speed=f"{turning.speed:.4g}", unit=turning.unit,
-    )  # fmt: skip
+        drive=name,
+        speed=f"{turning.speed:.4g}",
+        unit=turning.unit,
+    )

@@ -302,9 +302,9 @@ class StopWatch:
         units = watch.units
         names = {} if units is None else units.names
         reported = watch.newest is not None
-        travelled = float(watch.travelled_inc) if units is None else units.position(
-            watch.travelled_inc
-        )  # fmt: skip
+        travelled = (
+            float(watch.travelled_inc) if units is None else units.position(watch.travelled_inc)
+        )
         return AxisStop(
             drive=axis.drive.id,
             verdict=verdict,

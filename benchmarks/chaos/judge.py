@@ -109,8 +109,9 @@ class Judge:
 
     # --- claims -----------------------------------------------------------------------
 
-    def claim(self, axis: int, what: str, person: str, brake_s: float,
-              travel_rev: float | None = None) -> Claim:  # fmt: skip
+    def claim(
+        self, axis: int, what: str, person: str, brake_s: float, travel_rev: float | None = None
+    ) -> Claim:
         truth = self.truths.get(axis)
         made = Claim(axis, what, person, time.monotonic(), brake_s, travel_rev,
                      truth.position if truth and not self.moves(axis) else None)  # fmt: skip
@@ -125,9 +126,11 @@ class Judge:
         at = time.monotonic() if at is None else at
         with self._lock:
             for claim in self.claims:
-                if axis in (None, claim.axis) and person in (None, claim.person) and (
-                    before is None or claim.began < before
-                ):  # fmt: skip
+                if (
+                    axis in (None, claim.axis)
+                    and person in (None, claim.person)
+                    and (before is None or claim.began < before)
+                ):
                     claim.end(at)
                     if stands:
                         claim.brake_s = 0.0
@@ -186,8 +189,10 @@ class Judge:
         if self.violated(f"axis {self.station.specs[axis].name} moves: {why}", key):
             for each in list(self._history[axis])[-150::6]:
                 turns = each.position / self.counts[axis]
-                self._say(f"    {each.wall_s - now:+.3f} s: {turns:.3f} rev"
-                          f"{', enabled' if each.enabled else ''}")  # fmt: skip
+                self._say(
+                    f"    {each.wall_s - now:+.3f} s: {turns:.3f} rev"
+                    f"{', enabled' if each.enabled else ''}"
+                )
 
     def _judge_grant(self, axis: int, now: float, late: float) -> None:
         """No axis turns without a grant of the motion authority, but for its ramp."""
@@ -218,8 +223,7 @@ class Judge:
             if sent > self.troubled + _REASON_S + late:
                 self.violated(f"STOP: {name} is unreachable, and nothing is wrong: {verdict}")
             return
-        recent = [t.position for t in tuple(self._history[axis])
-                  if now - t.wall_s < _SAID_S + late]  # fmt: skip
+        recent = [t.position for t in tuple(self._history[axis]) if now - t.wall_s < _SAID_S + late]
         if said == "stopped" or len(recent) < 5:
             return
         if max(recent) - min(recent) < _MOVES_REV * self.counts[axis]:

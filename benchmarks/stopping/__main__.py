@@ -56,8 +56,10 @@ def _vertical(families: tuple[str, ...], *, markdown: bool) -> int:
             continue
         if not markdown:
             mark = "" if one.held else "  <-- finding"
-            print(f"{_NAMES[one.family]:5} {one.motion:19} {one.trouble:18} {_sinking(one)}{mark}",
-                  flush=True)  # fmt: skip
+            print(
+                f"{_NAMES[one.family]:5} {one.motion:19} {one.trouble:18} {_sinking(one)}{mark}",
+                flush=True,
+            )
     if markdown:
         print(_markdown(found, families, _sinking))
     bad = [each for each in found if not each.held]

@@ -105,7 +105,7 @@ class RigLink(DirectLink):
         self.device.communication_lost("watchdog")
 
     def newest(self, channels: list[str], within_s: float) -> dict[str, float]:
-        """`drivers.link.TellsNewest`."""
+        """See `drivers.link.Cyclic.newest`."""
         del within_s
         if not self.running:
             return {}

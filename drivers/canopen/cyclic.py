@@ -77,6 +77,21 @@ class CanopenCyclic:
         self._tell: Callable[[LinkEvent], None] = lambda _event: None
         self._heard: Callable[[int], bool] = lambda _node: False
 
+    @property
+    def power(self) -> CanopenCyclic:
+        """Its loop writes the control words."""
+        return self
+
+    @property
+    def speeds(self) -> CanopenCyclic:
+        """Drives without a cyclic mode are given speeds in Profile velocity."""
+        return self
+
+    @property
+    def trouble(self) -> str:
+        """Empty: an exchange that broke off is not set up again by itself."""
+        return ""
+
     def know_nodes_by(self, heard: Callable[[int], bool]) -> None:
         """How to tell whether a node of this number is on the bus."""
         self._heard = heard
@@ -236,7 +251,7 @@ class CanopenCyclic:
                 raise LinkLost("canopen.bus-lost")
 
     async def pause(self, station: int) -> None:
-        """See `drivers.link.Pauses`."""
+        """Brake now and hold, enabled, for the next motion."""
         self._require_running().axis(station, AxisLoop.pause)
 
     def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:
@@ -250,7 +265,7 @@ class CanopenCyclic:
         return leave
 
     def newest(self, channels: Sequence[str], within_s: float) -> dict[str, int | float]:
-        """See `drivers.link.TellsNewest`."""
+        """Raw values of the last cycle, see `drivers.link.Cyclic`."""
         reported = {} if self._loop is None else self._loop.newest(within_s)
         return {channel: reported[channel] for channel in channels if channel in reported}
 

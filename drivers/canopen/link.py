@@ -42,6 +42,7 @@ from drivers.link import (
     Address,
     Cyclic,
     Found,
+    Link,
     LinkEvent,
     LinkQuality,
     Progress,
@@ -393,6 +394,11 @@ class CanopenLink:
             except LinkLost:
                 return  # the receiving thread is about to notice and tell of it
 
+    @property
+    def doctor(self) -> CanopenLink:
+        """It says itself why a station is not in Operational."""
+        return self
+
     async def stations_known(self) -> Sequence[int]:
         """See `drivers.doctor.examined.Examines`."""
         return self._examiner.known()
@@ -407,6 +413,11 @@ class CanopenLink:
         found = await self._in_worker(partial(self._examiner.examine, station, profile, refusal))
         causes = diagnose(found)
         return Examination(station, not causes, causes)
+
+    @property
+    def frames(self) -> CanopenLink:
+        """It keeps the last minute of its frames."""
+        return self
 
     async def flight(self, station: int | None = None) -> bytes:
         """See `drivers.link.RecordsFrames`."""
@@ -448,3 +459,8 @@ def _fit(data: bytes, size: int | None) -> bytes:
     if rest.strip(b"\0") == b"" or rest.strip(sign) == b"":
         return data[:size]
     return data
+
+
+def can_bus_of(link: Link | None) -> CanopenLink | None:
+    """The link of a CAN bus, for what only CANopen has; None for another bus."""
+    return link if isinstance(link, CanopenLink) else None

@@ -230,7 +230,7 @@ class SyncLoop:
             self._lock.wait_for(still, 1.5)
 
     def newest(self, within_s: float) -> dict[str, int | float]:
-        """Inputs of the last cycle by channel, as `drivers.link.TellsNewest`."""
+        """Inputs of the last cycle by channel, as `drivers.link.Cyclic.newest`."""
         with self._lock:
             sampled_s = self._sampled_s
             if self._bus_lost or sampled_s is None:

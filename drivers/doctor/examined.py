@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 from drivers.doctor.diagnosis import Cause
 from drivers.errors import DriveError
@@ -19,7 +19,6 @@ class Examination:
     causes: tuple[Cause, ...] = ()
 
 
-@runtime_checkable
 class Examines(Protocol):
     """A link whose stations the doctor can examine."""
 

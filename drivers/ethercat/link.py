@@ -315,6 +315,11 @@ class EthercatLink:
         found = evidence_of(facts, self._profiles.get(station), refusal, aliases)
         return found, diagnose(found)
 
+    @property
+    def doctor(self) -> EthercatLink:
+        """It says itself why a station is not in Operational."""
+        return self
+
     async def stations_known(self) -> Sequence[int]:
         """See `drivers.doctor.examined.Examines`."""
         return [each.station for each in (await self.survey()).stations]
@@ -324,6 +329,11 @@ class EthercatLink:
         found, causes = await self.diagnose(station, refusal)
         reached = refusal is None and found.al == _OPERATIONAL
         return Examination(station, reached, () if reached else causes)
+
+    @property
+    def frames(self) -> EthercatLink:
+        """It keeps the last minute of its frames."""
+        return self
 
     async def flight(self, station: int | None = None) -> bytes:
         """See `drivers.link.RecordsFrames`."""

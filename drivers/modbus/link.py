@@ -16,6 +16,7 @@ from typing import TypeVar
 
 from drivers.cia402 import is_stop
 from drivers.dictionary import Described
+from drivers.doctor.examined import Examines
 from drivers.errors import (
     DriveError,
     LinkLost,
@@ -88,6 +89,7 @@ class RegisterLink:
     """A `drivers.link.Link` over one serial line."""
 
     cyclic: Cyclic | None = None
+    doctor: Examines | None = None
 
     def __init__(
         self,
@@ -241,6 +243,11 @@ class RegisterLink:
                 self._listeners.remove(listener)
 
         return unsubscribe
+
+    @property
+    def frames(self) -> RegisterLink:
+        """It keeps the last minute of its frames."""
+        return self
 
     async def flight(self, station: int | None = None) -> bytes:
         """See `drivers.link.RecordsFrames`."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from drivers.bus import BusUrl
+from drivers.bus import BusKind, BusUrl
 from drivers.errors import OutOfRange
 from drivers.link import Found, Progress
 from drivers.modbus.port import Parity, is_pseudo_terminal
 from drivers.texts.message import Text, text
-from drivers.urls import bus_kind, link_for, parse_url
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +21,8 @@ class LineFound:
 
 
 async def search_line_settings(
-    url: str | BusUrl,
+    bus: BusUrl,
+    kind: BusKind,
     progress: Progress,
     *,
     baudrates: Sequence[int] = (),
@@ -37,8 +37,7 @@ async def search_line_settings(
     Raises:
         LinkLost: the adapter is missing, in use, or pulled during the search.
     """
-    bus = parse_url(url) if isinstance(url, str) else url
-    usual = bus_kind(bus.scheme).serial
+    usual = kind.serial
     assert usual is not None, "only a serial line has settings to search for"
     rates = baudrates or usual.baudrates
     kinds: Sequence[str] = parities or usual.parities
@@ -50,7 +49,7 @@ async def search_line_settings(
             number / len(settings), text("modbus.trying-baud-parity", rate=rate, parity=parity)
         )
         candidate = bus.with_options(baudrate=rate, parity=parity)
-        link = link_for(candidate)
+        link = kind.link(candidate)
         try:
             await link.open()
             found = await link.scan(_quiet, stations)

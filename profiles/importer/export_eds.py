@@ -149,9 +149,11 @@ def _mandatory(index: int, profile: Profile) -> list[str]:
         return entry("1001", "Error register", _CODE["UINT8"], None)
     known = profile.identity
     parts = (
-        ("Vendor ID", known.vendor_id), ("Product code", known.product_code),
-        ("Revision number", known.revision), ("Serial number", None),
-    )  # fmt: skip
+        ("Vendor ID", known.vendor_id),
+        ("Product code", known.product_code),
+        ("Revision number", known.revision),
+        ("Serial number", None),
+    )
     lines = [
         "[1018]", "ParameterName=Identity object", f"ObjectType=0x{_RECORD:X}", "SubNumber=5", "",
         *entry("1018sub0", "Highest subindex", _CODE["UINT8"], 4),

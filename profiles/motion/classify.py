@@ -65,12 +65,16 @@ def _classified(profile: Profile, parameter: Parameter) -> Parameter:
         origin = "standard"
     if rule is None:
         update: dict[str, object] = {
-            "motion": "energises", "motion_origin": "unclassified",
-            "motion_reason": _UNCLASSIFIED, "safe_in_motion": False,
-        }  # fmt: skip
+            "motion": "energises",
+            "motion_origin": "unclassified",
+            "motion_reason": _UNCLASSIFIED,
+            "safe_in_motion": False,
+        }
     else:
         update = {
-            "motion": rule.motion, "motion_origin": origin,
-            "motion_reason": rule.reason, "safe_in_motion": rule.safe_in_motion,
-        }  # fmt: skip
+            "motion": rule.motion,
+            "motion_origin": origin,
+            "motion_reason": rule.reason,
+            "safe_in_motion": rule.safe_in_motion,
+        }
     return parameter.model_copy(update=update)

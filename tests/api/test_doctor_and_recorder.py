@@ -66,9 +66,11 @@ def decoded(data: bytes, folder: Path, chosen: str) -> list[str]:
     path.write_bytes(data)
     done = subprocess.run(
         ["tshark", "-r", str(path), "-Y", chosen, "-T", "fields", "-e", "frame.protocols"],
-        capture_output=True, check=True, text=True,
+        capture_output=True,
+        check=True,
+        text=True,
         env={"PATH": "/usr/bin:/bin", "HOME": str(folder)},
-    )  # fmt: skip
+    )
     return done.stdout.splitlines()
 
 
@@ -130,9 +132,10 @@ def test_the_bundle_of_a_fault_has_the_frames(
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         frames = {n: archive.read(n) for n in archive.namelist() if n.startswith("frames/")}
     assert set(frames) == {
-        "frames/ethercat-virtual0.pcapng", "frames/canopen-virtual0.pcapng",
+        "frames/ethercat-virtual0.pcapng",
+        "frames/canopen-virtual0.pcapng",
         "frames/mlink-virtual0.pcapng",
-    }  # fmt: skip
+    }
     # Emergencies travel with 80h + node-ID (CiA 301 clause 7.3.3).
     assert decoded(frames["frames/canopen-virtual0.pcapng"], tmp_path, "can.id == 0x083")
 

@@ -401,8 +401,9 @@ def test_killed_host_ends_the_motion_and_is_replaced(running: Segment) -> None:
     running.reported("the EtherCAT process runs again", after=before)
     running.reported(
         "the cyclic exchange runs again; every axis is disabled until you enable it",
-        after=before, within_s=20,
-    )  # fmt: skip
+        after=before,
+        within_s=20,
+    )
     assert running.exchange()["running"]
     assert not running.exchange()["problem"]
     running.stands()

@@ -56,17 +56,20 @@ def check_commands(tmp_path: Path, *where: str) -> None:
     assert found["not_read"] == []
     assert found["same"] > 50
     assert json.loads(call("handover", "watch", str(held), bus, *options, "--json")) == {
-        "changed": [], "not_read": [],
-    }  # fmt: skip
+        "changed": [],
+        "not_read": [],
+    }
 
     # A tuning after the hand-over: the controller undoes it.
-    before = int(next(
-        line.partition("=")[2]
-        for line in held.read_text().split("[[parameter]]")[1:]
-        if f'"{GAIN}"' in line
-        for line in line.splitlines()
-        if line.startswith("raw")
-    ))  # fmt: skip
+    before = int(
+        next(
+            line.partition("=")[2]
+            for line in held.read_text().split("[[parameter]]")[1:]
+            if f'"{GAIN}"' in line
+            for line in line.splitlines()
+            if line.startswith("raw")
+        )
+    )
     call("params", "set", bus, f"{GAIN}={before + 7}", "--raw", *options)
     try:
         found = conflicts_of(str(listed), bus, *options)
@@ -102,8 +105,9 @@ def test_a_list_is_compared_with_a_set_of_the_same_family(url: str, tmp_path: Pa
     other.write_text(other.read_text().replace('profile = "mms7"', 'profile = "m6l"'))
     listed = tmp_path / "x.sh"
     listed.write_text("ethercat download -p 0 -t uint16 0x6072 0 500\n")
-    text = call("handover", "compare", str(listed), url, "--profile", "mms7",
-                "--set", str(other), code=1)  # fmt: skip
+    text = call(
+        "handover", "compare", str(listed), url, "--profile", "mms7", "--set", str(other), code=1
+    )
     assert "m6l" in text
 
 
@@ -146,8 +150,10 @@ def test_export_compare_and_changes(station: Station, x: str, held: str) -> None
     query = {"file": "start.xml"}
     (conflict,) = station.ok(station.http.post(compare, params=query, content=listed))["conflicts"]
     assert (conflict["key"], conflict["drive"], conflict["controller"]) == (
-        GAIN, before + 5, before,
-    )  # fmt: skip
+        GAIN,
+        before + 5,
+        before,
+    )
     newest = station.ok(station.http.get(f"/drives/{x}/handovers"))[0]
     assert newest["sha256"] == made["files"][0]["sha256"]
     assert newest["person"]
@@ -267,11 +273,13 @@ def test_bad_exports_are_explained(
 @pytest.mark.parametrize(
     "content",
     [
-        b"", b"hello", b"<EtherCATMailbox>",
+        b"",
+        b"hello",
+        b"<EtherCATMailbox>",
         b'<!DOCTYPE a [<!ENTITY b "c">]><EtherCATMailbox>&b;</EtherCATMailbox>',
         b"a: &a [1]\nsdo: [*a, *a]",
     ],
-)  # fmt: skip
+)
 def test_hostile_lists_get_one_clear_error(station: Station, x: str, content: bytes) -> None:
     answer = station.http.post(
         f"/drives/{x}/handover/compare", params={"file": "list.xml"}, content=content

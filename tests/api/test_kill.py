@@ -99,8 +99,9 @@ def test_killed_server_leaves_an_axis_that_stops_by_itself(
     page = server.live()
     limits = {"speed": SPEED_RPM, "acceleration": RAMP_RPM_S, "travel_limit": 30,
               "torque_limit": 150}  # fmt: skip
-    with jogged(server.http, page, x, lambda now, _: abs(now["velocity"] - SPEED_RPM) < 30,
-                **limits):  # fmt: skip
+    with jogged(
+        server.http, page, x, lambda now, _: abs(now["velocity"] - SPEED_RPM) < 30, **limits
+    ):
         server.kill()
     page.close()
     seen = asyncio.run(positions(url, 1.5))

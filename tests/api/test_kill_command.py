@@ -68,8 +68,9 @@ class Bench:
 
     def sweep_killed(self, key: str, *more: str) -> None:
         """A sweep that is killed once ``key`` is changed in the drive."""
-        sweep = self.start("sweep", self.url, "--station", "1", "--out",
-                           str(self.folder / "never.json"), *more)  # fmt: skip
+        sweep = self.start(
+            "sweep", self.url, "--station", "1", "--out", str(self.folder / "never.json"), *more
+        )
 
         def borrowed() -> bool:
             if sweep.poll() is not None:

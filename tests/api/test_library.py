@@ -279,8 +279,9 @@ async def test_no_change_of_files_or_station_is_forgotten(
         ("changed", "X", "/drives/x", "local user")
     ]
     assert (events[0]["old"], events[0]["new"]) == (
-        '{"name":"X","notes":""}', '{"notes":"greased"}',
-    )  # fmt: skip
+        '{"name":"X","notes":""}',
+        '{"notes":"greased"}',
+    )
 
 
 async def audit_status(http: httpx.AsyncClient, *, troubled: bool) -> Any:

@@ -109,9 +109,10 @@ def test_feed_costs_nothing_when_nobody_looks(station: Station, x: str) -> None:
 
 
 def test_foreign_pages_get_no_feed(station: Station) -> None:
-    with pytest.raises(InvalidStatus), connect(
-        f"ws://127.0.0.1:{station.port}/rerun/feed", origin="http://evil.example"
-    ):  # fmt: skip
+    with (
+        pytest.raises(InvalidStatus),
+        connect(f"ws://127.0.0.1:{station.port}/rerun/feed", origin="http://evil.example"),
+    ):
         pass
 
 

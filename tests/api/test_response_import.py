@@ -97,9 +97,10 @@ def test_a_name_makes_no_path(station: Station, name: str) -> None:
     rows = "\n".join(f"{i / 1000},{(i * i) % 97},{(i * i * i) % 89}" for i in range(2000))
     answer = station.http.post(
         "/measurements/import",
-        params={"name": name, "time": "1", "input": "2", "output": "3"}, content=rows.encode(),
+        params={"name": name, "time": "1", "input": "2", "output": "3"},
+        content=rows.encode(),
         timeout=60,
-    )  # fmt: skip
+    )
     assert answer.status_code in (201, 409)
     if answer.status_code == 201:
         file = answer.json()["file"]

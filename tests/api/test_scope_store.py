@@ -27,10 +27,12 @@ SETUP: dict[str, Any] = {
 def snapshot(rows: int = 5, **change: object) -> bytes:
     """A file, put together by hand after the layout in backend/scope/stored.py."""
     header = {
-        "created": "2026-11-21T08:00:00Z", "notes": "belt loose", "origin_s": 12.5,
+        "created": "2026-11-21T08:00:00Z",
+        "notes": "belt loose",
+        "origin_s": 12.5,
         "setup": SETUP,
         "traces": [{"label": "X speed", "unit": "rpm", "rows": rows, "synchronous": True}],
-    } | change  # fmt: skip
+    } | change
     text = json.dumps(header).encode()
     columns = np.arange(2 * rows, dtype="<f8").tobytes()
     return b"SDSNAP1\n" + struct.pack("<I", len(text)) + text + columns

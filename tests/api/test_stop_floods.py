@@ -49,8 +49,10 @@ def stops(server: GuardedServer, caller: Caller, count: int) -> list[tuple[float
     waits = Path(f"/proc/self/task/{server._thread.native_id}/schedstat")
     process = subprocess.Popen(
         [sys.executable, flood.__file__, "stops", str(server.port), head],
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
     assert process.stdin is not None
     assert process.stdout is not None
     found = []
@@ -81,8 +83,10 @@ def flooded(server: GuardedServer, kind: str, caller: Caller) -> Iterator[None]:
     )
     process = subprocess.Popen(
         [sys.executable, flood.__file__, kind, str(server.port), head],
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
     assert process.stdin is not None
     assert process.stdout is not None
     try:
@@ -120,8 +124,9 @@ def figures(kind: str, took: list[tuple[float, float]]) -> float:
     for name, each in zip(("wall", "own"), zip(*took, strict=True), strict=True):
         ordered = sorted(each)
         p50, p99 = ordered[len(ordered) // 2], ordered[int(len(ordered) * 0.99) - 1]
-        shown.append(f"{name}: p50 {p50 * 1e3:.1f}, p99 {p99 * 1e3:.1f}, "
-                     f"longest {ordered[-1] * 1e3:.1f} ms")  # fmt: skip
+        shown.append(
+            f"{name}: p50 {p50 * 1e3:.1f}, p99 {p99 * 1e3:.1f}, longest {ordered[-1] * 1e3:.1f} ms"
+        )
     if os.environ.get("SERVODECK_PRINT_FIGURES"):
         print(f"\n{kind}: {'; '.join(shown)}")
     return p99

@@ -95,8 +95,9 @@ def step(page: Page, station: Station, axis: str) -> None:
 def following_error(page: Page, station: Station, axis: str) -> None:
     """Velocity lag of a move at constant speed."""
     arm(page, "motion", "1")
-    caught(page, station, axis, mode="CSP", shape="ramp", amplitude=4, duration_s=2.4,
-           acceleration=5)  # fmt: skip
+    caught(
+        page, station, axis, mode="CSP", shape="ramp", amplitude=4, duration_s=2.4, acceleration=5
+    )
     cursors(page, "0.2", "0.7")
     print(
         "move:",
@@ -114,8 +115,9 @@ def torque(page: Page, station: Station, axis: str) -> None:
     page.get_by_text("Spectrum", exact=True).click()
     spectrum = page.get_by_role("region", name="Spectrum")
     spectrum.get_by_label("Window").select_option("flattop")
-    job = generate(station, axis, mode="CSV", shape="sine", amplitude=20, frequency_hz=12,
-                   duration_s=20)  # fmt: skip
+    job = generate(
+        station, axis, mode="CSV", shape="sine", amplitude=20, frequency_hz=12, duration_s=20
+    )
     spectrum.get_by_label("Trace").select_option(VELOCITY)
 
     heights = [0.0]

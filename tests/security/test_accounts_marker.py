@@ -164,8 +164,10 @@ async def test_a_damaged_database_claims_only_what_is_known(station: Path) -> No
 def serve(folder: Path) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-m", "backend", "serve", "--port", "0", "--config", str(folder)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
 
 
 @pytest.mark.timeout(400)  # four starts of the whole program

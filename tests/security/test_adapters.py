@@ -130,9 +130,11 @@ async def test_a_saved_list_of_drives_opens_none(tmp_path: Path, listener: Liste
     kept = tmp_path / "kept"
     state = tmp_path / "state"
     state.mkdir()
-    urls = [f"canopen://slcan/spy:%2F%2F%2Fdev%2Fptmx%3Ffile={kept}",
-            f"modbus://socket://127.0.0.1:{listener.port}",
-            f"mlink://rfc2217://127.0.0.1:{listener.port}"]  # fmt: skip
+    urls = [
+        f"canopen://slcan/spy:%2F%2F%2Fdev%2Fptmx%3Ffile={kept}",
+        f"modbus://socket://127.0.0.1:{listener.port}",
+        f"mlink://rfc2217://127.0.0.1:{listener.port}",
+    ]
     drives = [
         {"name": f"d{n}", "profile": "mms7", "ports": [{"url": url, "station": 1}]}
         for n, url in enumerate(urls)
@@ -212,7 +214,7 @@ def test_what_is_no_serial_device_is_not_opened(tmp_path: Path) -> None:
         "shadow": Path("/etc/shadow"),
         "gone": tmp_path / "gone",
     }
-    for name, target in names.items():  # fmt: skip
+    for name, target in names.items():
         link = tmp_path / f"to-{name}"
         link.symlink_to(target)
         refusals = []

@@ -322,10 +322,12 @@ def test_entries_of_an_uploaded_zip_lead_nowhere(server: GuardedServer, cast: Ca
         archive.writestr("../../../../tmp/servodeck-evil.txt", "evil")
         archive.writestr("/tmp/servodeck-evil.txt", "evil")
     for method, path in (
-        ("POST", "/descriptions/devices?file=x.zip"), ("PUT", "/sets/x"),
-        ("POST", "/measurements?name=x"), ("POST", "/scope/snapshots/x"),
+        ("POST", "/descriptions/devices?file=x.zip"),
+        ("PUT", "/sets/x"),
+        ("POST", "/measurements?name=x"),
+        ("POST", "/scope/snapshots/x"),
         ("POST", "/sets/list?file=x"),
-    ):  # fmt: skip
+    ):
         answer = cast.operator.ask(method, path, content=data.getvalue())
         assert answer.status_code < 500, (path, answer.text[:200])
         assert answer.status_code >= 400 or answer.json() == [], path

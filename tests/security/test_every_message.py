@@ -352,8 +352,9 @@ def test_a_viewer_stops_what_moves(server: GuardedServer, cast: Cast) -> None:
 
 
 def test_a_guest_cannot_hold_the_enabling_button(server: GuardedServer, cast: Cast) -> None:
-    cast.operator.ok("PUT", f"/invitations/{cast.invitation}/grant",
-                     {"rights": ["motion"], "minutes": 5})  # fmt: skip
+    cast.operator.ok(
+        "PUT", f"/invitations/{cast.invitation}/grant", {"rights": ["motion"], "minutes": 5}
+    )
     try:
         for caller in (cast.guest, cast.viewer, cast.reader):
             with caller.live() as page:
@@ -372,9 +373,10 @@ def test_a_guest_gets_what_is_granted_where_and_as_long(server: GuardedServer, c
     grant = f"/invitations/{cast.invitation}/grant"
     ticks = server.people.support._ticks
     assert cast.guest.ask("PUT", path, json=write).status_code == 403
-    assert cast.operator.ask(
-        "PUT", grant, json={"rights": ["station"], "minutes": 5}
-    ).status_code == 409  # fmt: skip
+    assert (
+        cast.operator.ask("PUT", grant, json={"rights": ["station"], "minutes": 5}).status_code
+        == 409
+    )
     cast.operator.ok("PUT", grant, {"rights": ["parameters"], "minutes": 5, "drive": "x"})
     assert cast.guest.ask("PUT", path, json=write).status_code != 403
     other = cast.guest.ask("PUT", "/drives/y/parameters/2005:03", json=write)
@@ -391,8 +393,9 @@ def test_the_button_on_site_is_dead_within_200_ms(
     server: GuardedServer, cast: Cast, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No release comes: the page on site has frozen. What the guest moves is stopped."""
-    cast.operator.ok("PUT", f"/invitations/{cast.invitation}/grant",
-                     {"rights": ["motion"], "minutes": 5})  # fmt: skip
+    cast.operator.ok(
+        "PUT", f"/invitations/{cast.invitation}/grant", {"rights": ["motion"], "minutes": 5}
+    )
     now = [time.monotonic()]
     monkeypatch.setattr(server.people.support, "_ticks", lambda: now[0])
     with cast.operator.live() as site:
@@ -451,8 +454,10 @@ def test_a_link_works_once_and_its_code_cannot_be_guessed(
     made = cast.operator.ok("POST", "/invitations", {"guest": "Gina", "minutes": 5})
     link, code = made["link"].removeprefix("/guest/"), made["invitation"]["code"]
     server.people.support._throttle.succeeded("127.0.0.1")
-    codes = [nobody.ask("POST", "/guests", json={"link": link, "code": "AAAA-AAAA"}).status_code
-             for _ in range(5)]  # fmt: skip
+    codes = [
+        nobody.ask("POST", "/guests", json={"link": link, "code": "AAAA-AAAA"}).status_code
+        for _ in range(5)
+    ]
     assert set(codes) <= {401, 429}
     server.people.support._throttle.succeeded("127.0.0.1")
     good = nobody.ask("POST", "/guests", json={"link": link, "code": code})

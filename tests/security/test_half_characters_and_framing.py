@@ -39,7 +39,7 @@ BODIES = [
     ("PUT", "/drives/x/mechanics", {"name": HALF}),
     ("POST", "/recordings", {"name": HALF}),
     ("POST", "/reports", {"title": HALF}),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("method", "path", "body"), BODIES, ids=lambda part: ascii(part)[:40])
@@ -47,9 +47,11 @@ def test_half_a_character_is_refused(
     cast: Cast, method: str, path: str, body: dict[str, object]
 ) -> None:
     answer = cast.administrator.ask(
-        method, path, content=json.dumps(body).encode(),
+        method,
+        path,
+        content=json.dumps(body).encode(),
         headers={"Content-Type": "application/json"},
-    )  # fmt: skip
+    )
     assert 400 <= answer.status_code < 500, answer.text
     assert cast.administrator.ask("GET", "/drives").status_code == 200
 

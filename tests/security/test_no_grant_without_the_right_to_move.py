@@ -122,8 +122,10 @@ def test_no_request_replaces_a_quick_stop_by_torque_zero(server: GuardedServer) 
     root = Path(__file__).parents[2]
     for file in (root / "backend").rglob("*.py"):
         tree = ast.parse(file.read_text())
-        if any((isinstance(node, ast.keyword) and node.arg == "torque_off_only")
-               or (isinstance(node, ast.Attribute) and node.attr == "torque_off_only")
-               for node in ast.walk(tree)):  # fmt: skip
+        if any(
+            (isinstance(node, ast.keyword) and node.arg == "torque_off_only")
+            or (isinstance(node, ast.Attribute) and node.attr == "torque_off_only")
+            for node in ast.walk(tree)
+        ):
             named.add(file.relative_to(root).as_posix())
     assert named == {"backend/tools/brake/run.py", "backend/tools/first_power/run.py"}

@@ -95,8 +95,9 @@ class Scene:
     def writable(self) -> list[Parameter]:
         """Everything that this bus carries and that can be written."""
         drive = self.server.connected.drive
-        return [p for p in self.profile.parameters if p.access != "ro"
-                and not drive.unreachable_why(p)]  # fmt: skip
+        return [
+            p for p in self.profile.parameters if p.access != "ro" and not drive.unreachable_why(p)
+        ]
 
     def wire(self, on: bool) -> None:
         """All inputs as they are wired: on or off."""
@@ -198,9 +199,11 @@ def a_set(scene: Scene) -> bytes:
 def loaded(scene: Scene, caller: Caller, file: str, keys: list[str]) -> dict[str, Any]:
     """The report of loading a set, by key."""
     body = {
-        "file": file, "keys": keys, "accept_other_identity": True,
+        "file": file,
+        "keys": keys,
+        "accept_other_identity": True,
         "accept_motor_individual": True,
-    }  # fmt: skip
+    }
     job = caller.ok("POST", "/drives/x/jobs/load_set", body)
 
     async def ended() -> Any:
@@ -225,9 +228,10 @@ def test_no_set_moves_the_axis(scene: Scene, way: str) -> None:
     if way == "csv":
         rows = [f"{p.key},{values_of(p)[-1]}" for p in scene.writable()]
         answer = administrator.http.post(
-            "/sets/list", params={"profile": scene.profile.drive, "file": file},
+            "/sets/list",
+            params={"profile": scene.profile.drive, "file": file},
             content="\n".join(["key,raw", *rows]),
-        )  # fmt: skip
+        )
         assert answer.is_success, answer.text
         file = answer.json()["file"]
     else:
@@ -271,8 +275,9 @@ def test_the_command_line_moves_nothing(
     token = scene.callers["token look+parameters"].token
     monkeypatch.setenv("SERVODECK_TOKEN", token or "")
     verbs = local_params if where == "local" else remote_params
-    place = Place(scene.url, STATION, scene.profile.drive, None if where == "local" else
-                  scene.server.url)  # fmt: skip
+    place = Place(
+        scene.url, STATION, scene.profile.drive, None if where == "local" else scene.server.url
+    )
     for parameter in filter(energises, scene.writable()):
         with pytest.raises(DriveError) as refusal:
             asyncio.run(verbs.put(place, [f"{parameter.key}={values_of(parameter)[0]}"], raw=True))

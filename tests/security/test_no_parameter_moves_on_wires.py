@@ -148,8 +148,9 @@ class Wires:
     def writable(self, place: Place) -> list[Parameter]:
         """Everything that this bus carries and that can be written, what restarts it last."""
         drive = self.connected(place).drive
-        found = [p for p in drive.profile.parameters if p.access != "ro"
-                 and not drive.unreachable_why(p)]  # fmt: skip
+        found = [
+            p for p in drive.profile.parameters if p.access != "ro" and not drive.unreachable_why(p)
+        ]
         return sorted(found, key=lambda p: p.key.startswith(LAST))
 
 

@@ -173,8 +173,9 @@ def test_cut_off_at_every_step_to_the_disk(act: str, database: str, tmp_path: Pa
             (tmp_path / "reported").rename(tmp_path / f"reported-{step}")
             ended = lives.cut(step + 1, act, step)
             deeds = [*json_lines(tmp_path / f"reported-{step}"), *lives.reported()]
-            (tmp_path / "reported").write_text("".join(json.dumps(d) + "\n" for d in deeds
-                                                   if d["act"] != "end"))  # fmt: skip
+            (tmp_path / "reported").write_text(
+                "".join(json.dumps(d) + "\n" for d in deeds if d["act"] != "end")
+            )
             check(tmp_path, database, lives.reported())
             if ended:
                 break

@@ -48,8 +48,9 @@ def test_every_save_is_a_version_that_stays(library: Library, reported: list[Fac
     assert second.latest.sha256 == hashlib.sha256(b"two").hexdigest()
     assert second.latest.axis == X
     assert [(f.action, f.target, f.detail["version"]) for f in reported] == [
-        ("saved", "x.sdset", 1), ("saved", "x.sdset", 2),
-    ]  # fmt: skip
+        ("saved", "x.sdset", 1),
+        ("saved", "x.sdset", 2),
+    ]
 
 
 def test_the_same_contents_make_no_version(library: Library) -> None:

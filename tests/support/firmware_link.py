@@ -30,7 +30,7 @@ class FirmwareLink:
     With ``real_time`` an access comes as late for the drive as it does for the computer.
     """
 
-    cyclic = None
+    cyclic = doctor = frames = None
 
     def __init__(self, family: str, kind: LinkKind, *, real_time: bool = False) -> None:
         self._real_time, self._asked = real_time, time.monotonic()

@@ -29,6 +29,8 @@ class MemoryLink:
         self.kind: LinkKind = "mlink"
         self.url = "mlink://memory"
         self.cyclic: Cyclic | None = None
+        self.doctor = None
+        self.frames = None
         self.objects = objects
         self.written: list[tuple[tuple[int, int], bytes]] = []
         self.write_errors: list[DriveError] = []

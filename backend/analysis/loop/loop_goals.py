@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from backend.analysis.signals.arrays import BoolArray, ComplexArray
+from backend.analysis.thresholds import loop_goals as threshold
 
 LoadClass = Literal["stiff", "medium", "compliant"]
 Mark = Literal["robust", "balanced", "fast"]
@@ -31,8 +32,7 @@ class Goals:
         return Goals(self.gain_margin_db + db, self.phase_margin_deg + deg, self.ms / factor)
 
 
-#: A measured margin may be off by this: dB, degrees, factor of Ms.
-RESERVE = (1.5, 3.0, 1.03)
+RESERVE = threshold.RESERVE
 
 _BALANCED: dict[LoadClass, Goals] = {
     "stiff": Goals(8.0, 45.0, 1.9),

@@ -27,37 +27,11 @@ from backend.analysis.loop.measured_plant import BEYOND, MeasuredPlant
 from backend.analysis.loop.notch import Notch
 from backend.analysis.mechanics.mechanical_model import MechanicalModel
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.analysis.thresholds import loop_search as threshold
 
-#: The PI's corner is the speed bandwidth divided by this.
-INTEGRAL_RATIO = 10.0
-#: A notch, or a wider filter, must earn its place: this share of the bandwidth each.
-_PRICE = 0.03
-_LOWEST_HZ = 0.5
-#: A gain is found to this share; what is better by less is not better.
-_RESOLUTION = 0.01
-#: Gains are looked at in these steps before that.
-_COARSE = 1.4
-#: Widths as multiples of the centre and depths in dB that are tried at every place.
-_WIDTHS = (0.25, 0.5, 0.9, 1.5, 2.2)
-_DEPTHS = (-2.0, -6.0, -10.0, -16.0, -24.0)
-#: Places as multiples of a resonance: a wide notch above it takes the gain down from the
-#: resonance on, where the motor turns alone, and costs less phase below than one upon it.
-_PLACES = (0.8, 1.0, 1.25, 1.6)
-#: Steps of the pattern search: share of centre, share of width, dB; halved so many times.
-_STEP = (0.12, 0.4, 5.0)
-_HALVINGS, _SWEEPS = 4, 4
-#: A seed may be worth this share of what it is added to.
-BEGUN = 0.9
-#: Random steps of all notches: how many for each number of them and for the winner, spread as
-#: above, at once in so many coordinates, wider after one that is better and narrower after others.
-_TRIED, TRIED_AT_LAST = 60, 400
-_SPREAD, _AT_ONCE, _WIDER, _NARROWER, _FINEST = (0.12, 0.4, 3.0), 0.5, 1.5, 0.93, 0.05
-_DEEPEST_DB, _WIDEST, _NARROWEST = -40.0, 4.0, 0.08
-#: No notch is begun below this, and none ends this far above the highest line.
-_LOWEST_PLACE_HZ = 15.0
-_FARTHEST = 2.5
-#: A look at every so manyth line refuses most shapes.
-_SOME = 4
+INTEGRAL_RATIO = threshold.INTEGRAL_RATIO
+BEGUN = threshold.BEGUN
+TRIED_AT_LAST = threshold.TRIED_AT_LAST
 #: Where the gain below a bandwidth is looked at, as logarithms of shares of it.
 _DECADE = np.linspace(-np.log(10.0), 0.0, 24)
 
@@ -72,7 +46,7 @@ class Shape:
     @property
     def price(self) -> float:
         """What is left of a bandwidth after paying for the parts."""
-        return 1.0 - _PRICE * (len(self.notches) + self.choice)
+        return 1.0 - threshold.PRICE * (len(self.notches) + self.choice)
 
 
 @dataclass(frozen=True)
@@ -108,7 +82,7 @@ class LoopSearch:
         self._s = 1j * TURN * self.frequency_hz
         self._log_f = np.log(self.frequency_hz)
         self._shifts = self.plant.shifted()
-        self._some = np.ascontiguousarray(self._shifts[:, ::_SOME])
+        self._some = np.ascontiguousarray(self._shifts[:, :: threshold.SOME])
         self.filters = (self.loops.filters, *self.loops.choices)
         self._fixed = [self.loops.with_filters(f).response(self.frequency_hz) for f in self.filters]
         self._highest = (
@@ -148,8 +122,8 @@ class LoopSearch:
     def _keeps(self, fixed: ComplexArray, bandwidth_hz: float, goals: Goals) -> bool:
         # What some of the lines refuse need not be looked at on all of them.
         corner = TURN * bandwidth_hz / INTEGRAL_RATIO
-        pi = TURN * bandwidth_hz * self.inertia_kgm2 * (1.0 + corner / self._s[::_SOME])
-        if sensitivity_peak(self._some * (fixed[::_SOME] * pi)) > goals.ms:
+        pi = TURN * bandwidth_hz * self.inertia_kgm2 * (1.0 + corner / self._s[:: threshold.SOME])
+        if sensitivity_peak(self._some * (fixed[:: threshold.SOME] * pi)) > goals.ms:
             return False
         loops = self.loops_at(fixed, bandwidth_hz)
         return sensitivity_peak(loops) <= goals.ms and worst_of(loops).meets(goals)
@@ -161,11 +135,11 @@ class LoopSearch:
     def highest(self, shape: Shape, goals: Goals, above_hz: float = 0.0) -> float:
         """Highest bandwidth that keeps the goals; 0 where that is not above ``above_hz``."""
         fixed = self.fixed(shape)
-        lowest = max(above_hz * (1.0 + _RESOLUTION), _LOWEST_HZ)
+        lowest = max(above_hz * (1.0 + threshold.RESOLUTION), threshold.LOWEST_HZ)
         if fixed is None or lowest > self._highest:
             return 0.0
         # From the top: where a resonance crosses the limit a higher gain may keep the goals again.
-        count = 2 + int(np.log(self._highest / lowest) / np.log(_COARSE))
+        count = 2 + int(np.log(self._highest / lowest) / np.log(threshold.COARSE))
         levels = np.geomspace(lowest, self._highest, count)
         good = next(
             (i for i in range(count - 1, -1, -1) if self._safe(fixed, levels[i], goals)), -1
@@ -173,7 +147,7 @@ class LoopSearch:
         if good < 0:
             return 0.0
         low, high = float(levels[good]), float(levels[min(good + 1, count - 1)])
-        while high > low * (1.0 + _RESOLUTION):
+        while high > low * (1.0 + threshold.RESOLUTION):
             middle = float(np.sqrt(low * high))
             low, high = (middle, high) if self._keeps(fixed, middle, goals) else (low, middle)
         return low if self._safe(fixed, low, goals) else float(levels[good])
@@ -188,7 +162,7 @@ class LoopSearch:
                 found = self.better(found, shape, goals)
             if found is begun:
                 break
-            found = self.shaken(self._refined(found, goals), goals, _TRIED)
+            found = self.shaken(self._refined(found, goals), goals, threshold.TRIED)
             if found.merit <= best.merit:
                 break
             best = found
@@ -203,23 +177,27 @@ class LoopSearch:
         """
         random, spread = np.random.default_rng(1), 1.0
         at = np.array([_coordinates(notch) for notch in found.shape.notches])
-        low = np.array([np.log(_LOWEST_PLACE_HZ), np.log(_NARROWEST), _DEEPEST_DB])
-        high = np.array([np.log(_FARTHEST * self.plant.measured_hz), np.log(_WIDEST), -1.0])
+        low = np.array(
+            [np.log(threshold.LOWEST_PLACE_HZ), np.log(threshold.NARROWEST), threshold.DEEPEST_DB]
+        )
+        high = np.array(
+            [np.log(threshold.FARTHEST * self.plant.measured_hz), np.log(threshold.WIDEST), -1.0]
+        )
         for _ in range(tries if at.size else 0):
-            chosen = random.random(at.shape) < max(_AT_ONCE, 1.0 / len(at))
-            moved = at + spread * np.array(_SPREAD) * random.normal(size=at.shape) * chosen
+            chosen = random.random(at.shape) < max(threshold.AT_ONCE, 1.0 / len(at))
+            moved = at + spread * np.array(threshold.SPREAD) * random.normal(size=at.shape) * chosen
             moved = np.clip(moved, low, high)
             shape = replace(found.shape, notches=tuple(_of(*each) for each in moved))
             tried = self.better(found, shape, goals)
             if tried is not found:
-                found, at, spread = tried, moved, min(_WIDER * spread, 1.0)
+                found, at, spread = tried, moved, min(threshold.WIDER * spread, 1.0)
             else:
-                spread = _NARROWER * spread if spread > _FINEST else 1.0
+                spread = threshold.NARROWER * spread if spread > threshold.FINEST else 1.0
         return found
 
     def better(self, incumbent: Found, shape: Shape, goals: Goals) -> Found:
         """The shape with its highest gain where that is worth more, else the incumbent."""
-        worth = shape.price * self._left(shape, incumbent.bandwidth_hz or _LOWEST_HZ)
+        worth = shape.price * self._left(shape, incumbent.bandwidth_hz or threshold.LOWEST_HZ)
         if not worth:
             return incumbent
         reached = self.highest(shape, goals, incumbent.merit / worth)
@@ -248,8 +226,8 @@ class LoopSearch:
         """One notch more than given, and the same shape on all of the highest resonances."""
         ranked = _ranked(self.plant.model, BEYOND * self.plant.measured_hz)
         for place in self._places():
-            for width in _WIDTHS:
-                for depth in _DEPTHS:
+            for width in threshold.WIDTHS:
+                for depth in threshold.DEPTHS:
                     one = Notch(place, width * place, depth)
                     if len(given.notches) < count:
                         yield replace(given, notches=(*given.notches, one))
@@ -260,19 +238,19 @@ class LoopSearch:
     def _places(self) -> list[float]:
         """Centres worth a try: about the resonances, or about where the loop ends."""
         ranked = _ranked(self.plant.model, BEYOND * self.plant.measured_hz)
-        places = [factor * hz for hz in ranked[:4] for factor in _PLACES]
-        top = _FARTHEST * self.plant.measured_hz
+        places = [factor * hz for hz in ranked[:4] for factor in threshold.PLACES]
+        top = threshold.FARTHEST * self.plant.measured_hz
         places += [x for x in (240.0, 480.0, 960.0) if x < top]
-        return [hz for hz in places if _LOWEST_PLACE_HZ < hz < top]
+        return [hz for hz in places if threshold.LOWEST_PLACE_HZ < hz < top]
 
     def _refined(self, found: Found, goals: Goals) -> Found:
         """Move all notches together as long as the gain rises."""
-        for halving in range(_HALVINGS):
-            for _ in range(_SWEEPS):
+        for halving in range(threshold.HALVINGS):
+            for _ in range(threshold.SWEEPS):
                 before = found
                 for number in range(len(found.shape.notches)):
                     for notch in _moved(found.shape.notches[number], 0.5**halving):
-                        if notch.center_hz < _FARTHEST * self.plant.measured_hz:
+                        if notch.center_hz < threshold.FARTHEST * self.plant.measured_hz:
                             notches = list(found.shape.notches)
                             notches[number] = notch
                             shape = replace(found.shape, notches=tuple(notches))
@@ -294,15 +272,15 @@ def _of(centre: float, ratio: float, depth_db: float) -> Notch:
 
 def _moved(notch: Notch, scale: float) -> Iterator[Notch]:
     """The neighbours of a notch in centre, width and depth."""
-    centre, width, depth = (scale * x for x in _STEP)
+    centre, width, depth = (scale * x for x in threshold.STEP)
     for sign in (1.0, -1.0):
         factor = (1.0 + centre) ** sign
         yield Notch(notch.center_hz * factor, notch.width_hz * factor, notch.depth_db)
         ratio = notch.width_hz / notch.center_hz * (1.0 + width) ** sign
-        if _NARROWEST <= ratio <= _WIDEST:
+        if threshold.NARROWEST <= ratio <= threshold.WIDEST:
             yield Notch(notch.center_hz, ratio * notch.center_hz, notch.depth_db)
         deep = notch.depth_db + sign * depth
-        if _DEEPEST_DB <= deep <= -1.0:
+        if threshold.DEEPEST_DB <= deep <= -1.0:
             yield Notch(notch.center_hz, notch.width_hz, deep)
 
 

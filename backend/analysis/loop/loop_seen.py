@@ -16,21 +16,10 @@ import numpy as np
 from backend.analysis.loop.margins import open_from_closed
 from backend.analysis.loop.measured_plant import AS_THE_MODEL, MeasuredPlant
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
+from backend.analysis.thresholds import loop_seen as threshold
 
-#: What a line of a closed loop may be off by, whatever its scatter says (logarithm): half of the
-#: 0.4 dB and 3° that such a measurement is held to.
-_OFF = 0.025
-#: Half width of the window that lines are averaged over, in octaves: the distortion of play
-#: scatters from line to line, what it does to the plant does not.
-_OCTAVES = 1.0 / 6.0
 #: Lines that are known to less take no part at all.
 _BLURRED = 2.0 * AS_THE_MODEL
-#: This share of the lines of such a window must be sharp.
-_DENSE = 0.75
-#: A plant is read from so many lines at least.
-_LINES = 12
-#: The correction ends this factor beyond the lines.
-_FADE = 1.26
 
 
 @dataclass(frozen=True)
@@ -54,9 +43,9 @@ def seen_in_loop(plant: MeasuredPlant, lines: LoopLines, controller: ComplexArra
     """
     f, steep = lines.frequency_hz, 1.0 / np.abs(1.0 - lines.closed)
     deviation = np.nan_to_num(lines.deviation, nan=np.inf)
-    scatter, off = deviation * steep, _OFF * steep
+    scatter, off = deviation * steep, threshold.OFF * steep
     known = _known(np.log2(f), deviation < AS_THE_MODEL) & (scatter < AS_THE_MODEL)
-    if np.count_nonzero(known) < _LINES:
+    if np.count_nonzero(known) < threshold.LINES:
         raise ValueError("the lines of the loop do not tell the plant")
     ratio = np.log(open_from_closed(lines.closed) / (plant.on(f).response() * controller))
     # Blurred neighbours keep the mean of the last lines from leaning to one side.
@@ -65,7 +54,7 @@ def seen_in_loop(plant: MeasuredPlant, lines: LoopLines, controller: ComplexArra
     ratio, scatter = _averaged(x[known], x[use], ratio[use], scatter[use], off[use])
     ratio = ratio / (1.0 + (scatter**2 + off[known] ** 2) / AS_THE_MODEL**2)
     f = f[known]
-    ends = np.concatenate([[f[0] / _FADE], f, [f[-1] * _FADE]])
+    ends = np.concatenate([[f[0] / threshold.FADE], f, [f[-1] * threshold.FADE]])
     faded = np.concatenate([[0.0], ratio, [0.0]])
     x, xp = np.log(plant.frequency_hz), np.log(ends)
     joined = np.interp(x, xp, faded.real) + 1j * np.interp(x, xp, faded.imag)
@@ -74,8 +63,8 @@ def seen_in_loop(plant: MeasuredPlant, lines: LoopLines, controller: ComplexArra
 
 def _known(octaves: FloatArray, sharp: BoolArray) -> BoolArray:
     """Sharp lines up to where they become few: single ones among blurred ones are so by chance."""
-    near = np.abs(octaves[:, None] - octaves) < _OCTAVES
-    dense = np.count_nonzero(near & sharp, axis=1) > _DENSE * near.sum(axis=1)
+    near = np.abs(octaves[:, None] - octaves) < threshold.OCTAVES
+    dense = np.count_nonzero(near & sharp, axis=1) > threshold.DENSE * near.sum(axis=1)
     last = dense.size if np.all(dense) else int(np.argmin(dense))
     return np.asarray(sharp & (np.arange(dense.size) < last))
 
@@ -88,7 +77,7 @@ def _averaged(
     out = np.empty(centres.size, dtype=np.complex128)
     left = np.empty(centres.size)
     for i, centre in enumerate(centres):
-        x = (octaves - centre) / _OCTAVES
+        x = (octaves - centre) / threshold.OCTAVES
         near = np.abs(x) < 1.0
         weight = (1.0 - np.abs(x[near]) ** 3) ** 3 / (scatter[near] ** 2 + off[near] ** 2)
         total, first = weight.sum(), weight @ x[near]

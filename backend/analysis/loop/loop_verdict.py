@@ -17,22 +17,10 @@ import numpy as np
 
 from backend.analysis.loop.loop_goals import Goals, sensitivity_peak, stable, worst_of
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
+from backend.analysis.thresholds import loop_verdict as threshold
 
 #: Deviations to either side that hold 95 of 100 cases.
 _CI95 = 1.96
-#: Gains that no crossing of the negative real axis limits are stated up to this.
-_MOST_DB = 60.0
-#: A prediction is not known better than this where it is not measured: logarithm of its size, and
-#: seconds of delay (half of the shortest loop period in use, 62.5 µs).
-_SIZE, _LATE_S = 0.05, 30e-6
-#: Beyond the measured band a stated gain margin is known the worse the further away: logarithm of
-#: a size for each octave above the last line. Sampling, filters and the current loop are assumed
-#: there: of a drive with another loop period (62.5 to 250 µs) it was 5 dB off two octaves above.
-_PER_OCTAVE = 0.3
-#: Where no line tells it: loop periods of 62.5 to 250 µs, where 50 µs are assumed, and 1.5 dB.
-_UNSEEN, _UNSEEN_S = 0.17, 200e-6
-#: Fewer lines say nothing of margins.
-_FEW = 6
 
 Coverage = Literal["measured", "gain_steps", "predicted"]
 Missing = Literal[
@@ -40,14 +28,11 @@ Missing = Literal[
 ]
 #: What a figure that misses is: the stated value, or the worst end of the interval of one band.
 End = Literal["stated", "measured", "predicted"]
-#: The worst end of an interval is no more than this below a promise: degrees, dB, and that many dB
-#: as a factor of the sensitivity.
-WORST_DEG, WORST_DB = 5.0, 1.0
+WORST_DEG = threshold.WORST_DEG
+WORST_DB = threshold.WORST_DB
 _WORST_RATIO = 10 ** (WORST_DB / 20.0)
 #: A logarithm of a size in dB.
 _IN_DB = 20.0 / float(np.log(10.0))
-#: So many sizes and delays are looked at between the ends of their intervals.
-_SIZES, _DELAYS = 3, 5
 
 
 @dataclass(frozen=True)
@@ -137,8 +122,10 @@ class LoopVerdict:
         if self.stated.ms > promised.ms * ms_ratio:
             found.append(Missed("peak_sensitivity", self.stated.ms, promised.ms))
         reported = {each.what for each in found}
-        ends = (*_short(self.measured, "measured", promised),
-                *_short(self.designed, "predicted", promised))  # fmt: skip
+        ends = (
+            *_short(self.measured, "measured", promised),
+            *_short(self.designed, "predicted", promised),
+        )
         return (*found, *(each for each in ends if each.what not in reported))
 
 
@@ -187,11 +174,14 @@ def judge(
     of them either, they widen what is stated there.
     """
     measured, top = None, 0.0
-    if lines is not None and lines.frequency_hz.size >= _FEW:
+    if lines is not None and lines.frequency_hz.size >= threshold.FEW:
         measured, top = _measured(lines), float(lines.frequency_hz[-1])
-    delay, gain = _known(late_s, _LATE_S, _UNSEEN_S), _known(size, _SIZE, _UNSEEN)
+    delay, gain = (
+        _known(late_s, threshold.LATE_S, threshold.UNSEEN_S),
+        _known(size, threshold.SIZE, threshold.UNSEEN),
+    )
     # What is measured makes a prediction worse where it is, and never better beyond it.
-    delay = Interval(max(delay.value, 0.0), max(delay.low, 0.0), max(delay.high, _LATE_S))
+    delay = Interval(max(delay.value, 0.0), max(delay.low, 0.0), max(delay.high, threshold.LATE_S))
     possible = _moved(frequency_hz, loops, gain, delay)
     contradicted = False
     if shown_gain_db is not None:
@@ -214,7 +204,7 @@ def judge(
         others = _moved(frequency_hz, beside, gain, delay)
         others = others[np.asarray(stable(others * 10 ** (shown_gain_db / 20.0)))]
         every = np.concatenate([possible, others])
-    beyond = _beyond(frequency_hz, every, nominal_only, top, _PER_OCTAVE, shown_gain_db)
+    beyond = _beyond(frequency_hz, every, nominal_only, top, threshold.PER_OCTAVE, shown_gain_db)
     stated, worst = _worst(measured, beyond)
     return LoopVerdict(
         measured, beyond, last, coverage, shown_gain_db, stated, worst, sound,
@@ -293,8 +283,8 @@ def _moved(
     turn = -2j * np.pi * frequency_hz
     rows = [
         loops * np.exp(a + turn * d)
-        for a in np.linspace(size.low, size.high, _SIZES)
-        for d in np.linspace(late_s.low, late_s.high, _DELAYS)
+        for a in np.linspace(size.low, size.high, threshold.SIZES)
+        for d in np.linspace(late_s.low, late_s.high, threshold.DELAYS)
     ]
     return np.concatenate(rows)
 
@@ -362,7 +352,7 @@ def _beyond(
     )
     gain = Interval(mean.gain_margin_db, least_db, mean.gain_margin_db)
     return BandVerdict(
-        float(f[0]), float(f[-1]), phase, gain if least_db < _MOST_DB else None,
+        float(f[0]), float(f[-1]), phase, gain if least_db < threshold.MOST_DB else None,
         Interval(peak, peak, max(worst.ms, peak)),
     )  # fmt: skip
 
@@ -378,7 +368,7 @@ def _worst(measured: BandVerdict | None, beyond: BandVerdict | None) -> tuple[Go
         low = "value" if end == "value" else "low"
         high = "value" if end == "value" else "high"
         return Goals(
-            min((getattr(i, low) for i in gain), default=_MOST_DB),
+            min((getattr(i, low) for i in gain), default=threshold.MOST_DB),
             min((getattr(i, low) for i in phase), default=90.0),
             max([1.0, *(getattr(i, high) for i in peak)]),
         )

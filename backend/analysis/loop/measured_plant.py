@@ -10,15 +10,11 @@ import numpy as np
 from backend.analysis.mechanics.mechanical_model import MechanicalModel
 from backend.analysis.response.frf import Frf
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.analysis.thresholds import measured_plant as threshold
 
-#: Modes may move by this factor in frequency and this in damping after the measurement.
-FREQUENCY_FACTORS = (0.95, 1.0, 1.05)
-DAMPING_FACTORS = (0.6, 1.0, 1.4)
-#: A mode is known a little way beyond the highest line. The factor of frequency counts twice up to
-#: here, and four times above, where a mode stands for whatever is stiffer than what was measured.
-BEYOND = 1.25
-#: The motor is alone from so far above the highest line on.
-_LET_GO = 1.26
+FREQUENCY_FACTORS = threshold.FREQUENCY_FACTORS
+DAMPING_FACTORS = threshold.DAMPING_FACTORS
+BEYOND = threshold.BEYOND
 #: A line that is known to this (one deviation of its logarithm) tells as much as the model there:
 #: so much does a mode that is off by a per cent turn the lines beside it.
 AS_THE_MODEL = np.radians(10.0)
@@ -76,7 +72,7 @@ class MeasuredPlant:
         if self.measured_hz <= 0.0:
             return nominal
         alone = 1.0 / (2j * np.pi * f * motor_inertia_kgm2)
-        share = np.clip(np.log(f / self.measured_hz) / np.log(_LET_GO), 0.0, 1.0)
+        share = np.clip(np.log(f / self.measured_hz) / np.log(threshold.LET_GO), 0.0, 1.0)
         return np.asarray(nominal * np.exp(share * np.log(alone / nominal)))
 
     def on(self, frequency_hz: FloatArray) -> MeasuredPlant:

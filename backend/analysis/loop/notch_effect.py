@@ -27,18 +27,7 @@ from backend.analysis.response.sampling import (
     lag_response,
 )
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
-
-#: Images that are counted on each side, multiples of the sample rate.
-_IMAGES = 25
-#: A depth that cannot be distinguished from a deeper one.
-_DEEPEST_DB = -45.0
-#: A ratio that nowhere falls below this shows no notch.
-_NO_EFFECT = 0.93
-#: Lines beside a closed loop whose ratio is known to this (one deviation) are used; at least so
-#: many of them within an octave of the centre, and the notch must explain their median to this.
-_KNOWN_TO, _LEAST_LINES, _EXPLAINED = 0.1, 12, 0.06
-#: Noise of neighbouring lines is alike: so many are taken together.
-_ALIKE_LINES = 7
+from backend.analysis.thresholds import notch_effect as threshold
 
 
 @dataclass(frozen=True)
@@ -82,14 +71,14 @@ class LoopLines:
 def _mean_and_deviation(blocks: ComplexArray) -> tuple[ComplexArray, FloatArray]:
     count, lines = blocks.shape
     variance = np.var(blocks, axis=0, ddof=1) / count
-    window = np.ones(min(_ALIKE_LINES, lines))
+    window = np.ones(min(threshold.ALIKE_LINES, lines))
     pooled = np.convolve(variance, window, "same") / np.convolve(np.ones(lines), window, "same")
     return np.asarray(np.mean(blocks, axis=0)), np.asarray(np.sqrt(pooled))
 
 
 def seen_ratio(notch: Notch, frequency_hz: FloatArray, path: SignalPath) -> ComplexArray:
     """Ratio of the sampled torques with and without a notch."""
-    orders = np.arange(-_IMAGES, _IMAGES + 1)[:, None] * path.sample_rate_hz
+    orders = np.arange(-threshold.IMAGES, threshold.IMAGES + 1)[:, None] * path.sample_rate_hz
     f = frequency_hz[None, :] + orders
     direct = command_response(f, path)
     # One line's image k carries the phase of the line itself: the sequence is the same.
@@ -121,22 +110,25 @@ def fit_effect_in_loop(
     """
     f = np.asarray(frequency_hz, np.float64)
     controller = (
-        loop.response(f) * lag_response(f, path.current_bandwidth_hz)
+        loop.response(f)
+        * lag_response(f, path.current_bandwidth_hz)
         * delay_response(f, path.loop_delay_s)
-    )  # fmt: skip
+    )
     forward = plain.torque + controller * plain.velocity
     own = controller * notched.velocity
     driven = forward - own
     size = np.abs(controller)
     noise = np.sqrt(
-        plain.torque_deviation**2 + notched.torque_deviation**2
+        plain.torque_deviation**2
+        + notched.torque_deviation**2
         + size**2 * (plain.velocity_deviation**2 + notched.velocity_deviation**2)
-    )  # fmt: skip
+    )
     deviation = noise / np.maximum(np.abs(driven), 1e-12)
-    good = deviation < _KNOWN_TO
-    if np.count_nonzero(good) < _LEAST_LINES:
+    good = deviation < threshold.KNOWN_TO
+    if np.count_nonzero(good) < threshold.LEAST_LINES:
         raise ValueError(
-            f"only {np.count_nonzero(good)} lines are known to {_KNOWN_TO:.0%} beside the loop"
+            f"only {np.count_nonzero(good)} lines are known to {threshold.KNOWN_TO:.0%} "
+            "beside the loop"
         )
     scale = np.abs(forward[good])
     seen = _Seen(
@@ -146,9 +138,11 @@ def fit_effect_in_loop(
     found = _fitted(seen, path)
     centre = found.notch.center_hz
     about = np.count_nonzero((seen.frequency_hz > centre / 2) & (seen.frequency_hz < centre * 2))
-    if about < _LEAST_LINES:
-        raise ValueError(f"only {about} lines about {centre:.0f} Hz are known to {_KNOWN_TO:.0%}")
-    if found.error > _EXPLAINED:
+    if about < threshold.LEAST_LINES:
+        raise ValueError(
+            f"only {about} lines about {centre:.0f} Hz are known to {threshold.KNOWN_TO:.0%}"
+        )
+    if found.error > threshold.EXPLAINED:
         raise ValueError(f"a notch leaves {found.error:.0%} of what is seen unexplained")
     return found
 
@@ -176,14 +170,14 @@ class _Seen:
 
 def _fitted(seen: _Seen, path: SignalPath) -> NotchEffect:
     lowest = int(np.argmin(np.abs(seen.ratio)))
-    if abs(seen.ratio[lowest]) > _NO_EFFECT:
+    if abs(seen.ratio[lowest]) > threshold.NO_EFFECT:
         raise ValueError("the notch has no effect that can be seen in the torque")
     centre = float(seen.frequency_hz[lowest])
     # A line that the notch takes nearly all of counts for more, one that noise blurs for less.
     weight = 1.0 / (np.hypot(np.abs(seen.ratio), seen.deviation / 0.05) + 0.05)
 
     def notch_of(x: FloatArray) -> Notch:
-        depth = max(-float(np.exp(x[2])), _DEEPEST_DB)
+        depth = max(-float(np.exp(x[2])), threshold.DEEPEST_DB)
         return Notch(float(np.exp(x[0])), float(np.exp(x[1])), depth)
 
     def rest(x: FloatArray) -> FloatArray:
@@ -191,7 +185,7 @@ def _fitted(seen: _Seen, path: SignalPath) -> NotchEffect:
         return np.concatenate([error.real, error.imag])
 
     low = np.log([0.7 * centre, 0.01 * centre, 0.3])
-    high = np.log([1.4 * centre, 4.0 * centre, -_DEEPEST_DB])
+    high = np.log([1.4 * centre, 4.0 * centre, -threshold.DEEPEST_DB])
     fits = [
         scipy.optimize.least_squares(
             rest, np.log([centre, share * centre, depth]), bounds=(low, high), loss="soft_l1",

@@ -32,26 +32,12 @@ from backend.analysis.response.frf import Frf
 from backend.analysis.response.sampled_model import LoopModel, Sampler
 from backend.analysis.response.sampling import SignalPath, delay_response, lag_response
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
+from backend.analysis.thresholds import fit_problem as threshold
 
-#: Delays that no path tells are small: this one standard deviation, in s, beside the lines.
-_USUAL_DELAY_S = 60e-6
-#: A speed filter that nobody tells, log of Hz and its standard deviation.
-USUAL_CORNER, _CORNER_SPREAD = float(np.log(2000.0)), 1.0
-#: β of a mode is this share of ω at most in ordinary machines (one standard deviation).
-_USUAL_ZERO = 0.1
-#: Couplings have about this damping ratio, within a factor of e² (one standard deviation).
-USUAL_DAMPING, _DAMPING_SPREAD = 0.03, 2.0
-#: What moves showed of the whole inertia holds for the response to this share at best (one
-#: deviation), as one is shown by the reported torque and the other by the commanded.
-_INERTIA_ALIKE = 0.03
-#: Lines with a larger relative deviation take no part.
-_NOISE = 0.3
-#: Residuals beyond this count linearly.
-_OUTLIER = 3.0
-#: How far delays (cycles) and the filter (logarithm) go while mechanics are looked for.
-_NEAR_ANCHOR = np.array([0.15, 0.15, 0.7])
-#: Highest antiresonance that is tried, relative to the highest line.
-HIGHEST_TRIED = 4.0
+USUAL_CORNER = float(np.log(2000.0))
+USUAL_DAMPING = threshold.USUAL_DAMPING
+_NEAR_ANCHOR = np.array(threshold.NEAR_ANCHOR)
+HIGHEST_TRIED = threshold.HIGHEST_TRIED
 
 
 @dataclass(frozen=True)
@@ -78,7 +64,7 @@ class View:
         f = frf.frequency_hz
         relative = np.nan_to_num(frf.std_db, nan=0.0) * np.log(10) / 20
         # The logarithm of a line that is mostly noise is biased.
-        weight = np.where(use & (relative < _NOISE), 1.0 / np.hypot(relative, floor), 0.0)
+        weight = np.where(use & (relative < threshold.NOISE), 1.0 / np.hypot(relative, floor), 0.0)
         sampler = Sampler.of(f, path, loop, integrated=integrated)
         return View(f, frf.response, weight, sampler, integrated, second)
 
@@ -182,15 +168,18 @@ class Problem:
 
     def _rows(self, x: FloatArray, values: list[ComplexArray]) -> FloatArray:
         rows = [v * view.weight for v, view in zip(values, self.views, strict=True)]
-        path = [*(x[2:4] * self.period_s / _USUAL_DELAY_S), (x[4] - USUAL_CORNER) / _CORNER_SPREAD]
+        path = [
+            *(x[2:4] * self.period_s / threshold.USUAL_DELAY_S),
+            (x[4] - USUAL_CORNER) / threshold.CORNER_SPREAD,
+        ]
         usual = [np.array(path), self.form.prior(x)[0], self._known(x)[0]]
         return np.concatenate([p for e in rows for p in (e.real, e.imag)] + usual)
 
     def _slopes(self, x: FloatArray, gradients: list[ComplexArray]) -> FloatArray:
         rows = [g * view.weight for g, view in zip(gradients, self.views, strict=True)]
         path = np.zeros((3, x.size))
-        path[0, 2] = path[1, 3] = self.period_s / _USUAL_DELAY_S
-        path[2, 4] = 1.0 / _CORNER_SPREAD
+        path[0, 2] = path[1, 3] = self.period_s / threshold.USUAL_DELAY_S
+        path[2, 4] = 1.0 / threshold.CORNER_SPREAD
         usual = [path, self.form.prior(x)[1], self._known(x)[1]]
         return np.concatenate([p.T for e in rows for p in (e.real, e.imag)] + usual)
 
@@ -199,7 +188,7 @@ class Problem:
         if self.inertia is None:
             return np.zeros(0), np.zeros((0, x.size))
         value, slopes = self.form.inertia(x)
-        known = float(np.hypot(self.inertia.deviation, _INERTIA_ALIKE))
+        known = float(np.hypot(self.inertia.deviation, threshold.INERTIA_ALIKE))
         apart = (value - np.log(self.inertia.kgm2)) / known
         return np.array([apart]), np.asarray(slopes[None, :] / known)
 
@@ -225,9 +214,13 @@ class Problem:
             low[2:5] = np.maximum(low[2:5], self.anchor - _NEAR_ANCHOR)
             high[2:5] = np.minimum(high[2:5], self.anchor + _NEAR_ANCHOR)
         fit = minimise(
-            self.misfit, np.clip(start, low + 1e-9, high - 1e-9), low, high, scale=_OUTLIER,
+            self.misfit,
+            np.clip(start, low + 1e-9, high - 1e-9),
+            low,
+            high,
+            scale=threshold.OUTLIER,
             steps=steps,
-        )  # fmt: skip
+        )
         points = sum(2 * int(np.count_nonzero(view.weight)) for view in self.views)
         # No data are better than the floor of their weights, whatever synthetic ones are.
         misfit = max(2 * fit.cost, 1e-6 * points)
@@ -243,7 +236,7 @@ class Problem:
 
 def robust_rows(residuals: FloatArray) -> FloatArray:
     """Weights of rows as the robust loss has them."""
-    return np.asarray((1.0 + (residuals / _OUTLIER) ** 2) ** -0.25)
+    return np.asarray((1.0 + (residuals / threshold.OUTLIER) ** 2) ** -0.25)
 
 
 def _median(values: FloatArray, weight: FloatArray) -> float:
@@ -275,8 +268,8 @@ def _modal_prior(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Modes that are damped alike at both ends."""
     places = np.arange(RIGID_PARAMETERS + 3, x.size, MODE_PARAMETERS)
     slopes = np.zeros((places.size, x.size))
-    slopes[np.arange(places.size), places] = 1.0 / _USUAL_ZERO
-    return x[places] / _USUAL_ZERO, slopes
+    slopes[np.arange(places.size), places] = 1.0 / threshold.USUAL_ZERO
+    return x[places] / threshold.USUAL_ZERO, slopes
 
 
 def _chain_bounds(x: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -298,7 +291,7 @@ def _chain_prior(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Couplings with an ordinary damping ratio d / 2√(kJ)."""
     logs = x[RIGID_PARAMETERS:].reshape(-1, LOAD_PARAMETERS)
     ratio = logs @ _RATIO - np.log(2 * USUAL_DAMPING)
-    return ratio / _DAMPING_SPREAD, _chain_prior_slopes(x.size)
+    return ratio / threshold.DAMPING_SPREAD, _chain_prior_slopes(x.size)
 
 
 #: Logarithm of a coupling's damping ratio by those of its J, k and d.
@@ -310,7 +303,7 @@ def _chain_prior_slopes(size: int) -> FloatArray:
     """They depend on nothing but how many parameters there are; not to be written."""
     loads = (size - RIGID_PARAMETERS) // LOAD_PARAMETERS
     slopes = np.zeros((loads, size))
-    slopes[:, RIGID_PARAMETERS:] = np.kron(np.eye(loads), _RATIO / _DAMPING_SPREAD)
+    slopes[:, RIGID_PARAMETERS:] = np.kron(np.eye(loads), _RATIO / threshold.DAMPING_SPREAD)
     return slopes
 
 

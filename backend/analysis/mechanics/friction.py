@@ -14,17 +14,7 @@ from backend.analysis.signals.line_spectra import (
     friction_input,
     instrument_estimate,
 )
-
-#: No line is weighed as if its noise were less than this share of an ordinary line's.
-_LEAST_NOISE = 0.1
-#: Lines up to this multiple of the lowest are where friction rules, whatever else is nonlinear.
-_LOWEST = 4.0
-#: Friction is taken out where that leaves less than this share of the scatter.
-_WORTH_TAKING = 0.9
-#: Where all scatter is noise (up to this multiple of it) friction is there, however little it makes
-#: of it, once what it explains is so many times what a number explains by chance (three
-#: deviations): leaving it in would be off by all of it.
-_NOISE_ONLY, _BY_NO_CHANCE = 2.0, 9.0
+from backend.analysis.thresholds import friction as threshold
 
 
 def estimate_coulomb(s: LineSpectra, path: SignalPath, quantity: Quantity) -> float:
@@ -48,15 +38,15 @@ def estimate_coulomb(s: LineSpectra, path: SignalPath, quantity: Quantity) -> fl
         return 0.0
     # By their noise first: behind a coarse encoder the upper lines drown friction, and elsewhere
     # the lower ones tell it best. What play does drowns it in all but the lowest.
-    low = np.asarray(s.frequency_hz <= _LOWEST * s.frequency_hz[0], dtype=np.float64)
+    low = np.asarray(s.frequency_hz <= threshold.LOWEST * s.frequency_hz[0], dtype=np.float64)
     by_noise = _torque_weight(s, plain)
     found, share = _least(s, plain, turned, by_noise, limit)
     left = _scatter(found, s, plain, turned, by_noise)
-    if share < _WORTH_TAKING or _beyond_chance(s, share, left):
+    if share < threshold.WORTH_TAKING or _beyond_chance(s, share, left):
         return found
     for weight in (np.ones(s.frequency_hz.size), low):
         found, share = _least(s, plain, turned, weight, limit)
-        if share < _WORTH_TAKING:
+        if share < threshold.WORTH_TAKING:
             return found
     return 0.0
 
@@ -84,8 +74,8 @@ def _beyond_chance(s: LineSpectra, share: float, left: float) -> bool:
     if periods <= 1.0:
         return False
     freedom = 2 * s.frequency_hz.size * (len(s.sent) - 1)
-    only_noise = 2.0 * left * periods < _NOISE_ONLY * freedom
-    return only_noise and (1.0 / share - 1.0) * freedom > _BY_NO_CHANCE
+    only_noise = 2.0 * left * periods < threshold.NOISE_ONLY * freedom
+    return only_noise and (1.0 / share - 1.0) * freedom > threshold.BY_NO_CHANCE
 
 
 def _least(
@@ -122,5 +112,5 @@ def _torque_weight(s: LineSpectra, inputs: list[ComplexArray]) -> FloatArray:
         return np.ones(g.size)
     noise = np.sum([np.sum(np.abs(e - e.mean(axis=0)) ** 2, axis=0) for e in errors], axis=0)
     noise = neighbour_mean(noise / freedom, 3)
-    least = _LEAST_NOISE * float(np.median(noise))
+    least = threshold.LEAST_NOISE * float(np.median(noise))
     return np.asarray(1.0 / (noise + least)) if least > 0.0 else np.ones(g.size)

@@ -8,37 +8,34 @@ the ratio between what sampling shows and what is there.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.loop.loop_fit import fit_loop
 from backend.analysis.mechanics.fit_problem import KnownInertia
+from backend.analysis.mechanics.identification_trials import (
+    TRUSTED_ERROR,
+    Task,
+    Trial,
+    mode_uncertainties_of,
+    rank,
+)
 from backend.analysis.mechanics.inertia_by_place import InertiaByPlace, inertia_by_place
-from backend.analysis.mechanics.mode_uncertainty import ModeUncertainty, mode_uncertainties
-from backend.analysis.mechanics.model_fit import Solution, fit_sampled_model, views_of
-from backend.analysis.mechanics.reversals import with_balanced_reversals
+from backend.analysis.mechanics.mode_uncertainty import ModeUncertainty
 from backend.analysis.response.distortion import Distortion, distortion
-from backend.analysis.response.frf import Frf, estimate_periodic
+from backend.analysis.response.frf import Frf
 from backend.analysis.response.path_fit import (
     at_whole_cycles,
     find_paths,
-    moved_path,
-    path_between,
-    path_covariance,
     torque_left,
 )
 from backend.analysis.response.reference_gain import ReferenceLoop
-from backend.analysis.response.sampled_model import LoopModel, SampledFit
+from backend.analysis.response.sampled_model import SampledFit
 from backend.analysis.response.sampling import (
     DIRECT_SHARE,
     USUAL_CURRENT_HZ,
     Hold,
     SignalPath,
-    command_delay_s,
-    cycles_of,
     delay_response,
     lag_response,
 )
@@ -51,59 +48,13 @@ from backend.analysis.response.stated_band import (
     without_images,
 )
 from backend.analysis.response.two_signals import ways_of
-from backend.analysis.response.uncertainty import Shifted, Uncertainty
-from backend.analysis.response.uncertainty import uncertainty as joint_uncertainty
+from backend.analysis.response.uncertainty import Uncertainty
 from backend.analysis.signals.arrays import ComplexArray
-from backend.analysis.signals.line_spectra import Quantity, Record, loop_spectra, speed_lag_s
+from backend.analysis.signals.line_spectra import Quantity, Record
 from backend.analysis.signals.transient_removal import settled
+from backend.analysis.thresholds import identify as threshold
 
-#: A model whose median relative misfit is larger, and larger than the noise, corrects nothing.
-TRUSTED_ERROR = 0.03
-
-#: A path that leaves more cycles of delay than this is uncertaintyed.
-_LEFT_LATE = 0.3
-#: Paths whose criteria differ by less are both possible.
-_UNDECIDED = 80.0
-#: At most this many rounds of refining loop, path and mechanics against each other.
-_PASSES = 4
-#: A mode whose part in the response is not known to this (logarithm, one deviation) is tried
-#: without; it stays where that is worse by so much.
-_UNSURE, _WORTH_A_MODE = 0.25, 80.0
-#: A line is hidden by friction where that may move it by so much; so many are more than a few.
-_HIDDEN, _HIDDEN_SHARE = 0.1, 0.03
-#: Rounds of friction by the balance of torques and mechanics by what that leaves.
-_BALANCES = 2
-#: Realisations are as alike as before up to this multiple of what they differ by.
-_AS_ALIKE = 1.02
-#: What is left of a distortion along one axis of the complex plane, two draws averaged.
-_AVERAGED = 0.5
-#: Path parameters are moved by this much (cycles, logarithm) to see what they do, moved at all
-#: where torque and motion together put them further off than this share of their deviation, and
-#: by no more than two deviations or this at once.
-_STEP, _SETTLED, _LONGEST_STEP = 0.02, 0.2, 0.1
-#: A path by the motion alone is taken where the criterion is better by so much and the misfit is
-#: smaller than this share: chosen by hand on a few axes of `benchmarks.rough_campaign`, where
-#: filtered or copied torques left about 1.4 to 10 times the misfit. Those that leave less than 1.3
-#: times are not noticed by this; what right ones leave was not tabulated.
-_BY_MOTION, _CLEARLY = 60.0, 0.77
-#: So much better, and so much smaller, it is taken before the path by the torque is fitted anew.
-_BY_FAR, _FAR_CLEARLY = 600.0, 0.4
-_MOTION_PASSES = 3
-#: A median misfit (relative) that a path by the motion leaves where it is right.
-_EXPLAINED = 0.0035
 _HOLDS: tuple[Hold, ...] = ("zero", "linear")
-#: Current loops are within these, and one behind a low-pass of the torque begins about here, in Hz.
-_ORDINARY_HZ, _SLOW_HZ = (450.0, 1600.0), 300.0
-#: A torque that is the mechanics' leaves less delay (s) than this, and less of itself
-#: unexplained by hold, corner and delay (relative RMS; rounding to 0.1 % leaves 0.001 to 0.005 on
-#: the axes of `benchmarks.tune_accuracy`).
-_LEFT_BY_TORQUE_S, _TORQUE_LEFT, _ROUNDED = 60e-6, 0.02, 0.005
-#: Lines whose phase is beyond ±90° by more than this, and their share, are not those of a passive
-#: axis; lines that take part.
-_PASSIVE_DEG, _PASSIVE_SHARE, _COHERENT, _FEW = 12.0, 0.1, 0.9, 12
-#: What half a cycle of delay weighs, in the criterion's units, is half of this; and what a cycle
-#: by which a drive would report too early does.
-_FRACTION, _EARLY = 100.0, 2e3
 
 
 @dataclass(frozen=True)
@@ -146,7 +97,7 @@ def identify_mechanics(
     ``quantity`` is *torque_mode* or *torque_injection*; ``path`` holds the known delays, what is
     left is found by the fit. ``coulomb_nm`` as in :func:`estimate_periodic`, None estimates it.
     """
-    task = _Task(settled(records), quantity, max_modes, jitter_s)
+    task = Task(settled(records), quantity, max_modes, jitter_s)
     found = task.refined(task.trial(path, coulomb_nm), lambda _: path)
     if coulomb_nm is None:
         task, found = task.balanced(found)
@@ -170,7 +121,7 @@ def identify_with_path(
     """
     closed = quantity == "torque_injection"
     corner_known = path.current_bandwidth_hz is not None
-    task = _Task(
+    task = Task(
         settled(records), quantity, inertia=inertia, loop=None if loop is None else loop.controller
     )
     if loop is None:
@@ -187,30 +138,30 @@ def identify_with_path(
         known = replace(path, hold=fit.path.hold)
         return find_paths(
             task.records, known, loop_closed=True, hold_known=True, motion=fit, controller=task.loop
-        )[0]  # fmt: skip
+        )[0]
 
     task, found = task.balanced(task.refined(best, again))
     uncertainty = task.uncertainty(found, corner_known)
     by_torque = found.path
-    for _ in range(_PASSES if np.all(np.isfinite(uncertainty.path_step)) else 0):
-        if np.all(np.abs(uncertainty.path_step) < _SETTLED * uncertainty.path_std):
+    for _ in range(threshold.PASSES if np.all(np.isfinite(uncertainty.path_step)) else 0):
+        if np.all(np.abs(uncertainty.path_step) < threshold.SETTLED * uncertainty.path_std):
             break
         found = task.moved(found, uncertainty)
         uncertainty = task.uncertainty(found, corner_known, by_torque)
     found, uncertainty = task.with_sure_modes(found, uncertainty, corner_known)
-    alike = [t for t in trials[1:] if _rank(t) < _rank(best) + _UNDECIDED]
+    alike = [t for t in trials[1:] if rank(t) < rank(best) + threshold.UNDECIDED]
     made = _undecided(_identification(task, found, uncertainty), best, alike)
     unexplained_torque = (
         not closed
         and all(record.torque is not None for record in records)
-        and torque_left(settled(records), made.fit.path) > _TORQUE_LEFT
+        and torque_left(settled(records), made.fit.path) > threshold.TORQUE_LEFT
     )
     return replace(made, torque_dropped=dropped, torque_unexplained=unexplained_torque)
 
 
 def _by_motion(
-    task: _Task, paths: tuple[SignalPath, ...], corner_known: bool
-) -> tuple[_Task, list[_Trial], bool]:
+    task: Task, paths: tuple[SignalPath, ...], corner_known: bool
+) -> tuple[Task, list[Trial], bool]:
     """Trials without the reported torque, where that cannot be the mechanics' input; else with it.
 
     A torque that is reported late, or a copy of the demand, tells another path than the one to the
@@ -229,22 +180,22 @@ def _by_motion(
     alone = replace(task, records=tuple(replace(record, torque=None) for record in task.records))
     likeliest = trials[0].path if trials else paths[0]
     reported = likeliest.current_bandwidth_hz if corner_known else None
-    found: list[_Trial] = []
-    for corner in (reported or USUAL_CURRENT_HZ, _SLOW_HZ):
+    found: list[Trial] = []
+    for corner in (reported or USUAL_CURRENT_HZ, threshold.SLOW_HZ):
         begun = replace(likeliest, current_bandwidth_hz=corner)
         found += [alone.at_cycles(begun, hold) for hold in _HOLDS]
-        found.sort(key=_rank)
+        found.sort(key=rank)
         found[0] = alone.by_motion(found[0])
-        if found[0].fit.error < _EXPLAINED:
+        if found[0].fit.error < threshold.EXPLAINED:
             break
-    found.sort(key=_rank)
+    found.sort(key=rank)
     best = found[0].fit
     if not trials:
         begun_there = [task.trial(each, None, None, found[0].solution) for each in paths]
-        if _explains(best, min(begun_there, key=_rank).fit, _BY_FAR, _FAR_CLEARLY):
+        if _explains(best, min(begun_there, key=rank).fit, threshold.BY_FAR, threshold.FAR_CLEARLY):
             return alone, found, True
         trials = task.trials(paths)
-    if _explains(best, trials[0].fit, _BY_MOTION, _CLEARLY):
+    if _explains(best, trials[0].fit, threshold.BY_MOTION, threshold.CLEARLY):
         return alone, found, True
     return task, trials, False
 
@@ -254,259 +205,50 @@ def _explains(one: SampledFit, other: SampledFit, by: float, share: float) -> bo
     return one.score < other.score - by and one.error < share * other.error
 
 
-def _odd(task: _Task, path: SignalPath, corner_known: bool) -> bool:
+def _odd(task: Task, path: SignalPath, corner_known: bool) -> bool:
     """Whether the path that the reported torque tells is none of a torque that acts."""
     if any(record.torque is None for record in task.records):
         return False
     corner = path.current_bandwidth_hz or USUAL_CURRENT_HZ
-    odd = not corner_known and not _ORDINARY_HZ[0] < corner < _ORDINARY_HZ[1]
+    odd = not corner_known and not threshold.ORDINARY_HZ[0] < corner < threshold.ORDINARY_HZ[1]
     left = torque_left(task.records, path)
     # Parts of a cycle are no reason where they explain the torque to its rounding.
-    parts = not at_whole_cycles(path) and left > _ROUNDED
-    return odd or parts or left > _TORQUE_LEFT
+    parts = not at_whole_cycles(path) and left > threshold.ROUNDED
+    return odd or parts or left > threshold.TORQUE_LEFT
 
 
-def _suspect(task: _Task, trial: _Trial, corner_known: bool) -> bool:
+def _suspect(task: Task, trial: Trial, corner_known: bool) -> bool:
     """Whether the motion shows that the reported torque may be another than what drives it."""
     if any(record.torque is None for record in task.records):
         return False
-    late = abs(trial.fit.delay_s) > _LEFT_BY_TORQUE_S
+    late = abs(trial.fit.delay_s) > threshold.LEFT_BY_TORQUE_S
     return late or _odd(task, trial.path, corner_known) or _beyond_passive(trial)
 
 
-def _beyond_passive(trial: _Trial) -> bool:
+def _beyond_passive(trial: Trial) -> bool:
     """Whether lines show a phase that no passive mechanics have between torque and speed.
 
     Sampling folds a few degrees into the lines below a quarter of its rate.
     """
     frf = trial.views.position or trial.views.velocity
     late = trial.fit.position_delay_s if trial.views.position else trial.fit.delay_s
-    use = (frf.frequency_hz < DIRECT_SHARE * frf.sample_rate_hz) & (frf.coherence > _COHERENT)
-    if np.count_nonzero(use) < _FEW:
+    use = (frf.frequency_hz < DIRECT_SHARE * frf.sample_rate_hz) & (
+        frf.coherence > threshold.COHERENT
+    )
+    if np.count_nonzero(use) < threshold.FEW:
         return False
     true = frf.response[use] / delay_response(frf.frequency_hz[use], late)
-    return float(np.mean(np.abs(np.degrees(np.angle(true))) > 90.0 + _PASSIVE_DEG)) > _PASSIVE_SHARE
+    return (
+        float(np.mean(np.abs(np.degrees(np.angle(true))) > 90.0 + threshold.PASSIVE_DEG))
+        > threshold.PASSIVE_SHARE
+    )
 
 
-@dataclass(frozen=True)
-class _Trial:
-    """A fit, and the estimates and the path that it was made with."""
-
-    views: _Views
-    path: SignalPath
-    solution: Solution
-
-    @property
-    def fit(self) -> SampledFit:
-        """What it says."""
-        return self.solution.fit
-
-
-@dataclass(frozen=True)
-class _Task:
-    """What stays the same from trial to trial."""
-
-    records: tuple[Record, ...]
-    quantity: Quantity
-    max_modes: int = 4
-    jitter_s: float = 0.0
-    inertia: KnownInertia | None = None
-    loop: LoopModel | None = None
-
-    def trial(
-        self, path: SignalPath, coulomb_nm: float | None = None, motion: SampledFit | None = None,
-        start: Solution | None = None,
-    ) -> _Trial:  # fmt: skip
-        """Estimates and fit with one path; ``motion`` is a fit before, which tells the images."""
-        if self.quantity == "closed_loop":
-            raise ValueError("mechanics are identified from torque, not from a loop's reference")
-        views = self.views(path, coulomb_nm)
-        solution = fit_sampled_model(
-            views.velocity, path, from_position=views.position, loop=self._loop(path, motion),
-            max_modes=self.max_modes, start=start, inertia=self.inertia,
-        )  # fmt: skip
-        return _Trial(views, path, solution)
-
-    def trials(self, paths: tuple[SignalPath, ...]) -> list[_Trial]:
-        """All that are worth it, best first: fractions of a cycle where no whole ones do.
-
-        Torque and motion are reported together, so a path that leaves much delay is a wrong one.
-        """
-        first = [p for p in paths if at_whole_cycles(p)] or list(paths)
-        tried = sorted((self.trial(p) for p in first), key=_rank)
-        if abs(tried[0].fit.delay_s) * paths[0].sample_rate_hz > _LEFT_LATE:
-            tried += [self.trial(p) for p in paths if p not in first]
-        return sorted(tried, key=_rank)
-
-    def at_cycles(self, path: SignalPath, hold: Hold) -> _Trial:
-        """A fit with this hold and the whole cycles of delay that leave the least of one."""
-        rate = path.sample_rate_hz
-        # What is too early shows as a delay that is left, what is too late may not.
-        cycles = max(math.floor(path.command_delay_s * rate - 0.25), 0)
-        late_s = command_delay_s(cycles, hold, rate)
-        trial = self.trial(replace(path, hold=hold, command_delay_s=late_s))
-        more = round(trial.fit.delay_s * rate)
-        if more == 0 or cycles + more < 0:
-            return trial
-        late_s = command_delay_s(cycles + more, hold, rate)
-        other = self.trial(replace(path, hold=hold, command_delay_s=late_s))
-        return min(trial, other, key=_rank)
-
-    def by_motion(self, trial: _Trial) -> _Trial:
-        """The same with a path that only the motion moves, from where it is usual."""
-        for _ in range(_MOTION_PASSES):
-            uncertainty = self.uncertainty(trial, corner_known=False)
-            finite = np.all(np.isfinite(uncertainty.path_step))
-            if not finite or np.all(
-                np.abs(uncertainty.path_step) < _SETTLED * uncertainty.path_std
-            ):
-                break
-            moved = self.moved(trial, uncertainty)
-            if moved.fit.score >= trial.fit.score:
-                break
-            trial = moved
-        return trial
-
-    def views(self, path: SignalPath, coulomb_nm: float | None) -> _Views:
-        """Estimates from what was recorded."""
-        velocity = estimate_periodic(
-            self.records, path, self.quantity, coulomb_nm=coulomb_nm, jitter_s=self.jitter_s
-        )
-        if any(record.position is None for record in self.records):
-            return _Views(velocity, None)
-        position = estimate_periodic(
-            self.records, path, self.quantity, coulomb_nm=velocity.coulomb_nm,
-            jitter_s=self.jitter_s, position=True,
-        )  # fmt: skip
-        return _Views(velocity, position)
-
-    def refined(self, first: _Trial, path_of: Callable[[SampledFit], SignalPath]) -> _Trial:
-        """Loop, path and mechanics in turn: each is needed to take the images out of the others."""
-        last = first
-        for _ in range(_PASSES if self.quantity == "torque_injection" else 0):
-            path = path_of(last.fit)
-            change = abs(self._loop(path, last.fit).c0 / last.fit.loop.c0 - 1.0)
-            if _alike(path, last.path) and change < 0.003:
-                break
-            last = self.trial(path, last.views.velocity.coulomb_nm, last.fit)
-        return last
-
-    def balanced(self, trial: _Trial) -> tuple[_Task, _Trial]:
-        """The same refined with friction as the balance of torques tells it at reversals.
-
-        The round whose friction leaves the realisations most alike: a balance that is off bends
-        friction and damping against each other.
-        """
-        task, last = self, trial
-        best = task, last
-        lag_s = speed_lag_s(self.records, trial.path)
-        motion = trial.fit if self.quantity == "torque_injection" else None
-        for n in range(_BALANCES):
-            if last.fit.error > max(TRUSTED_ERROR, 1.5 * last.fit.noise):
-                break
-            friction_nm = last.views.velocity.coulomb_nm
-            reported = with_balanced_reversals(
-                self.records, self.quantity, last.fit, friction_nm, lag_s
-            )
-            task = replace(self, records=reported)
-            anew = n == 0 and _hidden_by_friction(trial)
-            last = task.trial(trial.path, None, motion, None if anew else last.solution)
-            least = best[1].views.velocity.scatter_left
-            if last.views.velocity.scatter_left < _AS_ALIKE * least:
-                best = task, last
-        return best
-
-    def with_sure_modes(
-        self, trial: _Trial, uncertainty: Uncertainty, corner_known: bool
-    ) -> tuple[_Trial, Uncertainty]:
-        """The same with fewer modes as long as one of them may as well be none.
-
-        Two that share what one does are as little known, each by itself.
-        """
-        motion = trial.fit if self.quantity == "torque_injection" else None
-        while trial.fit.error <= TRUSTED_ERROR and _unsure(trial, uncertainty):
-            task = replace(self, max_modes=len(trial.fit.model.modes) - 1)
-            fewer = task.trial(trial.path, trial.views.velocity.coulomb_nm, motion)
-            if fewer.fit.score > trial.fit.score + _WORTH_A_MODE:
-                break
-            trial, uncertainty = fewer, task.uncertainty(fewer, corner_known)
-        return trial, uncertainty
-
-    def moved(self, trial: _Trial, uncertainty: Uncertainty) -> _Trial:
-        """The same mechanics refined on the path that torque and motion together would have."""
-        most = np.maximum(2.0 * uncertainty.path_std, _LONGEST_STEP)
-        step = np.clip(uncertainty.path_step, -most, most)
-        path = moved_path(trial.path, float(step[0]), float(step[1]) if step.size > 1 else 0.0)
-        motion = trial.fit if self.quantity == "torque_injection" else None
-        return self.trial(path, trial.views.velocity.coulomb_nm, motion, trial.solution)
-
-    def uncertainty(
-        self, trial: _Trial, corner_known: bool, by_torque: SignalPath | None = None
-    ) -> Uncertainty:
-        """How far path and mechanics may be off together.
-
-        ``by_torque`` is the path that the torque alone tells, where the trial has another one.
-        """
-        closed = self.quantity == "torque_injection"
-        covariance = path_covariance(
-            self.records, trial.path, loop_closed=closed, corner_known=corner_known,
-            motion=trial.fit if closed else None, controller=self.loop,
-        )  # fmt: skip
-        problem = trial.solution.problem
-        shifted = []
-        for n in range(len(covariance)):
-            path = moved_path(trial.path, _STEP * (n == 0), _STEP * (n == 1))
-            other = self.views(path, trial.views.velocity.coulomb_nm)
-            seen = views_of(other.velocity, other.position, path, trial.fit.loop)
-            views = tuple(
-                replace(v, g=o.g, sampler=o.sampler)
-                for v, o in zip(problem.views, seen, strict=True)
-            )
-            shifted.append(Shifted(views, _STEP))
-        moved = path_between(by_torque or trial.path, trial.path)[: len(covariance)]
-        return joint_uncertainty(problem, trial.solution.x, shifted, covariance, moved)
-
-    def _loop(self, path: SignalPath, motion: SampledFit | None) -> LoopModel:
-        """The controller that is closed meanwhile."""
-        if self.quantity == "torque_mode":
-            return LoopModel()
-        if self.loop is not None:
-            return self.loop
-        own, velocity = loop_spectra(self.records, path)
-        lines = self.records[0].excitation.line_hz
-        if motion is not None:
-            own = own / motion.loop_image_factor(lines)
-        return fit_loop(lines, own, velocity, path)
-
-
-def _alike(one: SignalPath, other: SignalPath) -> bool:
-    """Whether another fit of the mechanics would give the same."""
-    apart = abs(one.command_delay_s - other.command_delay_s) * one.sample_rate_hz
-    corners = (one.current_bandwidth_hz or 1.0) / (other.current_bandwidth_hz or 1.0)
-    return one.hold == other.hold and apart < 0.01 and abs(np.log(corners)) < 0.03
-
-
-def _rank(trial: _Trial) -> float:
-    """Less is better."""
-    return trial.fit.score + _implausible(trial.fit)
-
-
-def _implausible(fit: SampledFit) -> float:
-    """A drive does not report what has not happened yet, and takes setpoints at whole cycles."""
-    path = fit.path
-    first_s = min(fit.delay_s, fit.position_delay_s)
-    early = max(-first_s * path.sample_rate_hz - 0.1, 0.0)
-    cycles = cycles_of(path)
-    return _EARLY * early + _FRACTION * abs(cycles - round(cycles))
-
-
-def _identification(task: _Task, trial: _Trial, uncertainty: Uncertainty) -> Identification:
+def _identification(task: Task, trial: Trial, uncertainty: Uncertainty) -> Identification:
     """The estimates with what the fit found taken out."""
     views, path, fit = trial.views, trial.path, trial.fit
     spoilt = distortion(task.records, path, task.quantity, views.velocity)
-    by_place = inertia_by_place(
-        task.records, fit.path, task.quantity, views.velocity.coulomb_nm
-    )  # fmt: skip
+    by_place = inertia_by_place(task.records, fit.path, task.quantity, views.velocity.coulomb_nm)
 
     def everywhere(frf: Frf) -> Frf:
         return frf if by_place is None else by_place.charged(frf)
@@ -524,7 +266,9 @@ def _identification(task: _Task, trial: _Trial, uncertainty: Uncertainty) -> Ide
     direct = [widened(p.lines, p.factor, 1.0, p.direct) for p in parts]
     corrected = [without_images(p.lines, p.factor, task.jitter_s, p.corrected) for p in parts]
     # Play changes stiffness, and so everything above the frequency where it shows most.
-    share = np.maximum.accumulate(spoilt.share) if spoilt.play else _AVERAGED * spoilt.share
+    share = (
+        np.maximum.accumulate(spoilt.share) if spoilt.play else threshold.AVERAGED * spoilt.share
+    )
     best, lines = (everywhere(distorted(pooled(parts), share)) for parts in (corrected, direct))
     if spoilt.play:
         lines = lines.cut(lines.valid_band_hz[1])
@@ -533,38 +277,14 @@ def _identification(task: _Task, trial: _Trial, uncertainty: Uncertainty) -> Ide
     moved = None if by_place is None else by_place.share(best)
     uncertainties = tuple(
         each.with_band(mode, best.frequency_hz, spoilt.share, moved)
-        for mode, each in zip(fit.model.modes, _mode_uncertainties(trial, uncertainty), strict=True)
+        for mode, each in zip(
+            fit.model.modes, mode_uncertainties_of(trial, uncertainty), strict=True
+        )
     )
     return Identification(lines, best, fit, True, spoilt, uncertainties, by_place=by_place)
 
 
-def _hidden_by_friction(trial: _Trial) -> bool:
-    """Whether lines were so uncertain by friction that other mechanics may have been there."""
-    uncertainty = trial.views.velocity.friction
-    return uncertainty is not None and float(np.mean(np.abs(uncertainty) > _HIDDEN)) > _HIDDEN_SHARE
-
-
-def _unsure(trial: _Trial, uncertainty: Uncertainty) -> bool:
-    """Whether a mode within the band has a part in the response that may be nothing."""
-    low, high = trial.views.velocity.frequency_hz[0], trial.fit.valid_band_hz[1]
-    pairs = zip(trial.fit.model.modes, _mode_uncertainties(trial, uncertainty), strict=True)
-    return any(d.residue > _UNSURE and low < m.frequency_hz < high for m, d in pairs)
-
-
-def _mode_uncertainties(trial: _Trial, uncertainty: Uncertainty) -> tuple[ModeUncertainty, ...]:
-    """With what friction may do to all lines together."""
-    given = [view for view in (trial.views.velocity, trial.views.position) if view is not None]
-    together = [
-        np.zeros(v.frequency_hz.size, np.complex128) if v.friction is None else v.friction
-        for v in given
-    ]
-    return mode_uncertainties(
-        trial.solution.problem, trial.solution.x, uncertainty.covariance, together,
-        friction_seen=trial.views.velocity.coulomb_nm > 0,
-    )  # fmt: skip
-
-
-def _without_path(trial: _Trial) -> ComplexArray:
+def _without_path(trial: Trial) -> ComplexArray:
     """The velocity's response without delay, filter and images."""
     raw, fit = trial.views.velocity, trial.fit
     late = delay_response(raw.frequency_hz, fit.delay_s)
@@ -573,7 +293,7 @@ def _without_path(trial: _Trial) -> ComplexArray:
     return np.asarray(raw.response / late / fit.image_factor(raw.frequency_hz))
 
 
-def _undecided(found: Identification, best: _Trial, others: list[_Trial]) -> Identification:
+def _undecided(found: Identification, best: Trial, others: list[Trial]) -> Identification:
     """Charge to the band how far another path that explains as much would move the lines."""
     if not found.trusted or not others:
         return found
@@ -588,11 +308,3 @@ def _undecided(found: Identification, best: _Trial, others: list[_Trial]) -> Ide
         )
 
     return replace(found, direct=wider(found.direct), corrected=wider(found.corrected))
-
-
-@dataclass(frozen=True)
-class _Views:
-    """The same mechanics by way of the reported velocity and of the reported position."""
-
-    velocity: Frf
-    position: Frf | None

@@ -26,21 +26,12 @@ from backend.analysis.mechanics.load_terms import (
 )
 from backend.analysis.mechanics.position_torque import angle_of
 from backend.analysis.signals.arrays import BoolArray, FloatArray
+from backend.analysis.thresholds import inertia as threshold
 
-#: Shares of J, viscous, Coulomb and gravity torque by which compliance, timing and the smoothing
-#: of standstill bend the answer however little noise there is; part of every interval.
-SYSTEMATIC_SHARE = np.array([0.005, 0.05, 0.03, 0.01])
+SYSTEMATIC_SHARE = np.array(threshold.SYSTEMATIC_SHARE)
 
-#: Swings are looked for up to this multiple of the smoothing's corner; above, their first order
-#: is enough.
-_SWINGS_TO = 2.0
-#: What the model leaves may be alike for about this long.
-_ALIKE_S = 0.2
-_FEWEST = 20
 #: Columns of a rigid axis with friction, as `_columns` makes them.
 _RIGID = 6
-#: Share of the Coulomb friction that may have been taken for viscous friction.
-_DISTINGUISHED = 0.01
 
 #: Why data do not support an answer, in the order in which they are stated.
 Reason = Literal[
@@ -176,15 +167,15 @@ def estimate_inertia(
     keep = (np.abs(matrix[:, 1]) > slowest) & ~near_spoilt
     keep[: kernel.size] = keep[-kernel.size :] = False
     samples, saturated_share = int(np.count_nonzero(keep)), float(np.mean(saturated))
-    if samples < _FEWEST:
+    if samples < threshold.FEWEST:
         return _nothing(saturated_share)
     middle = 0.5 * (float(np.min(angle)) + float(np.max(angle)))
     motion = Motion(velocity_rad_s, angle - middle, lambda x: _smooth(x, kernel))
-    highest_hz = _SWINGS_TO * cutoff_hz
+    highest_hz = threshold.SWINGS_TO * cutoff_hz
     terms, matrix, bends = _machine(matrix, torque, motion, keep, sample_rate_hz, highest_hz)
     found, sizes = _regress(
         matrix[keep], torque[keep], bends[keep], keep,
-        round(_ALIKE_S * sample_rate_hz), saturated_share, motor_inertia_kgm2,
+        round(threshold.ALIKE_S * sample_rate_hz), saturated_share, motor_inertia_kgm2,
     )  # fmt: skip
     return replace(found, beside=terms.sized(motion, sizes[_RIGID:]))
 
@@ -279,7 +270,7 @@ def _intervals(
     half = np.hypot(uncertainty[:4], SYSTEMATIC_SHARE * np.abs(x[:4]))
     # What reversals bend of Coulomb friction, viscous friction makes up for at the speeds moved at.
     speed = float(np.sqrt(np.mean(a[:, 1] ** 2)))
-    half[1] = np.hypot(half[1], _DISTINGUISHED * abs(x[2]) / speed)
+    half[1] = np.hypot(half[1], threshold.DISTINGUISHED * abs(x[2]) / speed)
     return [
         Interval(float(v), float(v - h), float(v + h)) for v, h in zip(x[:4], half, strict=True)
     ]

@@ -23,12 +23,7 @@ from backend.analysis.signals.line_spectra import (
     instrument_estimate,
     period_spectra,
 )
-
-#: Lines to this share of the sample rate: products of motions are folded above.
-_SHARE = 0.2
-#: A part that stands out by so many deviations, and is this share of the inertia, is there.
-_SURE, _LEAST = 5.0, 0.01
-_FEW = 12
+from backend.analysis.thresholds import inertia_by_place as threshold
 
 
 @dataclass(frozen=True)
@@ -82,8 +77,8 @@ def inertia_by_place(
         own = sum(n * r.conj() for n, r in zip(rows, sent, strict=True)) / s_ur
         return [n - own * u for n, u in zip(rows, means, strict=True)]
 
-    use = (f < _SHARE * path.sample_rate_hz) & (np.abs(g) > 0)
-    if np.count_nonzero(use) < _FEW:
+    use = (f < threshold.SHARE * path.sample_rate_hz) & (np.abs(g) > 0)
+    if np.count_nonzero(use) < threshold.FEW:
         return None
     columns = []
     for phase in (0.0, np.pi / 2):
@@ -107,7 +102,7 @@ def inertia_by_place(
     along = x / amplitude
     std = float(np.sqrt(along @ covariance @ along))
     whole = 1.0 / float(np.median((2 * np.pi * f * np.abs(g))[use]))
-    if amplitude < _SURE * std or amplitude < _LEAST * whole:
+    if amplitude < threshold.SURE * std or amplitude < threshold.LEAST * whole:
         return None
     return InertiaByPlace(amplitude, std)
 

@@ -29,18 +29,7 @@ from backend.analysis.mechanics.fit_problem import (
 from backend.analysis.mechanics.mechanical_model import RIGID_PARAMETERS, TURN
 from backend.analysis.response.sampling import delay_response
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
-
-#: Antiresonances that are tried, from this multiple of the lowest line.
-_LOWEST_TRIED = 1.3
-#: Starts nearer to each other than this (logarithm of their frequencies) lead to the same place,
-#: but for what is seen by its images alone: that fits at many places which lie close together.
-_APART, _APART_FOLDED, _FOLDED = 0.5, 0.12, 4
-#: A start is moved by this much (cycles) to where its delay fits.
-_LATE = 0.1
-#: Images of up to about this frequency are looked at in a search.
-_SEARCHED_HZ = 2000.0
-#: Inertia of one more load, relative to the one that it hangs on.
-_RATIOS = (0.05, 0.12, 0.25, 0.5, 1.0, 2.0, 5.0, 12.0, 30.0)
+from backend.analysis.thresholds import load_search as threshold
 
 
 def with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
@@ -51,7 +40,7 @@ def with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
     weight = np.minimum(view.weight[lines], 100.0).astype(np.float32)
     cycles_per_sample = (f * problem.period_s).astype(np.float32)
     # What is folded back from beyond a few kHz is weak.
-    images = max(1, round(_SEARCHED_HZ * problem.period_s))
+    images = max(1, round(threshold.SEARCHED_HZ * problem.period_s))
     sampler = view.sampler.thinned(lines).nearest(images).single()
     every = sampler.frequency_hz
     late = delay_response(every, float(found.x[2]) * problem.period_s).astype(np.complex64)
@@ -61,9 +50,11 @@ def with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
     measured = view.g[lines].astype(np.complex64)
     top = float(view.f[-1])
     grid_hz = np.concatenate(
-        [np.geomspace(_LOWEST_TRIED * float(f[0]), 0.8 * top, 26),
-         np.geomspace(0.8 * top, HIGHEST_TRIED * top, 20)]
-    )  # fmt: skip
+        [
+            np.geomspace(threshold.LOWEST_TRIED * float(f[0]), 0.8 * top, 26),
+            np.geomspace(0.8 * top, HIGHEST_TRIED * top, 20),
+        ]
+    )
     worst_hz = _worst_hz(view, found)
     places = range(1 + (found.x.size - RIGID_PARAMETERS) // LOAD_PARAMETERS)
     trials: list[_Trial] = []
@@ -80,16 +71,17 @@ def with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
         kept, inertia, stiffness, _ = new[best].T
         frequencies, ratios = np.log(stiffness / inertia) / 2, np.log(inertia / kept)
         trials += [
-            _Trial(float(costs[i]), place, frequency, ratio, new[i], float(gain[i]),
-                   float(cycles[i]))
+            _Trial(
+                float(costs[i]), place, frequency, ratio, new[i], float(gain[i]), float(cycles[i])
+            )
             for i, frequency, ratio in zip(best, frequencies, ratios, strict=True)
-        ]  # fmt: skip
+        ]
     ranked = sorted(trials, key=lambda t: t.cost)
     edges = np.log(TURN * np.array([0.0, 0.3 * top, 0.7 * top, np.inf]) + 1e-12)
     chosen = ranked[:1]
-    for (low, high), count in zip(itertools.pairwise(edges), (1, 1, _FOLDED), strict=True):
+    for (low, high), count in zip(itertools.pairwise(edges), (1, 1, threshold.FOLDED), strict=True):
         here = [t for t in ranked if low <= t.frequency < high]
-        apart = _APART if count == 1 else _APART_FOLDED
+        apart = threshold.APART if count == 1 else threshold.APART_FOLDED
         chosen += _different(here, chosen, count, apart)
     return [t.start(found.x) for t in chosen + _different(ranked, chosen, 1)]
 
@@ -105,7 +97,7 @@ def _without_gain_and_delay(
     gain = logs.real @ squared / np.sum(squared)
     turn = TURN * cycles
     late = -(logs.imag @ (squared * turn)) / np.sum(squared * turn**2)
-    late = np.clip(late, -_LATE, _LATE)
+    late = np.clip(late, -threshold.LATE, threshold.LATE)
     return np.asarray(logs - gain[:, None] + 1j * late[:, None] * turn), gain, late
 
 
@@ -156,8 +148,9 @@ def with_one_more_mode(problem: Problem, found: Found) -> list[FloatArray]:
             model.gain,
             np.array([*(m.frequency_hz for m in model.modes), hz[best]]),
             np.array([*(max(m.residue, 1e-9) for m in model.modes), residue]),
-            float(np.exp(found.x[1])), USUAL_DAMPING,
-        )  # fmt: skip
+            float(np.exp(found.x[1])),
+            USUAL_DAMPING,
+        )
     except ValueError:
         return []
     x[2:RIGID_PARAMETERS] = found.x[2:RIGID_PARAMETERS]
@@ -215,7 +208,7 @@ def _new_loads(x: FloatArray, place: int, grid_hz: FloatArray, worst_hz: FloatAr
     """
     whole = float(np.exp(x[0]) if place == 0 else loads_of(x)[place - 1, 0])
     rows = []
-    for ratio in _RATIOS:
+    for ratio in threshold.RATIOS:
         tried_hz = np.concatenate([grid_hz, worst_hz, worst_hz / np.sqrt(1.0 + ratio)])
         for kept in (whole, whole / (1.0 + ratio)):
             inertia = kept * ratio
@@ -227,7 +220,7 @@ def _new_loads(x: FloatArray, place: int, grid_hz: FloatArray, worst_hz: FloatAr
 
 
 def _different(
-    trials: list[_Trial], known: list[_Trial], count: int, apart: float = _APART
+    trials: list[_Trial], known: list[_Trial], count: int, apart: float = threshold.APART
 ) -> list[_Trial]:
     """The best few that are neighbours neither of the known ones nor of each other."""
     kept: list[_Trial] = []

@@ -21,18 +21,7 @@ import numpy as np
 import scipy
 
 from backend.analysis.signals.arrays import BoolArray, FloatArray, IntArray
-
-#: What the search looks at: ratios of neighbouring frequencies, and dampings.
-_STEP, _DAMPINGS = 1.07, (0.008, 0.03, 0.1)
-_LEAST_DAMPING, _MOST_DAMPING = 5e-4, 0.5
-#: Below this frequency a swing is not distinguished from the move itself.
-_LOWEST_HZ = 3.0
-#: A mode must take this share of the power that is left, or it is not there to be seen.
-_WORTH = 0.5
-#: Relative step of numerical slopes.
-_DIFFERENCE = 1e-4
-#: Samples per cycle of the highest frequency that are worth regressing over.
-_PER_CYCLE = 8.0
+from backend.analysis.thresholds import load_swing as threshold
 
 
 @dataclass(frozen=True)
@@ -67,7 +56,7 @@ def lag_slopes(
         moved = Swing(swing.frequency_hz * frequency, swing.damping * damping)
         return lag_of_load(acceleration, moved, sample_rate_hz)
 
-    e = _DIFFERENCE
+    e = threshold.DIFFERENCE
     return (
         np.asarray((at(1 + e, 1.0) - at(1 - e, 1.0)) / (2 * e)),
         np.asarray((at(1.0, 1 + e) - at(1.0, 1 - e)) / (2 * e)),
@@ -88,7 +77,7 @@ def find_swings(
     ``others`` begins with the acceleration. A mode counts only while it takes half of what was
     left unexplained, as an inertia that is positive and smaller than the whole.
     """
-    every = max(1, int(sample_rate_hz / (_PER_CYCLE * highest_hz)))
+    every = max(1, int(sample_rate_hz / (threshold.PER_CYCLE * highest_hz)))
     rows = np.flatnonzero(keep)[::every]
     problem = _Problem(others[rows], torque_nm[rows], acceleration, rows, sample_rate_hz)
     found: tuple[Swing, ...] = ()
@@ -97,16 +86,18 @@ def find_swings(
         seed = min(_grid(highest_hz), key=lambda s: problem.unexplained((*found, s)))
         better = problem.refined((*found, seed), highest_hz)
         power = problem.unexplained(better)
-        if not power < _WORTH * left or not problem.is_physical(better):
+        if not power < threshold.WORTH * left or not problem.is_physical(better):
             break
         found, left = better, power
     return found
 
 
 def _grid(highest_hz: float) -> list[Swing]:
-    count = int(np.log(highest_hz / _LOWEST_HZ) / np.log(_STEP)) + 1
+    count = int(np.log(highest_hz / threshold.LOWEST_HZ) / np.log(threshold.STEP)) + 1
     return [
-        Swing(float(f), z) for f in np.geomspace(_LOWEST_HZ, highest_hz, count) for z in _DAMPINGS
+        Swing(float(f), z)
+        for f in np.geomspace(threshold.LOWEST_HZ, highest_hz, count)
+        for z in threshold.DAMPINGS
     ]
 
 
@@ -149,8 +140,8 @@ class _Problem:
             return tuple(Swing(float(f), float(z)) for f, z in np.exp(q).reshape(-1, 2))
 
         start = np.log([(s.frequency_hz, s.damping) for s in swings]).ravel()
-        low = np.tile(np.log([0.7 * _LOWEST_HZ, _LEAST_DAMPING]), len(swings))
-        high = np.tile(np.log([1.3 * highest_hz, _MOST_DAMPING]), len(swings))
+        low = np.tile(np.log([0.7 * threshold.LOWEST_HZ, threshold.LEAST_DAMPING]), len(swings))
+        high = np.tile(np.log([1.3 * highest_hz, threshold.MOST_DAMPING]), len(swings))
         inside = np.clip(start, low + 1e-6, high - 1e-6)
         size = max(float(np.sqrt(np.mean(self._rest**2))), 1e-300)
 

@@ -20,21 +20,7 @@ from backend.analysis.mechanics.position_torque import (
     place_columns,
 )
 from backend.analysis.signals.arrays import BoolArray, FloatArray
-
-#: A term that takes this share of the power that is left is there, whatever the noise.
-_PLAIN = 0.5
-#: Beside noise a smaller share counts for a fan and for the machine's place, which bend inertia
-#: most: least share, and least ratio of variances (F) for the three things that are fitted.
-_SHARE, _F = 0.15, 20.0
-#: Of the largest torque, what takes less matters to nobody; of the Coulomb friction, the shape of
-#: friction itself is not known better.
-_LEAST, _LEAST_OF_FRICTION = 0.01, 0.1
-#: An arm may hang on a shaft that is out of balance, of a motor that cogs in two ways.
-_PLACES = 4
-#: Speeds within which friction falls to its Coulomb value, as shares of the highest.
-_STATIC = (0.01, 0.02, 0.04, 0.08)
-#: Relative step of numerical slopes.
-_DIFFERENCE = 1e-3
+from backend.analysis.thresholds import load_terms as threshold
 
 
 @dataclass(frozen=True)
@@ -117,9 +103,9 @@ class Terms:
         for period in self.periods_rad:
             ahead, behind = (
                 place_columns(motion.angle_rad, period * (1.0 + step), motion.smooth)
-                for step in (_DIFFERENCE, -_DIFFERENCE)
+                for step in (threshold.DIFFERENCE, -threshold.DIFFERENCE)
             )
-            found.extend(((ahead - behind) / (2 * _DIFFERENCE)).T)
+            found.extend(((ahead - behind) / (2 * threshold.DIFFERENCE)).T)
         return found
 
 
@@ -137,7 +123,7 @@ def find_terms(others: FloatArray, torque_nm: FloatArray, motion: Motion, keep: 
         scale = np.maximum(np.max(np.abs(a), axis=0), 1e-12)
         x = np.linalg.lstsq(a / scale, torque_nm[keep], rcond=None)[0] / scale
         made = extra @ x[others.shape[1] :]
-        least = max(_LEAST * largest, _LEAST_OF_FRICTION * float(abs(x[2])))
+        least = max(threshold.LEAST * largest, threshold.LEAST_OF_FRICTION * float(abs(x[2])))
         seen = 0.5 * float(np.ptp(made)) >= least
         return _Fit(terms, np.asarray(torque_nm[keep] - a @ x), seen)
 
@@ -146,8 +132,8 @@ def find_terms(others: FloatArray, torque_nm: FloatArray, motion: Motion, keep: 
         terms = best.terms
         possible = [] if terms.fan else [replace(terms, fan=True)]
         if not terms.static_rad_s:
-            possible += [replace(terms, static_rad_s=share * fastest) for share in _STATIC]
-        if len(terms.periods_rad) < _PLACES:
+            possible += [replace(terms, static_rad_s=share * fastest) for share in threshold.STATIC]
+        if len(terms.periods_rad) < threshold.PLACES:
             known = np.column_stack([others, terms.columns(motion)])
             period = find_period(known, torque_nm, motion.angle_rad, keep, motion.smooth)
             possible.append(replace(terms, periods_rad=(*terms.periods_rad, period)))
@@ -175,12 +161,14 @@ class _Fit:
 def _clearly(before: _Fit, after: _Fit, keep: BoolArray) -> bool:
     """Whether the second explains so much more that chance is not the reason."""
     taken = before.power - after.power
-    if taken > _PLAIN * before.power:
+    if taken > threshold.PLAIN * before.power:
         return True
     if not after.terms.may_hide(before.terms):
         return False
     freedom = independent_share(after.rest, keep) * float(np.count_nonzero(keep))
-    return taken > _SHARE * before.power and taken / 3.0 > _F * after.power / max(freedom, 1.0)
+    return taken > threshold.SHARE * before.power and taken / 3.0 > threshold.F * after.power / max(
+        freedom, 1.0
+    )
 
 
 def independent_share(residual: FloatArray, keep: BoolArray) -> float:

@@ -21,15 +21,10 @@ import numpy as np
 from backend.analysis.mechanics.fit_problem import Problem, robust_rows
 from backend.analysis.mechanics.mechanical_model import Mode
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.analysis.thresholds import mode_uncertainty as threshold
 
-#: What path and interpolation leave of frequency and damping however long one measures, and of
-#: damping where the friction that every axis has did not show, and so is still in the lines.
-_SYSTEMATIC = np.array([3e-4, 0.03, 0.0])
-_UNSEEN_FRICTION = np.array([0.0, 0.1, 0.0])
-#: A larger deviation of a damping says no more than that nothing is known.
-_WIDEST = 10.0
-#: Parameters (most are logarithms) are moved by this much to see what the modes do.
-_STEP = 1e-5
+_SYSTEMATIC = np.array(threshold.SYSTEMATIC)
+_UNSEEN_FRICTION = np.array(threshold.UNSEEN_FRICTION)
 
 
 @dataclass(frozen=True)
@@ -57,13 +52,14 @@ class ModeUncertainty:
         frequency = (self.frequency, mode.damping * phase, 0.5 * place)
         damping = (self.damping, phase, place)
         return replace(
-            self, frequency=float(np.linalg.norm(frequency)),
+            self,
+            frequency=float(np.linalg.norm(frequency)),
             damping=float(np.linalg.norm(damping)),
-        )  # fmt: skip
+        )
 
     def damping_interval(self, damping: float, deviations: float) -> tuple[float, float]:
         """Within so many deviations of a damping ratio."""
-        apart = deviations * min(self.damping, _WIDEST)
+        apart = deviations * min(self.damping, threshold.WIDEST)
         return damping * max(1.0 - apart, 0.0), damping * (1.0 + apart)
 
 
@@ -82,10 +78,10 @@ def mode_uncertainties(
     slopes = np.zeros((x.size, *here.shape))
     for n in range(x.size):
         moved = x.copy()
-        moved[n] += _STEP
+        moved[n] += threshold.STEP
         there = _modes(problem, moved)
         if there.shape == here.shape:
-            slopes[n] = (there - here) / _STEP
+            slopes[n] = (there - here) / threshold.STEP
     spread = np.einsum("pml,pq,qml->ml", slopes, covariance, slopes)
     shift = np.einsum("pml,p->ml", slopes, _step_of(problem, x, together))
     least = _SYSTEMATIC**2 + (0.0 if friction_seen else 1.0) * _UNSEEN_FRICTION**2

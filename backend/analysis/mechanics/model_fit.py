@@ -29,17 +29,7 @@ from backend.analysis.response.frf import Frf, valid_band_hz
 from backend.analysis.response.sampled_model import LoopModel, SampledFit
 from backend.analysis.response.sampling import SignalPath
 from backend.analysis.signals.arrays import BoolArray, FloatArray
-
-#: One more load must gain this much, free modes instead of a chain that much.
-_WORTHWHILE, _MODES_GAIN = 10.0, 60.0
-#: A first look takes about twice so many lines and so many steps; so many starts get further.
-_COARSE_LINES, _COARSE_STEPS, _FINISHED = 40, 12, 4
-#: Lines with less coherence take no part, and none is believed to be more accurate than this.
-_LEAST_COHERENCE, _FLOOR = 0.6, 0.01
-#: Ends that are worse by so much are not followed; below this misfit nothing more is hidden.
-_WORSE, _EXPLAINED = 60.0, 0.003
-#: Below this misfit mechanics are there, and delays and filter are free.
-_FREED = 0.1
+from backend.analysis.thresholds import model_fit as threshold
 
 
 @dataclass(frozen=True)
@@ -81,7 +71,7 @@ def fit_sampled_model(
     lines = given[0].frequency_hz
     coherence = np.max([part.coherence for part in given], axis=0)
     band = valid_band_hz(float(lines[0]), path.sample_rate_hz, model=True)
-    use = np.asarray((lines <= band[1]) & (coherence >= _LEAST_COHERENCE))
+    use = np.asarray((lines <= band[1]) & (coherence >= threshold.LEAST_COHERENCE))
     if np.count_nonzero(use) < 12:
         raise ValueError("fewer than 12 coherent lines: too little excitation for a model")
     loop = LoopModel() if loop is None else loop
@@ -129,7 +119,13 @@ def views_of(
         use = np.ones(given[0].frequency_hz.size, dtype=np.bool_)
     return tuple(
         View.of(
-            part, use, path, loop, _FLOOR, integrated=part is not frf, second=part is not given[0]
+            part,
+            use,
+            path,
+            loop,
+            threshold.FLOOR,
+            integrated=part is not frf,
+            second=part is not given[0],
         )
         for part in given
     )
@@ -158,7 +154,7 @@ def _best(chain: Problem, longest_delay_s: float, max_modes: int) -> tuple[Found
     if found.x.size > RIGID_PARAMETERS:
         modal = replace(chain, form=MODAL).solve(modal_start(found.x))
         # Free modes also imitate delays and noise, so they must explain much that no chain does.
-        if modal.score < found.score - _MODES_GAIN and modal.error < 0.7 * found.error:
+        if modal.score < found.score - threshold.MODES_GAIN and modal.error < 0.7 * found.error:
             return modal, MODAL
     return found, CHAIN
 
@@ -167,8 +163,9 @@ def _rigid_start(view: View, delay: float) -> FloatArray:
     """A single inertia, from the low lines, where every chain moves as one."""
     low = slice(0, max(3, view.f.size // 6))
     inertia = 1.0 / float(np.median(np.abs(view.g[low]) * TURN * view.f[low]))
-    return np.array([np.log(inertia), np.log(0.02 * TURN * view.f[0] * inertia), delay, delay,
-                     USUAL_CORNER])  # fmt: skip
+    return np.array(
+        [np.log(inertia), np.log(0.02 * TURN * view.f[0] * inertia), delay, delay, USUAL_CORNER]
+    )
 
 
 def _grown(problem: Problem, start: FloatArray, max_modes: int) -> Found:
@@ -179,25 +176,26 @@ def _grown(problem: Problem, start: FloatArray, max_modes: int) -> Found:
     for _ in range(max_modes):
         starts = [*with_one_more(problem, now), *with_one_more_mode(problem, now)]
         now = _best_end(problem, now, starts)
-        if now.score < best.score - _WORTHWHILE:
+        if now.score < best.score - threshold.WORTHWHILE:
             best, misses = now, 0
         else:
             misses += 1
         # What is explained this well hides nothing behind a load that alone gains little.
-        if misses == 2 or (misses and best.error < _EXPLAINED) or best.error < 0.0004:
+        if misses == 2 or (misses and best.error < threshold.EXPLAINED) or best.error < 0.0004:
             break
     return problem.solve(best.x)
 
 
 def _best_end(problem: Problem, now: Found, starts: list[FloatArray]) -> Found:
     """Where the starts lead: all of them on few lines first, the most promising on all lines."""
-    coarse = problem.thinned(telling_lines(best_view(problem.views), now, _COARSE_LINES))
+    coarse = problem.thinned(telling_lines(best_view(problem.views), now, threshold.COARSE_LINES))
     looked = sorted(
-        (coarse.solve(x, _COARSE_STEPS, bound=True) for x in starts), key=lambda t: t.score
+        (coarse.solve(x, threshold.COARSE_STEPS, bound=True) for x in starts), key=lambda t: t.score
     )
-    ends = [problem.solve(t.x, bound=True) for t in looked[:_FINISHED]]
+    ends = [problem.solve(t.x, bound=True) for t in looked[: threshold.FINISHED]]
     least = min(e.score for e in ends)
-    followed = (e for e in ends if e.score < least + _WORSE)
+    followed = (e for e in ends if e.score < least + threshold.WORSE)
     return min(
-        (problem.solve(e.x, bound=e.error > _FREED) for e in followed), key=lambda t: t.score
+        (problem.solve(e.x, bound=e.error > threshold.FREED) for e in followed),
+        key=lambda t: t.score,
     )

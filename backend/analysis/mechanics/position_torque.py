@@ -20,20 +20,12 @@ import numpy as np
 import scipy
 
 from backend.analysis.signals.arrays import BoolArray, FloatArray
+from backend.analysis.thresholds import position_torque as threshold
 
 _TURN = 2 * np.pi
-#: The longest period looked for, in ways of the move: a sine is a straight line and a bow there.
-_LONGEST = 8.0
-#: The shortest period that is searched, in turns of the motor, and how often in a turn others may
-#: repeat.
-_SHORTEST_REV = 0.9
 _ORDERS = range(2, 31)
 #: Shorter periods than this, in rad, are the motor's own.
 COGGING_RAD = 0.45 * _TURN
-#: Ratio of neighbouring periods of the search.
-_STEP = 1.12
-#: Rows that are enough for torques as slow as these.
-_ROWS = 2000
 
 Smooth = Callable[[FloatArray], FloatArray]
 
@@ -68,8 +60,11 @@ def find_period(
     Whether it is worth having, the caller judges.
     """
     rows = np.flatnonzero(keep)
-    rows = rows[:: max(1, rows.size // _ROWS)]
-    longest, shortest = _LONGEST * float(np.ptp(angle_rad[rows])), _SHORTEST_REV * _TURN
+    rows = rows[:: max(1, rows.size // threshold.ROWS)]
+    longest, shortest = (
+        threshold.LONGEST * float(np.ptp(angle_rad[rows])),
+        threshold.SHORTEST_REV * _TURN,
+    )
     scale = np.maximum(np.max(np.abs(others), axis=0), 1e-12)
     q = np.linalg.qr(others[rows] / scale)[0]
     rest = torque_nm[rows] - q @ (q.T @ torque_nm[rows])
@@ -81,10 +76,10 @@ def find_period(
         return float(np.sum((rest - columns @ x) ** 2))
 
     repeated = min((float(np.log(_TURN / order)) for order in _ORDERS), key=left)
-    if longest <= shortest * _STEP:
+    if longest <= shortest * threshold.STEP:
         return float(np.exp(repeated))
-    count = int(np.log(longest / shortest) / np.log(_STEP)) + 2
+    count = int(np.log(longest / shortest) / np.log(threshold.STEP)) + 2
     best = min(np.linspace(np.log(shortest), np.log(longest), count), key=left)
-    near = (float(best - np.log(_STEP)), float(best + np.log(_STEP)))
+    near = (float(best - np.log(threshold.STEP)), float(best + np.log(threshold.STEP)))
     slow = float(scipy.optimize.minimize_scalar(left, bounds=near, method="bounded").x)
     return float(np.exp(min(slow, repeated, key=left)))

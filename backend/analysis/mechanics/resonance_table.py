@@ -8,10 +8,8 @@ from backend.analysis.mechanics.mechanical_model import MechanicalModel
 from backend.analysis.mechanics.mode_uncertainty import ModeUncertainty
 from backend.analysis.mechanics.resonance import Resonance
 from backend.analysis.signals.arrays import FloatArray
+from backend.analysis.thresholds import resonance_table as threshold
 
-#: Weak modes below this are artefacts of friction more often than mechanics.
-_LOWEST_MODE_HZ = 15.0
-_WEAK_DB, _LEAST_DB, _LEAST_SHARE = 3.0, 1.0, 0.2
 #: A mode whose part in the response is not known to this (logarithm, one deviation) may be none.
 _UNSURE = 1.0 / 3.0
 #: Deviations to either side that hold 95 of 100 cases.
@@ -19,9 +17,11 @@ _CI95 = 1.96
 
 
 def resonance_table(
-    model: MechanicalModel, lines_hz: FloatArray, highest_hz: float,
+    model: MechanicalModel,
+    lines_hz: FloatArray,
+    highest_hz: float,
     uncertainties: tuple[ModeUncertainty, ...] = (),
-) -> tuple[Resonance, ...]:  # fmt: skip
+) -> tuple[Resonance, ...]:
     """Resonances and antiresonances that the lines show, ascending; heights are local, in dB.
 
     A mode that hardly rises, or that no line shows because it is narrower than what lies between
@@ -32,11 +32,11 @@ def resonance_table(
     for number, mode in enumerate(model.modes):
         known = uncertainties[number] if uncertainties else None
         height = model.height_db(mode)
-        low = mode.frequency_hz < _LOWEST_MODE_HZ
+        low = mode.frequency_hz < threshold.LOWEST_MODE_HZ
         nearest_hz = float(np.min(np.abs(lines_hz - mode.frequency_hz)))
         half_width_hz = mode.damping * mode.frequency_hz
         seen = model.prominence(mode) / np.hypot(1.0, nearest_hz / half_width_hz)
-        shown = height > _WEAK_DB if low else seen > _LEAST_SHARE
+        shown = height > threshold.WEAK_DB if low else seen > threshold.LEAST_SHARE
         inside = lines_hz[0] < mode.frequency_hz <= highest_hz
         sure = known is None or known.residue < _UNSURE
         if shown and sure and inside and mode.damping < 1.0:
@@ -58,7 +58,7 @@ def resonance_table(
         around = np.array([frequency * 0.5, frequency, frequency * 2.0])
         db = 20 * np.log10(np.abs(model.response(around)))
         depth = float(db[1] - (db[0] + db[2]) / 2)
-        if depth < -_LEAST_DB:
+        if depth < -threshold.LEAST_DB:
             rows.append(Resonance("antiresonance", frequency, damping, depth))
     return tuple(sorted(rows, key=lambda row: row.frequency_hz))
 

@@ -19,15 +19,7 @@ from backend.analysis.response.sampled_model import SampledFit
 from backend.analysis.response.sampling import STEP_LEAD_S, SignalPath, delay_response, lag_response
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 from backend.analysis.signals.line_spectra import Quantity, Record, own_torque
-
-#: Where the balance is off by more than this (one deviation, of the Coulomb torque) the sampled
-#: speed tells more. It tells an interval to 0.3; but errors of the balance are those of speeds at
-#: samples, which cancel from one interval to the next, so that it is better on the lower lines.
-_ROUGH, _LEAST_WEIGHT = 0.4, 0.5
-#: What the balance is off by is shown by so many intervals to each side, to this share.
-_SLOW, _JITTER = 12, 0.01
-#: Fewer intervals without a reversal say nothing of the balance.
-_FEWEST = 50
+from backend.analysis.thresholds import reversals as threshold
 
 
 def with_balanced_reversals(
@@ -70,14 +62,14 @@ def _reported(
     e = record.excitation
     known = steady.copy()
     known[: e.first_sample + e.transient_periods * e.period_samples] = False
-    if np.count_nonzero(known) < _FEWEST:
+    if np.count_nonzero(known) < threshold.FEWEST:
         return None
     sign = np.sign(velocity)
     off = left_nm / coulomb_nm - sign
     mean = float(np.mean(off[known]))
     wrong, spread = _between(np.where(known, off - mean, 0.0), known, ~steady)
-    weight = 1.0 / (1.0 + (spread / _ROUGH) ** 4)
-    if weight < _LEAST_WEIGHT:
+    weight = 1.0 / (1.0 + (spread / threshold.ROUGH) ** 4)
+    if weight < threshold.LEAST_WEIGHT:
         return None
     # Cut above one only: what noise adds would else no longer cancel.
     most = 1.0 + spread
@@ -92,21 +84,23 @@ def _between(off: FloatArray, known: BoolArray, wanted: BoolArray) -> tuple[Floa
     frequency (mechanics that the fit has not quite right) goes on through a reversal.
     """
     count = known.astype(np.float64)
-    size = scipy.fft.next_fast_len(off.size + 2 * _SLOW, real=True)
+    size = scipy.fft.next_fast_len(off.size + 2 * threshold.SLOW, real=True)
     power = np.abs(np.fft.rfft(off * count, size)) ** 2
-    pairs = np.fft.irfft(np.abs(np.fft.rfft(count, size)) ** 2, size)[: 4 * _SLOW]
-    alike = np.fft.irfft(power, size)[: 4 * _SLOW] / np.maximum(pairs, 1.0)
+    pairs = np.fft.irfft(np.abs(np.fft.rfft(count, size)) ** 2, size)[: 4 * threshold.SLOW]
+    alike = np.fft.irfft(power, size)[: 4 * threshold.SLOW] / np.maximum(pairs, 1.0)
     places = np.flatnonzero(wanted)
     out, rest = np.zeros(off.size), []
     for group in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1):
-        if group.size == 0 or group.size > 2 * _SLOW:
+        if group.size == 0 or group.size > 2 * threshold.SLOW:
             continue
-        near = np.arange(max(group[0] - _SLOW, 0), min(group[-1] + _SLOW + 1, off.size))
+        near = np.arange(
+            max(group[0] - threshold.SLOW, 0), min(group[-1] + threshold.SLOW + 1, off.size)
+        )
         near = near[known[near]]
-        if near.size < _SLOW:
+        if near.size < threshold.SLOW:
             continue
         within = alike[np.abs(near[:, None] - near[None, :])]
-        within = within + np.eye(near.size) * _JITTER * alike[0]
+        within = within + np.eye(near.size) * threshold.JITTER * alike[0]
         across = alike[np.abs(group[:, None] - near[None, :])]
         share = np.linalg.solve(within, across.T).T
         out[group] = share @ off[near]

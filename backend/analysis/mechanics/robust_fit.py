@@ -14,10 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from backend.analysis.signals.arrays import FloatArray
+from backend.analysis.thresholds import robust_fit as threshold
 
 Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-
-_LEAST_DAMPING, _MOST_DAMPING = 1e-9, 1e9
 
 
 @dataclass(frozen=True)
@@ -65,12 +64,12 @@ def minimise(
         if new_cost < cost:
             quiet = quiet + 1 if cost - new_cost < cost_tolerance * cost else 0
             x, r, slopes, cost = tried, new_r, new_slopes, new_cost
-            damping = max(damping / 7.0, _LEAST_DAMPING)
+            damping = max(damping / 7.0, threshold.LEAST_DAMPING)
             if quiet == 2 or moved < step_tolerance:
                 break
         else:
             damping *= 6.0
-            if moved < step_tolerance or damping > _MOST_DAMPING:
+            if moved < step_tolerance or damping > threshold.MOST_DAMPING:
                 break
     root = (1.0 + (r / scale) ** 2) ** -0.25
     return Minimum(x, cost, r, slopes * root[:, None])

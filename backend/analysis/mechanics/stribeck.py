@@ -14,16 +14,7 @@ import numpy as np
 import scipy
 
 from backend.analysis.signals.arrays import FloatArray
-
-_EXPONENTS = (0.5, 1.0, 1.5, 2.0)
-_GRID = 48
-#: Fewer speeds say nothing of a Stribeck curve; of its height only what is this near to it.
-_FEWEST, _NEAR = 5, 0.6
-#: Rise of the weighted squares within which a pair is as good as the best (chi-squared, 95 %).
-_ALIKE = 3.84
-#: A point differs from the model beyond its interval times this, and this share of its torque.
-_BEYOND, _SHARE = 2.0, 0.03
-_CURVE = 60
+from backend.analysis.thresholds import stribeck as threshold
 
 
 @dataclass(frozen=True)
@@ -60,7 +51,7 @@ class SpeedModel:
     @property
     def enough(self) -> bool:
         """Whether there are speeds enough to look for a Stribeck curve."""
-        return self.speeds >= _FEWEST
+        return self.speeds >= threshold.FEWEST
 
     @property
     def reached(self) -> bool:
@@ -68,7 +59,7 @@ class SpeedModel:
         if self.best.speed is None:
             return False
         least = float(np.min(np.abs(self.speed)))
-        return bool(np.exp(-((least / self.best.speed) ** self.best.exponent)) >= _NEAR)
+        return bool(np.exp(-((least / self.best.speed) ** self.best.exponent)) >= threshold.NEAR)
 
     def value(self, index: int) -> tuple[float, float, float]:
         """Load, Coulomb, viscous or Stribeck torque (0 to 3) with its 95 % interval."""
@@ -77,9 +68,10 @@ class SpeedModel:
         values = np.array([each.values[index] for each in self.alike])
         spread = times * np.array([each.deviations[index] for each in self.alike])
         return (
-            float(self.best.values[index]), float(np.min(values - spread)),
+            float(self.best.values[index]),
+            float(np.min(values - spread)),
             float(np.max(values + spread)),
-        )  # fmt: skip
+        )
 
     def stribeck_speed(self) -> tuple[float, float, float]:
         """Where the Stribeck curve has fallen to 1/e, with its 95 % interval.
@@ -92,14 +84,14 @@ class SpeedModel:
         speeds = [each.speed for each in self.alike if each.speed is not None]
         # Half a step of the grid is not distinguished.
         size = np.abs(self.speed)
-        half = (size.max() / size.min()) ** (0.5 / (_GRID - 1))
+        half = (size.max() / size.min()) ** (0.5 / (threshold.GRID - 1))
         return self.best.speed, float(min(speeds) / half), float(max(speeds) * half)
 
     def misfit(self) -> float:
         """Largest share of its torque by which a point differs; 0 where none does beyond chance."""
         off = np.abs(self.torque - self.best.at(self.speed))
         size = np.abs(self.torque)
-        beyond = off > np.maximum(_BEYOND * self.half, _SHARE * size)
+        beyond = off > np.maximum(threshold.BEYOND * self.half, threshold.SHARE * size)
         return float(np.max(off[beyond] / np.maximum(size[beyond], 1e-12))) if beyond.any() else 0.0
 
     def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -112,7 +104,7 @@ class SpeedModel:
             side = np.sign(self.speed) == sign
             size = np.abs(self.speed[side])
             order = np.argsort(size)
-            at = np.geomspace(size.min(), size.max(), _CURVE)
+            at = np.geomspace(size.min(), size.max(), threshold.CURVE)
             beside = np.interp(np.log(at), np.log(size[order]), left[side][order])
             back = slice(None, None, -1 if sign < 0 else 1)
             speeds += (sign * at)[back].tolist()
@@ -129,11 +121,13 @@ def speed_model(speed: FloatArray, torque: FloatArray, half: FloatArray) -> Spee
     plain, speeds = _fit(speed, torque, weight, None, 1.0), speed.size // 2
     without = SpeedModel(speed, torque, half, plain, (plain,), speeds)
     freedom = speed.size - 6
-    if speeds < _FEWEST or freedom < 1:
+    if speeds < threshold.FEWEST or freedom < 1:
         return without
     size = np.abs(speed)
-    grid = np.geomspace(0.5 * size.min(), 0.5 * size.max(), _GRID)
-    fits = [_fit(speed, torque, weight, vs, exponent) for vs in grid for exponent in _EXPONENTS]
+    grid = np.geomspace(0.5 * size.min(), 0.5 * size.max(), threshold.GRID)
+    fits = [
+        _fit(speed, torque, weight, vs, exponent) for vs in grid for exponent in threshold.EXPONENTS
+    ]
     fits = [each for each in fits if each.values[3] > 0.0]
     if not fits:
         return without
@@ -141,7 +135,7 @@ def speed_model(speed: FloatArray, torque: FloatArray, half: FloatArray) -> Spee
     gained = (plain.squares - best.squares) / 3.0 / max(best.squares / freedom, 1e-12)
     if gained < float(scipy.special.fdtri(3, freedom, 0.99)):
         return without
-    limit = best.squares + _ALIKE * max(1.0, best.squares / freedom)
+    limit = best.squares + threshold.ALIKE * max(1.0, best.squares / freedom)
     alike = tuple(each for each in fits if each.squares <= limit)
     return SpeedModel(speed, torque, half, best, alike, speeds)
 

@@ -16,12 +16,9 @@ from backend.analysis.response.foreign import ForeignResponse
 from backend.analysis.response.frf import Frf
 from backend.analysis.response.product_model import TURN, ProductModel
 from backend.analysis.signals.arrays import FloatArray
+from backend.analysis.thresholds import collocated as threshold
 
-#: Lines beyond ±90° by more than this and their band contradict; so many in a row are no chance.
-_TOLERATED_DEG, _IN_A_ROW = 12.0, 4
 _CI95 = 1.96
-#: A friction pole above this share of the lowest line leaves the inertia to a guess.
-_HIGHEST_POLE = 4.0
 
 
 @dataclass(frozen=True)
@@ -63,11 +60,11 @@ def contradiction(
     bare = without_filter(found, filter_hz)
     f = bare.frequency_hz
     turned = np.degrees(np.angle(bare.response * np.exp(2j * np.pi * f * delay_s)))
-    over = np.abs(turned) - 90.0 - _TOLERATED_DEG - _CI95 * found.std_deg
+    over = np.abs(turned) - 90.0 - threshold.TOLERATED_DEG - _CI95 * found.std_deg
     run = 0
     for i, value in enumerate(over):
         run = run + 1 if value > 0 else 0
-        if run >= _IN_A_ROW:
+        if run >= threshold.IN_A_ROW:
             worst = int(np.argmax(over))
             poles = sorted(found.fit.model.poles_hz) if found.fit else []
             other = poles[1] if filter_hz is None and len(poles) > 1 else None
@@ -82,7 +79,7 @@ def rigid_part(found: ForeignResponse, filter_hz: float | None) -> RigidPart | N
     if fit is None:
         return None
     pole = _friction_pole(fit.model, filter_hz)
-    if pole is None or fit.model.poles_hz[pole] > _HIGHEST_POLE * found.frequency_hz[0]:
+    if pole is None or fit.model.poles_hz[pole] > threshold.HIGHEST_POLE * found.frequency_hz[0]:
         return None
     corner = fit.model.poles_hz[pole]
     gain = abs(fit.model.gain) * TURN * corner
@@ -131,9 +128,9 @@ def mechanical_model(found: ForeignResponse, filter_hz: float | None) -> Mechani
         for i, other in enumerate(poles):
             w = TURN * other.frequency_hz
             root = _root(other.frequency_hz, other.damping)
-            factor = (s - root.conjugate()) if i == skip else (
-                s * s + 2 * other.damping * w * s + w * w
-            )  # fmt: skip
+            factor = (
+                (s - root.conjugate()) if i == skip else (s * s + 2 * other.damping * w * s + w * w)
+            )
             out *= w**2 / factor
         return out
 

@@ -33,29 +33,7 @@ from backend.analysis.signals.line_spectra import (
     speed_lag_s,
     velocity_from_position,
 )
-
-#: Empty bins that a level is taken over, to each side, and the fewest that tell anything.
-_REACH, _FEWEST = 6, 12
-#: What a bin that is left out may hold of what an excited one does: rounding, and nothing else.
-_SILENT = 1e-3
-#: What the position shows less than this share of is noise of the reported speed. (What moves
-#: above half the sample rate is folded into both, into the position less.)
-_CONTRADICTED = 0.5
-#: Places of the axis that differ by less, relative to its way, are the same.
-_ROUNDING = 1e-9
-#: Play is looked for above this share of the sample rate: below, friction rules.
-_LOWEST = 0.1
-#: So much of the motion is too much, in any case or where friction explains none of it.
-_MUCH, _SOME, _UNEXPLAINED = 0.17, 0.1, 0.9
-#: About standstill: speed below this share of its deviation, and so long before and after.
-_SLOW, _ABOUT_S = 0.1, 0.002
-#: What is so much stronger there than elsewhere is friction; so little of the time says nothing.
-_AT_REVERSALS, _LEAST_TIME = 1.4, 0.01
-#: Power on the empty bins over that of the noise in it, from which on it tells of play.
-_ABOVE_NOISE = 4.0
-#: Where noise rules below, play may show above this share of the sample rate, where it moves the
-#: motor alone; so much above the noise there.
-_HIGHEST, _FAR_ABOVE_NOISE = 0.3, 5.0
+from backend.analysis.thresholds import distortion as threshold
 
 
 @dataclass(frozen=True)
@@ -75,10 +53,10 @@ class Distortion:
     @property
     def play(self) -> bool:
         """Whether the axis is no linear one, beyond friction: it seems to have play."""
-        if self.at_reversals > _AT_REVERSALS:
+        if self.at_reversals > threshold.AT_REVERSALS:
             return False
-        left = self.level > _UNEXPLAINED * self.before
-        return self.level > _MUCH or (self.level > _SOME and left)
+        left = self.level > threshold.UNEXPLAINED * self.before
+        return self.level > threshold.MUCH or (self.level > threshold.SOME and left)
 
 
 def distortion(
@@ -93,8 +71,8 @@ def distortion(
     empty = np.setdiff1d(bins, np.append(e.lines, e.base_line))
     # A chirp and a PRBS excite bins that are not evaluated, too.
     played = np.abs(np.fft.rfft(e.one_period))
-    empty = empty[played[empty] < _SILENT * np.median(played[e.lines])]
-    if empty.size < _FEWEST:
+    empty = empty[played[empty] < threshold.SILENT * np.median(played[e.lines])]
+    if empty.size < threshold.FEWEST:
         return none
     f = empty * (e.sample_rate_hz / e.period_samples)
     plant = np.exp(
@@ -117,7 +95,7 @@ def distortion(
         friction = frf.coulomb_nm * plant * friction_direction(record, between, good, path, lag_s)
         seen = [way.seen(record, between, good, path, own, friction) for way in ways]
         sizes = [float(np.median(np.abs(one.left))) for one in seen]
-        least = seen[-1] if sizes[-1] < _CONTRADICTED * sizes[0] else seen[0]
+        least = seen[-1] if sizes[-1] < threshold.CONTRADICTED * sizes[0] else seen[0]
         noise.append(least.noise)
         before.append(np.abs(least.plain) ** 2)
         rest.append(np.abs(least.left) ** 2)
@@ -125,20 +103,20 @@ def distortion(
         lines.append(np.abs(period_spectra(record.response, record.excitation, good).mean(axis=0)))
     if not rest:
         return none
-    around = np.interp(f, frf.frequency_hz, neighbour_mean(np.mean(lines, axis=0), _REACH))
+    around = np.interp(f, frf.frequency_hz, neighbour_mean(np.mean(lines, axis=0), threshold.REACH))
 
     def relative(power: list[FloatArray]) -> FloatArray:
-        pure = neighbour_mean(np.mean(power, axis=0) - np.mean(noise, axis=0), _REACH)
+        pure = neighbour_mean(np.mean(power, axis=0) - np.mean(noise, axis=0), threshold.REACH)
         return np.asarray(np.sqrt(np.maximum(pure, 0.0)) / around)
 
     share, plain = relative(rest), relative(before)
-    upper = f >= _LOWEST * path.sample_rate_hz
-    if np.count_nonzero(upper) < _FEWEST:
+    upper = f >= threshold.LOWEST * path.sample_rate_hz
+    if np.count_nonzero(upper) < threshold.FEWEST:
         return none
     # Where noise rules, what is left after it is taken out is noise.
-    highest = f >= _HIGHEST * path.sample_rate_hz
-    if not _stands_out(rest, noise, upper, _ABOVE_NOISE):
-        if not _stands_out(rest, noise, highest, _FAR_ABOVE_NOISE):
+    highest = f >= threshold.HIGHEST * path.sample_rate_hz
+    if not _stands_out(rest, noise, upper, threshold.ABOVE_NOISE):
+        if not _stands_out(rest, noise, highest, threshold.FAR_ABOVE_NOISE):
             return Distortion(np.asarray(np.interp(frf.frequency_hz, f, share)))
         upper = highest
     return Distortion(
@@ -152,7 +130,7 @@ def _stands_out(
     rest: list[FloatArray], noise: list[FloatArray], use: BoolArray, factor: float
 ) -> bool:
     """Whether what is left on these bins is more than noise."""
-    if np.count_nonzero(use) < _FEWEST:
+    if np.count_nonzero(use) < threshold.FEWEST:
         return False
     power, of_noise = (float(np.median(np.mean(p, axis=0)[use])) for p in (rest, noise))
     return power >= factor * of_noise
@@ -208,7 +186,7 @@ def _steps(record: Record, f: FloatArray) -> FloatArray:
     e = record.excitation
     places = np.diff(np.unique(record.position))
     # What is no step is rounding of the numbers.
-    places = places[places > _ROUNDING * float(np.ptp(record.position))]
+    places = places[places > threshold.ROUNDING * float(np.ptp(record.position))]
     if not places.size:
         return np.zeros(f.size)
     x = f / e.sample_rate_hz
@@ -223,8 +201,8 @@ def _at_reversals(
     e = record.excitation
     n = e.period_samples
     speed = np.mean([record.response[e.first_sample + p * n :][:n] for p in good], axis=0)
-    reach = 2 * round(_ABOUT_S * e.sample_rate_hz) + 1
-    slow = np.abs(speed) < _SLOW * np.std(speed)
+    reach = 2 * round(threshold.ABOUT_S * e.sample_rate_hz) + 1
+    slow = np.abs(speed) < threshold.SLOW * np.std(speed)
     # The period closes upon itself.
     about = np.convolve(np.pad(slow, reach // 2, mode="wrap"), np.ones(reach), "valid") > 0.5
     spectrum = np.zeros(n // 2 + 1, dtype=np.complex128)
@@ -236,4 +214,4 @@ def _at_reversals(
 def _ratio(falls: list[tuple[float, float]]) -> float:
     """Of power to time, over all records; zero where the speed hardly ever reverses."""
     power, time = np.mean(falls, axis=0)
-    return float(power / time) if time > _LEAST_TIME else 0.0
+    return float(power / time) if time > threshold.LEAST_TIME else 0.0

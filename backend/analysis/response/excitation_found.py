@@ -13,22 +13,9 @@ import numpy as np
 import scipy
 
 from backend.analysis.signals.arrays import BoolArray, FloatArray, IntArray
+from backend.analysis.thresholds import excitation_found as threshold
 
 Excited = Literal["periodic", "chirp", "noise"]
-
-#: Two passes of a period that differ by more than this share of the power are not the same.
-_UNLIKE = 0.05
-#: The shortest lag whose correlation comes this near to the best one is the period.
-_AS_GOOD = 0.01
-_LEAST_PERIOD, _LEAST_PERIODS = 16, 2
-#: A line is excited above this share of the strongest one, and above this many deviations.
-_LEAST_SHARE, _DEVIATIONS = 0.01, 6.0
-#: Amplitudes part into excited and not where neighbours in order differ by this factor.
-_GAP = 2.5
-#: Of a chirp, one frequency holds this share of the power of each moment, and moves one way.
-_ONE_TONE, _ONE_WAY = 0.6, 0.85
-#: The first periods hold the transient while they differ so many times more than the later ones.
-_TRANSIENT = 4.0
 
 
 @dataclass(frozen=True)
@@ -69,14 +56,14 @@ def _period(u: FloatArray) -> int:
     lags = np.arange(n)
     both = power[n - lags] + (power[n] - power[lags])
     alike = 2.0 * products / np.maximum(both, 1e-300)
-    last = n // _LEAST_PERIODS
-    if last <= _LEAST_PERIOD:
+    last = n // threshold.LEAST_PERIODS
+    if last <= threshold.LEAST_PERIOD:
         return 0
     # What is near lag 0 is the smoothness of the signal: the period lies beyond the first fall.
     fallen = np.flatnonzero(alike[: last + 1] < 0.5)
     if not fallen.size:
         return 0
-    first = max(int(fallen[0]), _LEAST_PERIOD)
+    first = max(int(fallen[0]), threshold.LEAST_PERIOD)
     peaks = np.flatnonzero(
         (alike[first : last + 1] >= alike[first - 1 : last])
         & (alike[first : last + 1] >= alike[first + 1 : last + 2])
@@ -85,9 +72,9 @@ def _period(u: FloatArray) -> int:
         return 0
     values = alike[first + peaks]
     best = float(np.max(values))
-    if best < 1.0 - _UNLIKE:
+    if best < 1.0 - threshold.UNLIKE:
         return 0
-    return int(first + peaks[np.flatnonzero(values >= best - _AS_GOOD)[0]])
+    return int(first + peaks[np.flatnonzero(values >= best - threshold.AS_GOOD)[0]])
 
 
 def _is_chirp(u: FloatArray) -> bool:
@@ -104,9 +91,9 @@ def _is_chirp(u: FloatArray) -> bool:
     single = float(np.median(np.asarray(near)[loud] / total[loud]))
     way = np.diff(top[loud].astype(float))
     moves = way[way != 0]
-    if single < _ONE_TONE or moves.size < 4:
+    if single < threshold.ONE_TONE or moves.size < 4:
         return False
-    return bool(max(np.mean(moves > 0), np.mean(moves < 0)) > _ONE_WAY)
+    return bool(max(np.mean(moves > 0), np.mean(moves < 0)) > threshold.ONE_WAY)
 
 
 def transient_periods(*spectra: FloatArray) -> int:
@@ -120,10 +107,10 @@ def transient_periods(*spectra: FloatArray) -> int:
         later = rows[count // 2 :].mean(axis=0)
         far = np.sqrt(np.mean((rows - later) ** 2, axis=1))
         usual = max(float(np.median(far[count // 2 :])), 1e-12 * float(np.std(rows)))
-        over = far > _TRANSIENT * usual
+        over = far > threshold.TRANSIENT * usual
         settled = next((i for i in range(count) if not over[i]), count)
         worst = max(worst, settled)
-    return int(min(worst, count - _LEAST_PERIODS))
+    return int(min(worst, count - threshold.LEAST_PERIODS))
 
 
 def excited_lines(amplitude: FloatArray, deviation: FloatArray) -> IntArray:
@@ -135,11 +122,13 @@ def excited_lines(amplitude: FloatArray, deviation: FloatArray) -> IntArray:
     usable = np.arange(1, amplitude.size - 1)
     a = amplitude[usable]
     top = float(np.percentile(a[a >= 0.1 * np.max(a)], 90))
-    over: BoolArray = (a > _LEAST_SHARE * top) & (a > _DEVIATIONS * deviation[usable])
+    over: BoolArray = (a > threshold.LEAST_SHARE * top) & (
+        a > threshold.DEVIATIONS * deviation[usable]
+    )
     ordered = np.sort(a[over])
     if ordered.size > 2:
         ratio = ordered[1:] / ordered[:-1]
-        low = np.flatnonzero((ordered[:-1] < 0.5 * top) & (ratio > _GAP))
+        low = np.flatnonzero((ordered[:-1] < 0.5 * top) & (ratio > threshold.GAP))
         if low.size:
             over &= a >= ordered[low[-1] + 1]
     return np.asarray(usable[over], dtype=np.int64)

@@ -24,20 +24,12 @@ from backend.analysis.signals.arrays import (
     neighbour_mean,
     phase_deg,
 )
+from backend.analysis.thresholds import foreign as threshold
 
 Method = Literal["periods", "local polynomial"]
 
-#: Fewer lines, or samples, are no frequency response.
-LEAST_LINES, LEAST_SAMPLES = 12, 256
-#: Lines of a record without periods; more say nothing more.
-_LINES = 400
-#: Of an input without periods, frequencies that carry this share of the strongest are excited.
-_EXCITED_DB = -30.0
-#: Lines less coherent than this are left out of the fit, and end the band.
-_COHERENT = 0.5
-#: Empty lines that tell distortion, at least.
-_FEWEST_EMPTY = 8
-_CLIPPED = 0.01
+LEAST_LINES = threshold.LEAST_LINES
+LEAST_SAMPLES = threshold.LEAST_SAMPLES
 
 
 class NoResponse(ValueError):
@@ -195,7 +187,7 @@ def _on_empty(
     found: list[float | None] = []
     for parity in (0, 1):
         bins = empty[empty % 2 == parity]
-        if bins.size < _FEWEST_EMPTY:
+        if bins.size < threshold.FEWEST_EMPTY:
             found.append(None)
             continue
         near = np.asarray(np.interp(bins, lines, g.real) + 1j * np.interp(bins, lines, g.imag))
@@ -213,10 +205,10 @@ def _by_window(u: FloatArray, y: FloatArray, rate: float) -> _Lines:
     reach = max(round(n / rate), 8)
     level = 10.0 * np.log10(neighbour_mean(power, reach) + 1e-300)
     usable = np.arange(8, power.size - 8)
-    strong = usable[level[usable] > np.max(level[usable]) + _EXCITED_DB]
+    strong = usable[level[usable] > np.max(level[usable]) + threshold.EXCITED_DB]
     if strong.size < LEAST_LINES:
         raise NoResponse("few-lines", lines=strong.size, least=LEAST_LINES)
-    step = max((strong[-1] - strong[0]) // _LINES, 1)
+    step = max((strong[-1] - strong[0]) // threshold.LINES, 1)
     half = max(8, int(step))
     centres = np.arange(max(strong[0], half), strong[-1] + 1, step)
     centres = centres[np.isin(centres, strong)]
@@ -256,7 +248,9 @@ def _with_band(lines: _Lines) -> ForeignResponse:
 
 
 def _fitted(lines: _Lines) -> ProductFit | None:
-    use = (lines.coherence > _COHERENT) & (lines.noise < 0.5) & (np.abs(lines.response) > 0)
+    use = (
+        (lines.coherence > threshold.COHERENT) & (lines.noise < 0.5) & (np.abs(lines.response) > 0)
+    )
     if np.count_nonzero(use) < LEAST_LINES:
         raise NoResponse("incoherent", coherence=float(np.median(lines.coherence)))
     weight = 1.0 / np.hypot(lines.noise, 0.03)
@@ -270,7 +264,7 @@ def _fitted(lines: _Lines) -> ProductFit | None:
 
 def _band_hz(f: FloatArray, coherence: FloatArray) -> tuple[float, float]:
     """From the first to the last coherent line."""
-    good = np.flatnonzero(coherence > _COHERENT)
+    good = np.flatnonzero(coherence > threshold.COHERENT)
     if good.size < LEAST_LINES:
         raise NoResponse("incoherent", coherence=float(np.median(coherence)))
     return float(f[good[0]]), float(f[good[-1]])

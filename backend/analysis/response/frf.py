@@ -29,11 +29,7 @@ from backend.analysis.signals.line_spectra import (
     continuous_input,
     instrument_estimate,
 )
-
-#: What friction did to a line is off by this share where only the speed tells its direction, and
-#: where the balance of torques does at reversals: all lines alike, as too little or too much
-#: friction makes them, and each line by itself, in size and phase.
-_BY_SPEED, _BY_BALANCE, _EACH_BY_BALANCE = 0.2, 0.08, 0.1
+from backend.analysis.thresholds import frf as threshold
 
 __all__ = ["Frf", "Quantity", "Record", "estimate_periodic", "valid_band_hz"]
 
@@ -138,11 +134,15 @@ def estimate_periodic(
     plain = instrument_estimate(s, continuous_input(s, path, quantity, position=position))[0]
     reported = all(record.known_direction is not None for record in records)
     # Where friction takes most of the torque, a share of it is much of what is left.
-    uncertainty = _BY_BALANCE * (g / plain - 1.0) if reported else _BY_SPEED * np.log(g / plain)
+    uncertainty = (
+        threshold.BY_BALANCE * (g / plain - 1.0)
+        if reported
+        else threshold.BY_SPEED * np.log(g / plain)
+    )
     size, turn = np.abs(uncertainty.real), np.abs(uncertainty.imag)
     if reported:
         # What the balance leaves is no share of what friction did: it may turn a line as well.
-        size = turn = _EACH_BY_BALANCE * np.abs(g / plain - 1.0)
+        size = turn = threshold.EACH_BY_BALANCE * np.abs(g / plain - 1.0)
     power = np.asarray(sum(np.abs(r.mean(axis=0)) ** 2 for r in s.sent))
     noise_var, total_var, freedom = _variances(s, inputs, g, smooth_lines)
     relative = total_var * power / np.abs(g * s_ur) ** 2

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from backend.analysis.signals.arrays import ComplexArray, FloatArray, IntArray
+from backend.analysis.thresholds import local_polynomial as threshold
 
 _ORDER = 2
 #: Unknowns of a window: both polynomials. So many equations more tell the scatter.
 _UNKNOWNS = 2 * (_ORDER + 1)
-_SPARE = 10
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ def local_polynomial(
     input_spectrum: ComplexArray, output_spectrum: ComplexArray, centres: IntArray, reach: int
 ) -> LocalEstimate:
     """Estimate at the bins ``centres`` from ``reach`` bins to each side."""
-    least = (_UNKNOWNS + _SPARE) // 2
+    least = (_UNKNOWNS + threshold.SPARE) // 2
     reach = max(reach, least)
     bins = input_spectrum.size
     out = np.empty(centres.size, dtype=np.complex128)

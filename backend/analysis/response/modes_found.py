@@ -10,16 +10,9 @@ import scipy
 from backend.analysis.mechanics.resonance import Resonance
 from backend.analysis.response.product_model import ProductFit
 from backend.analysis.signals.arrays import FloatArray
+from backend.analysis.thresholds import modes_found as threshold
 
-#: A peak or valley stands out so much from the curve, without its slope.
-_LEAST_DB = 3.0
-#: A pair belongs to an extremum that is nearer than this share.
-_NEAR = 0.06
 _CI95 = 1.96
-#: No frequency is known better than the clock and the structure of the model allow.
-_FLOOR = 1e-3
-#: Nor a damping, which friction and backlash change with the level (logarithm, one deviation).
-_DAMPING_FLOOR = 0.15
 
 
 @dataclass(frozen=True)
@@ -41,19 +34,19 @@ def modes_of(fit: ProductFit, f: FloatArray) -> tuple[FoundMode, ...]:
     first = 2 + len(model.poles_hz)
     found: list[FoundMode] = []
     for kind, curve in (("resonance", flat), ("antiresonance", -flat)):
-        places, facts = scipy.signal.find_peaks(curve, prominence=_LEAST_DB)
+        places, facts = scipy.signal.find_peaks(curve, prominence=threshold.LEAST_DB)
         for place, height in zip(places, facts["prominences"], strict=True):
             near = [
                 (abs(np.log(p.frequency_hz / dense[place])) + 0.1 * p.damping, i)
                 for i, p in enumerate(model.pairs)
-                if p.kind == kind and abs(np.log(p.frequency_hz / dense[place])) < _NEAR
+                if p.kind == kind and abs(np.log(p.frequency_hz / dense[place])) < threshold.NEAR
             ]
             if not near:
                 continue
             i = min(near)[1]
             pair = model.pairs[i]
-            spread = float(np.hypot(deviations[first + 2 * i], _FLOOR))
-            of_damping = float(np.hypot(deviations[first + 2 * i + 1], _DAMPING_FLOOR))
+            spread = float(np.hypot(deviations[first + 2 * i], threshold.FLOOR))
+            of_damping = float(np.hypot(deviations[first + 2 * i + 1], threshold.DAMPING_FLOOR))
             signed = float(height) if kind == "resonance" else -float(height)
             found.append(
                 FoundMode(

@@ -23,32 +23,12 @@ from backend.analysis.response.sampling import (
 )
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.analysis.signals.line_spectra import Record, mean_spectra
+from backend.analysis.thresholds import path_fit as threshold
 
-#: Setpoints are in force after this many cycles at most.
-_MOST_CYCLES = 3.5
-#: Parts of a cycle that a search begins with.
-_PARTS = (0.0, 0.25, 0.5, 0.75, 0.88, 0.94)
 #: Ordinary current loops, in Hz: log of the middle.
 _USUAL_CORNER = float(np.log(1000.0))
 _SLOWEST, _FASTEST = float(np.log(80.0)), float(np.log(6000.0))
 _CORNERS_HZ = np.geomspace(200.0, 5000.0, 6)
-#: What is usual (whole cycles of delay, an ordinary current loop) weighs this much, relative to
-#: the whole torque: it decides only where nothing else does, for above about the sample rate
-#: corner and a fraction of a cycle look alike.
-_WHOLE_CYCLES, _ORDINARY = 2e-3, 1e-4
-_SCALE = 1e4
-#: Speed and its torque are sampled signals: trusted up to about this share of the sample rate.
-_OWN_SHARE = 0.15
-#: Another hold is worth a trial when it leaves less than this multiple unexplained.
-_ALIKE = 3.0
-#: A delay of whole cycles that leaves less than this multiple of what a fraction does is taken.
-_NEARLY = 1.5
-#: A delay so near to whole cycles is one of whole cycles.
-_WHOLE = 0.06
-#: Deviations of delays (cycles) and of corners (logarithm) where nothing but habit tells them.
-_STEADY, _UNSTEADY, _REPORTED, _UNTOLD = 0.02, 0.1, 0.03, 0.7
-#: So much stays unexplained by rounding alone.
-_ROUNDING = 1.5e-7
 
 
 def find_paths(
@@ -89,9 +69,9 @@ def path_covariance(
     drive tells is meant to be one of first order. ``controller`` is the closed loop's, where it is
     known.
     """
-    usual = [_STEADY if at_whole_cycles(path) else _UNSTEADY]
+    usual = [threshold.STEADY if at_whole_cycles(path) else threshold.UNSTEADY]
     if path.current_bandwidth_hz is not None:
-        usual.append(_REPORTED if corner_known else _UNTOLD)
+        usual.append(threshold.REPORTED if corner_known else threshold.UNTOLD)
     information = np.diag(np.array(usual) ** -2.0)
     if any(r.torque is None for r in records):
         return np.asarray(np.linalg.inv(information))
@@ -99,7 +79,7 @@ def path_covariance(
     rest = fit.rest(path)
     steps = [moved_path(path, 0.02 * (n == 0), 0.02 * (n == 1)) for n in range(len(usual))]
     slopes = np.column_stack([(fit.rest(step) - rest) / 0.02 for step in steps])
-    noise = max(float(rest @ rest), _ROUNDING) / rest.size
+    noise = max(float(rest @ rest), threshold.ROUNDING) / rest.size
     return np.asarray(np.linalg.inv(information + slopes.T @ slopes / noise))
 
 
@@ -134,23 +114,23 @@ def ranked(fit: PathFit, holds: tuple[Hold, ...]) -> tuple[SignalPath, ...]:
     truth; so of every hold its best whole cycles stand for trial, too.
     """
     found = sorted((fit.best(hold) for hold in holds), key=lambda t: t[1])
-    least = max(found[0][1], _ROUNDING)
-    alike = [t for t in found if t[1] < _ALIKE * least]
+    least = max(found[0][1], threshold.ROUNDING)
+    alike = [t for t in found if t[1] < threshold.ALIKE * least]
     whole = [t for t in alike if at_whole_cycles(t[0])]
     there = {p.hold for p, _ in whole}
     pinned = [fit.best_whole(hold) for hold in holds if hold not in there]
-    pinned = sorted((t for t in pinned if t[1] < _ALIKE * least), key=lambda t: t[1])
+    pinned = sorted((t for t in pinned if t[1] < threshold.ALIKE * least), key=lambda t: t[1])
     if whole:
         first = sorted([*whole, *pinned], key=lambda t: t[1])
         return tuple(p for p, _ in [*first, *(t for t in alike if t not in whole)])
-    nearly = [t for t in pinned if t[1] < _NEARLY * least]
+    nearly = [t for t in pinned if t[1] < threshold.NEARLY * least]
     return tuple(p for p, _ in [*nearly, *alike, *(t for t in pinned if t not in nearly)])
 
 
 def at_whole_cycles(path: SignalPath) -> bool:
     """Whether setpoints take effect with a cycle of the bus, as drives in step with it do."""
     cycles = cycles_of(path)
-    return abs(cycles - round(cycles)) < _WHOLE
+    return abs(cycles - round(cycles)) < threshold.WHOLE
 
 
 @dataclass(frozen=True)
@@ -175,7 +155,7 @@ class PathFit:
         f, sent, torque, velocity = mean_spectra(records)
         size = np.sqrt(np.abs(sent) / np.sum(np.abs(sent)))
         if loop_closed and motion is None:
-            size = size / (1.0 + (f / (_OWN_SHARE * path.sample_rate_hz)) ** 4)
+            size = size / (1.0 + (f / (threshold.OWN_SHARE * path.sample_rate_hz)) ** 4)
         elif loop_closed and motion is not None:
             velocity = velocity * motion.loop_image_factor(f)
         return PathFit(f, torque / sent, velocity / sent, size, path, loop_closed, controller)
@@ -183,7 +163,14 @@ class PathFit:
     def best(self, hold: Hold) -> tuple[SignalPath, float]:
         """The best delay and corner with this hold, and what they leave unexplained."""
         # A sample just behind a step tells most of the delay, and only if a start is near.
-        cycles = np.sort([n + part for n in range(4) for part in _PARTS if n + part < _MOST_CYCLES])
+        cycles = np.sort(
+            [
+                n + part
+                for n in range(4)
+                for part in threshold.PARTS
+                if n + part < threshold.MOST_CYCLES
+            ]
+        )
         corners = _CORNERS_HZ if self.path.current_bandwidth_hz is None else [None]
         starts = []
         for late in cycles:
@@ -199,7 +186,7 @@ class PathFit:
     def best_whole(self, hold: Hold) -> tuple[SignalPath, float]:
         """The best delay of whole cycles with this hold, and what it leaves unexplained."""
         tried = []
-        for late in np.arange(0.0, _MOST_CYCLES):
+        for late in np.arange(0.0, threshold.MOST_CYCLES):
             corners = _CORNERS_HZ if self.path.current_bandwidth_hz is None else [None]
             row = [np.array([late] if c is None else [late, np.log(c)]) for c in corners]
             costs = [float(np.sum(self._rows(x, hold) ** 2)) for x in row]
@@ -209,8 +196,10 @@ class PathFit:
             return self._path_of(x, hold), cost
         end = scipy.optimize.minimize_scalar(
             lambda corner: float(np.sum(self._rows(np.array([x[0], corner]), hold) ** 2)),
-            bounds=(x[1] - 0.5, x[1] + 0.5), method="bounded", options={"maxiter": 12},
-        )  # fmt: skip
+            bounds=(x[1] - 0.5, x[1] + 0.5),
+            method="bounded",
+            options={"maxiter": 12},
+        )
         return self._path_of(np.array([x[0], end.x]), hold), min(cost, float(end.fun))
 
     def _refined(self, x0: FloatArray, hold: Hold) -> tuple[FloatArray, float]:
@@ -220,10 +209,10 @@ class PathFit:
 
         def rows(x: FloatArray) -> FloatArray:
             # The solver takes small numbers for zero.
-            return self._rows(x, hold) * _SCALE
+            return self._rows(x, hold) * threshold.SCALE
 
         end = scipy.optimize.least_squares(rows, x0, bounds=(low, high), x_scale=scale, max_nfev=30)
-        return end.x, 2.0 * float(end.cost) / _SCALE**2
+        return end.x, 2.0 * float(end.cost) / threshold.SCALE**2
 
     def _path_of(self, x: FloatArray, hold: Hold) -> SignalPath:
         """Parameters are cycles of delay and, where it is not known, the log of the corner."""
@@ -234,9 +223,9 @@ class PathFit:
 
     def _rows(self, x: FloatArray, hold: Hold) -> FloatArray:
         """What is left unexplained, and how unusual the path is."""
-        usual = [_WHOLE_CYCLES * np.sin(np.pi * x[0]) / np.pi]
+        usual = [threshold.WHOLE_CYCLES * np.sin(np.pi * x[0]) / np.pi]
         if x.size == 2:
-            usual.append(_ORDINARY * (x[1] - _USUAL_CORNER))
+            usual.append(threshold.ORDINARY * (x[1] - _USUAL_CORNER))
         return np.concatenate([self.rest(self._path_of(x, hold)), usual])
 
     def rest(self, path: SignalPath) -> FloatArray:

@@ -13,20 +13,9 @@ import numpy as np
 import scipy
 
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.analysis.thresholds import product_model as threshold
 
 TURN = 2.0 * np.pi
-#: A further pair must leave less than this of what the lines differ by from the model.
-_WORTH = 0.8
-#: Further real poles cost little and must be worth it, too.
-_WORTH_REAL = 0.85
-_MOST_PAIRS, _MOST_REAL = 4, 3
-_STEPS = 30
-#: Residuals of neighbours that correlate less than this are scatter, which no mode explains.
-_WHITE = 0.2
-_GRID, _START_DAMPING = 36, (0.02, 0.1)
-#: Damping and delay stay within; pairs up to this far beyond the lines.
-_DAMPING = (5e-4, 0.5)
-_BEYOND = 1.3
 
 
 @dataclass(frozen=True)
@@ -89,9 +78,11 @@ def model_of(x: FloatArray, like: ProductModel) -> ProductModel:
         for i, p in enumerate(like.pairs)
     )
     return ProductModel(
-        float(np.sign(like.gain) * np.exp(x[0])), float(x[1]) / 1e3,
-        tuple(float(np.exp(v)) for v in x[2 : 2 + real]), pairs,
-    )  # fmt: skip
+        float(np.sign(like.gain) * np.exp(x[0])),
+        float(x[1]) / 1e3,
+        tuple(float(np.exp(v)) for v in x[2 : 2 + real]),
+        pairs,
+    )
 
 
 def log_ratio(response: ComplexArray, model: ProductModel, f: FloatArray) -> ComplexArray:
@@ -108,11 +99,13 @@ def fit_product(f: FloatArray, response: ComplexArray, weight: FloatArray) -> Pr
         return None
     w = weight / float(np.sqrt(np.mean(weight**2)))
     best = _start(f, response, w)
-    for _ in range(_MOST_PAIRS):
-        if _alike(w * log_ratio(response, best, f)) < _WHITE:
+    for _ in range(threshold.MOST_PAIRS):
+        if _alike(w * log_ratio(response, best, f)) < threshold.WHITE:
             break
         more = _with_pair(best, f, response, w)
-        if more is None or _cost(more, f, response, w) > _WORTH * _cost(best, f, response, w):
+        if more is None or _cost(more, f, response, w) > threshold.WORTH * _cost(
+            best, f, response, w
+        ):
             break
         best = _with_real(more, f, response, w)
     return _described(best, f, response, w)
@@ -133,7 +126,7 @@ def _cost(model: ProductModel, f: FloatArray, response: ComplexArray, w: FloatAr
 def _start(f: FloatArray, response: ComplexArray, w: FloatArray) -> ProductModel:
     """Gain, delay and up to three real poles; more only where they are worth it."""
     rows = []
-    for real in range(_MOST_REAL + 1):
+    for real in range(threshold.MOST_REAL + 1):
         corners = tuple(f[0] * 0.3 * 4.0**i for i in range(real))
         for sign in (1.0, -1.0):
             unit = ProductModel(sign, 0.0, corners)
@@ -141,7 +134,7 @@ def _start(f: FloatArray, response: ComplexArray, w: FloatArray) -> ProductModel
             rows.append(_refined(replace(unit, gain=sign * size), f, response, w))
     best = rows[0]
     for other in rows[1:]:
-        if _cost(other, f, response, w) < _WORTH_REAL * _cost(best, f, response, w):
+        if _cost(other, f, response, w) < threshold.WORTH_REAL * _cost(best, f, response, w):
             best = other
     return best
 
@@ -151,17 +144,19 @@ def _with_real(
 ) -> ProductModel:
     """Real poles that show only now that a mode is explained."""
     best = model
-    while len(best.poles_hz) < _MOST_REAL:
+    while len(best.poles_hz) < threshold.MOST_REAL:
         tried = [
             _refined(
                 replace(best, gain=sign * best.gain, poles_hz=(*best.poles_hz, corner)),
-                f, response, w,
+                f,
+                response,
+                w,
             )
             for corner in (float(f[0]) / 3.0, float(np.sqrt(f[0] * f[-1])), float(f[-1]))
             for sign in (1.0, -1.0)
-        ]  # fmt: skip
+        ]
         more = min(tried, key=lambda each: _cost(each, f, response, w))
-        if _cost(more, f, response, w) > _WORTH_REAL * _cost(best, f, response, w):
+        if _cost(more, f, response, w) > threshold.WORTH_REAL * _cost(best, f, response, w):
             break
         best = more
     return best
@@ -172,11 +167,11 @@ def _with_pair(
 ) -> ProductModel | None:
     """The best further resonance, antiresonance, or both, from a grid and then refined."""
     left = log_ratio(response, model, f)
-    places = np.geomspace(f[0], f[-1], _GRID)
+    places = np.geomspace(f[0], f[-1], threshold.GRID)
     peaks = f[np.argsort(-np.abs(w * left))[:6]]
     places = np.unique(np.concatenate([places, peaks]))
     tried: list[tuple[float, tuple[Pair, ...]]] = []
-    for damping in _START_DAMPING:
+    for damping in threshold.START_DAMPING:
         poles = [Pair("resonance", float(p), damping) for p in places]
         zeros = [Pair("antiresonance", float(p), damping) for p in places]
         of_poles = np.array([np.log(p.factor(f)) for p in poles])
@@ -193,9 +188,9 @@ def _with_pair(
     for _, pairs in [*tried[:2], *single[:2]]:
         found = _refined(replace(model, pairs=(*model.pairs, *pairs)), f, response, w)
         # A pair alone is simpler than two.
-        price = _WORTH ** len(pairs)
+        price = threshold.WORTH ** len(pairs)
         if best is None or _cost(found, f, response, w) / price < _cost(best, f, response, w) / (
-            _WORTH ** (len(best.pairs) - len(model.pairs))
+            threshold.WORTH ** (len(best.pairs) - len(model.pairs))
         ):
             best = found
     return best
@@ -212,8 +207,10 @@ def _left(left: ComplexArray, w: FloatArray) -> float:
 def _bounds(model: ProductModel, f: FloatArray) -> tuple[FloatArray, FloatArray]:
     real, pairs = len(model.poles_hz), len(model.pairs)
     corner = (np.log(1e-3 * f[0]), np.log(20.0 * f[-1]))
-    pair = ((np.log(f[0] / _BEYOND), np.log(_DAMPING[0])),
-            (np.log(f[-1] * _BEYOND), np.log(_DAMPING[1])))  # fmt: skip
+    pair = (
+        (np.log(f[0] / threshold.BEYOND), np.log(threshold.DAMPING[0])),
+        (np.log(f[-1] * threshold.BEYOND), np.log(threshold.DAMPING[1])),
+    )
     late = 1e3 * 2.0 / float(f[-1])
     low = [-60.0, -0.05 * late, *[corner[0]] * real, *list(pair[0]) * pairs]
     high = [60.0, late, *[corner[1]] * real, *list(pair[1]) * pairs]
@@ -242,7 +239,7 @@ def _refined(
         bounds=(low, high),
         loss="soft_l1",
         f_scale=0.3,
-        max_nfev=_STEPS,
+        max_nfev=threshold.STEPS,
         x_scale="jac",
     )
     return model_of(np.asarray(found.x), model)

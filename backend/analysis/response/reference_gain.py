@@ -21,14 +21,9 @@ from backend.analysis.response.sampling import (
 )
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.analysis.signals.line_spectra import Record
+from backend.analysis.thresholds import reference_gain as threshold
 
 _TURN = 2 * np.pi
-#: A torque of which more than this share (power) is not made of the reference does not follow it.
-_UNRELATED = 0.5
-#: A slower integral than this makes no torque worth speaking of within a measurement.
-_SLOWEST_HZ = 0.2
-#: Gains and current loops that differ by less are the same.
-_SAME_GAIN, _SAME_CORNER = 0.003, 0.03
 
 
 @dataclass(frozen=True)
@@ -43,7 +38,9 @@ class ReferenceLoop:
         corners = (p.current_bandwidth_hz or np.inf for p in (self.path, other.path))
         first, second = (1.0 / corner for corner in corners)
         gain = abs(other.controller.c0 / self.controller.c0 - 1.0)
-        return gain < _SAME_GAIN and abs(second - first) < _SAME_CORNER * max(first, second, 1e-9)
+        return gain < threshold.SAME_GAIN and abs(second - first) < threshold.SAME_CORNER * max(
+            first, second, 1e-9
+        )
 
 
 def reference_gain(
@@ -64,12 +61,12 @@ def reference_gain(
     fit = replace(fit, torque=fit.torque / size, integral_rad_s=integral_rad_s)
     holds: tuple[Hold, ...] = (path.hold,) if hold_known else ("zero", "linear")
     best = ranked(fit, holds)[0]
-    if integral_rad_s is None and fit.corner_rad_s(best) < _TURN * _SLOWEST_HZ:
+    if integral_rad_s is None and fit.corner_rad_s(best) < _TURN * threshold.SLOWEST_HZ:
         fit = replace(fit, integral_rad_s=0.0)
         best = ranked(fit, holds)[0]
     rest = fit.rest(best)
     gain, corner = fit.gains(best)[0], fit.corner_rad_s(best)
-    if gain <= 0 or float(rest @ rest) > _UNRELATED:
+    if gain <= 0 or float(rest @ rest) > threshold.UNRELATED:
         raise ValueError("the torque does not follow the reference: its gain cannot be read")
     return ReferenceLoop(LoopModel(gain * size, gain * size * corner), best)
 

@@ -15,20 +15,7 @@ import numpy as np
 
 from backend.analysis.response.sampling import Hold, hold_response
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
-
-#: What a line may be off by, whatever its scatter says (logarithm).
-_OFF = 0.02
-#: A drive in step with the bus takes references at its cycles: one deviation, in cycles. Where the
-#: path that the mechanics showed is the one that explains the loop, nothing else is looked for.
-_STEADY_CYCLES = 0.3
-#: What a loop's delay and size may differ by from the prediction, one deviation: loop periods of
-#: 62.5 to 250 µs where 50 µs are assumed.
-_LOOP_LATE_S, _LOOP_SIZE = 100e-6, 0.3
-#: A delay is put right where it is so many deviations from the assumed one.
-_SURE = 3.0
-#: Holds whose misfit differs by less than this share are both possible.
-_ALIKE = 1.25
-_FEW = 12
+from backend.analysis.thresholds import reference_path as threshold
 
 
 @dataclass(frozen=True)
@@ -45,8 +32,8 @@ class ReferencePath:
     misfit: float
     closed: ComplexArray
     """The closed loop with this hold and, where it is sure, this delay taken out."""
-    loop_late_s: tuple[float, float] = (0.0, _LOOP_LATE_S)
-    loop_size: tuple[float, float] = (0.0, _LOOP_SIZE)
+    loop_late_s: tuple[float, float] = (0.0, threshold.LOOP_LATE_S)
+    loop_size: tuple[float, float] = (0.0, threshold.LOOP_SIZE)
     """Delay and size (logarithm) of the loop beyond the predicted, each with its deviation."""
 
 
@@ -59,17 +46,17 @@ def reference_paths(
     ``closed`` was evaluated with ``hold``; ``predicted`` is the open loop expected on the lines.
     """
     f = frequency_hz
-    if f.size < _FEW:
+    if f.size < threshold.FEW:
         return (ReferencePath(hold, 0.0, np.inf, np.inf, closed),)
     expected = predicted / (1.0 + predicted)
     s = 1.0 / (1.0 + predicted)
-    weight = 1.0 / np.hypot(deviation, _OFF)
+    weight = 1.0 / np.hypot(deviation, threshold.OFF)
     found = []
     for each in holds:
         given = closed * hold_response(f, rate_hz, hold) / hold_response(f, rate_hz, each)
         found.append(_fitted(each, f, given, expected, s, weight, rate_hz))
     found.sort(key=lambda p: p.misfit)
-    return tuple(p for p in found if p.misfit <= _ALIKE * found[0].misfit)
+    return tuple(p for p in found if p.misfit <= threshold.ALIKE * found[0].misfit)
 
 
 def _fitted(
@@ -80,7 +67,9 @@ def _fitted(
     rows = np.log(closed / expected)
     turn = -2j * np.pi * f
     columns = np.column_stack([turn, s * turn, s])
-    prior = np.diag([rate_hz / _STEADY_CYCLES, 1.0 / _LOOP_LATE_S, 1.0 / _LOOP_SIZE])
+    prior = np.diag(
+        [rate_hz / threshold.STEADY_CYCLES, 1.0 / threshold.LOOP_LATE_S, 1.0 / threshold.LOOP_SIZE]
+    )
     w = weight.copy()
     x, left, covariance = np.zeros(3), rows, np.eye(3)
     for _ in range(4):
@@ -93,7 +82,7 @@ def _fitted(
         w = weight / np.sqrt(1.0 + (np.abs(left) * weight / 3.0) ** 2)
     misfit = float(np.sqrt(np.mean((np.abs(left) * w) ** 2)))
     stds = np.sqrt(np.diag(covariance)) * max(misfit, 1.0)
-    late = float(x[0]) if abs(x[0]) > _SURE * stds[0] else 0.0
+    late = float(x[0]) if abs(x[0]) > threshold.SURE * stds[0] else 0.0
     return ReferencePath(
         hold, float(x[0]), float(stds[0]), misfit, np.asarray(closed * np.exp(-turn * late)),
         (float(x[1]), float(stds[1])), (float(x[2]), float(stds[2])),

@@ -19,22 +19,12 @@ from backend.analysis.response.local_polynomial import smooth_residual
 from backend.analysis.response.modes_found import FoundMode
 from backend.analysis.response.product_model import ProductModel, jacobian
 from backend.analysis.signals.arrays import ComplexArray, FloatArray, neighbour_mean
+from backend.analysis.thresholds import repeat_band as threshold
 
-#: Lines to each side of the local parabola, and of the mean of what it leaves.
-_REACH, _POOL = 6, 8
-#: One deviation each, fitted to simulated benches (two masses with Coulomb and Stribeck friction,
-#: backlash, ripple; 0.5 to 2 times the level): `benchmarks/import_accuracy.py` prints the coverage.
-MODE_SHIFT, DAMPING_SHIFT = 0.004, 0.25
-#: The pole that friction makes goes with 1/level: at half the level it has twice its frequency,
-#: which 1.96 deviations are to reach.
-FRICTION_SHIFT = 0.5
-#: A pole is friction's, not a filter's, up to so many times the lowest line.
-_FRICTION_BELOW = 2.0
-#: Gain of any two runs: by temperature of magnets and amplifier (1 %), and by the place where each
-#: of them happens to stand, as a motor's torque goes with its place by 1 to 3 % (two places of a
-#: ripple of 2 % differ by 2 %, one deviation). A run that hardly travels shows nothing of it.
-_BY_TEMPERATURE, _BY_PLACE = 0.01, 0.02
-_GAIN = float(np.hypot(_BY_TEMPERATURE, _BY_PLACE))
+MODE_SHIFT = threshold.MODE_SHIFT
+DAMPING_SHIFT = threshold.DAMPING_SHIFT
+FRICTION_SHIFT = threshold.FRICTION_SHIFT
+_GAIN = float(np.hypot(threshold.BY_TEMPERATURE, threshold.BY_PLACE))
 #: Phase by sampling.
 _TURN = 0.01
 #: Two runs differ by the variances of both; at half the level noise and what friction distorts are
@@ -61,8 +51,8 @@ def line_scatter(left: ComplexArray, known: FloatArray) -> FloatArray:
 
     ``known`` [lines] is the part that noise explains; the roughness is never less.
     """
-    rough, kept = smooth_residual(left, _REACH)
-    variance = neighbour_mean(np.abs(rough) ** 2 / (2.0 * np.maximum(kept, 0.2)), _POOL)
+    rough, kept = smooth_residual(left, threshold.REACH)
+    variance = neighbour_mean(np.abs(rough) ** 2 / (2.0 * np.maximum(kept, 0.2)), threshold.POOL)
     return np.asarray(np.sqrt(np.maximum(variance, known**2)))
 
 
@@ -93,7 +83,7 @@ def _level_changes(
         changes.append(np.asarray(MODE_SHIFT * slopes[:, column]))
         changes.append(np.asarray(DAMPING_SHIFT * slopes[:, column + 1]))
     lowest = min(model.poles_hz, default=np.inf)
-    if lowest < _FRICTION_BELOW * f[0]:
+    if lowest < threshold.FRICTION_BELOW * f[0]:
         # The pole moves while the inertia, and so the gain well above it, stays.
         changes.append(np.asarray(-FRICTION_SHIFT / (1.0 + 1j * f / lowest)))
     return changes

@@ -15,14 +15,7 @@ from backend.analysis.response.frf import Frf
 from backend.analysis.response.sampling import SignalPath, lag_response
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.analysis.signals.line_spectra import Record, good_periods, period_spectra
-
-#: A speed may be a mean over so many cycles; it is one where half of the upper
-#: lines differ by less.
-_MOST_CYCLES, _SAME = 16, 0.01
-#: A torque that follows its command faster than this is the command; current loops are slower.
-_COMMANDED_HZ, _USUAL_HZ = 3500.0, 1000.0
-#: A lag that is not reported is not slower, and what is left of its delay, one deviation.
-_SLOWEST_HZ, _LATE_S = 250.0, 60e-6
+from backend.analysis.thresholds import reported as threshold
 
 
 def mean_cycles(records: tuple[Record, ...]) -> int | None:
@@ -34,11 +27,11 @@ def mean_cycles(records: tuple[Record, ...]) -> int | None:
     if any(r.position is None or r.excitation.segments for r in records):
         return None
     left = []
-    for cycles in range(1, _MOST_CYCLES + 1):
+    for cycles in range(1, threshold.MOST_CYCLES + 1):
         shares = [_apart(r, cycles) for r in records]
         left.append(float(np.median(np.concatenate(shares))))
     best = int(np.argmin(left))
-    return best + 1 if left[best] < _SAME else None
+    return best + 1 if left[best] < threshold.SAME else None
 
 
 def _apart(record: Record, cycles: int) -> FloatArray:
@@ -58,12 +51,14 @@ def _apart(record: Record, cycles: int) -> FloatArray:
 
 def commanded(path: SignalPath) -> bool:
     """Whether the reported torque is the command: no current loop lies between them."""
-    return path.current_bandwidth_hz is not None and path.current_bandwidth_hz > _COMMANDED_HZ
+    return (
+        path.current_bandwidth_hz is not None and path.current_bandwidth_hz > threshold.COMMANDED_HZ
+    )
 
 
 def current_uncertainty(frequency_hz: FloatArray) -> ComplexArray:
     """Logarithm of what an ordinary current loop takes that no recording shows, but its delay."""
-    return _without_delay(frequency_hz, np.log(lag_response(frequency_hz, _USUAL_HZ)))
+    return _without_delay(frequency_hz, np.log(lag_response(frequency_hz, threshold.USUAL_HZ)))
 
 
 def slow_uncertainty(frequency_hz: FloatArray, corner_hz: float) -> ComplexArray:
@@ -71,8 +66,8 @@ def slow_uncertainty(frequency_hz: FloatArray, corner_hz: float) -> ComplexArray
 
     A slow torque is an ordinary current loop behind a filter as well as one slow lag.
     """
-    own_s, usual_s = 1.0 / corner_hz, 1.0 / _USUAL_HZ
-    two = lag_response(frequency_hz, _USUAL_HZ) * lag_response(
+    own_s, usual_s = 1.0 / corner_hz, 1.0 / threshold.USUAL_HZ
+    two = lag_response(frequency_hz, threshold.USUAL_HZ) * lag_response(
         frequency_hz, 1.0 / max(own_s - usual_s, 1e-6)
     )
     return np.asarray(np.log(two / lag_response(frequency_hz, corner_hz)))
@@ -81,11 +76,12 @@ def slow_uncertainty(frequency_hz: FloatArray, corner_hz: float) -> ComplexArray
 def path_uncertainty(frequency_hz: FloatArray) -> ComplexArray:
     """Logarithm of what a path may take that neither the drive nor its torque explains.
 
-    One lag more as slow as current loops hardly are, the delay of which is found to `_LATE_S`.
+    One lag more as slow as current loops hardly are, the delay of which is found to
+    `threshold.LATE_S`.
     """
     f = np.asarray(frequency_hz, dtype=np.float64)
-    form = _without_delay(f, np.log(lag_response(f, _SLOWEST_HZ)))
-    return np.asarray(form.real + 1j * np.hypot(form.imag, 2 * np.pi * f * _LATE_S))
+    form = _without_delay(f, np.log(lag_response(f, threshold.SLOWEST_HZ)))
+    return np.asarray(form.real + 1j * np.hypot(form.imag, 2 * np.pi * f * threshold.LATE_S))
 
 
 def charged(frf: Frf, lines_hz: FloatArray, uncertainty: ComplexArray) -> Frf:

@@ -22,10 +22,9 @@ from backend.analysis.response.sampling import (
     reported_response,
 )
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.analysis.thresholds import sampled_model as threshold
 
 TURN = 2.0 * np.pi
-#: Nothing comes back from above this, whatever the sample rate.
-_HIGHEST_IMAGE_HZ = 6000.0
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,7 @@ class Sampler:
     ) -> Sampler:
         """Precompute for these lines."""
         f = np.asarray(frequency_hz, dtype=np.float64)
-        images = int(np.clip(np.ceil(_HIGHEST_IMAGE_HZ / path.sample_rate_hz), 2, 6))
+        images = int(np.clip(np.ceil(threshold.HIGHEST_IMAGE_HZ / path.sample_rate_hz), 2, 6))
         all_f = f[None, :] + np.arange(-images, images + 1)[:, None] * path.sample_rate_hz
         lag = lag_response(all_f, path.current_bandwidth_hz)
         delay = delay_response(all_f, path.command_delay_s)

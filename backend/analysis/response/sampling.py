@@ -15,18 +15,16 @@ import numpy as np
 import scipy
 
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.analysis.thresholds import sampling as threshold
 
 Hold = Literal["zero", "linear"]
 
-#: Direct estimates hold to this share of the sample rate, sampled-data models to the second.
-DIRECT_SHARE = 0.25
-MODEL_SHARE = 0.4
+DIRECT_SHARE = threshold.DIRECT_SHARE
+MODEL_SHARE = threshold.MODEL_SHARE
 
-#: A drive interpolates in the steps of its own loop (50 µs) and so is half a step ahead of a line.
-STEP_LEAD_S = 25e-6
+STEP_LEAD_S = threshold.STEP_LEAD_S
 
-#: An ordinary current loop's corner, where nobody tells one.
-USUAL_CURRENT_HZ = 1000.0
+USUAL_CURRENT_HZ = threshold.USUAL_CURRENT_HZ
 
 
 @dataclass(frozen=True)

@@ -11,20 +11,13 @@ from backend.analysis.mechanics.model_fit import Solution
 from backend.analysis.response.frf import Frf, valid_band_hz
 from backend.analysis.response.sampling import DIRECT_SHARE, hold_response
 from backend.analysis.signals.arrays import ComplexArray, FloatArray, neighbour_mean
+from backend.analysis.thresholds import stated_band as threshold
 
-#: One standard deviation of what hold, lag and delay leave unexplained however long one measures.
-SYSTEMATIC_DB = 0.05
-SYSTEMATIC_DEG = 0.35
+SYSTEMATIC_DB = threshold.SYSTEMATIC_DB
+SYSTEMATIC_DEG = threshold.SYSTEMATIC_DEG
 
-#: So much of what is taken out as images may be wrong beside what the model's uncertainty says.
-_IMAGES_LEFT = 0.08
 
-#: By a model, an answer holds while 95 of 100 cases lie within these limits of it.
-_KNOWN_DB, _KNOWN_DEG, _CI95 = 2.0, 15.0, 1.96
-
-#: What no model explains is shown to this share of the sample rate; its misfit is a mean over so
-#: many lines to each side.
-_UNTRUSTED_SHARE, _AROUND = 0.1, 6
+_CI95 = 1.96
 
 
 def unexplained(raw: Frf, solution: Solution, view: int) -> Frf:
@@ -37,7 +30,7 @@ def unexplained(raw: Frf, solution: Solution, view: int) -> Frf:
     misfit = solution.problem.logs(solution.x)[0][view]
     hold = np.log(hold_response(f, rate, "zero"))
     size, turn = (
-        np.hypot(neighbour_mean(np.abs(left), _AROUND), known)
+        np.hypot(neighbour_mean(np.abs(left), threshold.AROUND), known)
         for left, known in ((misfit.real, hold.real), (misfit.imag, hold.imag))
     )
     low, high = raw.valid_band_hz
@@ -45,7 +38,7 @@ def unexplained(raw: Frf, solution: Solution, view: int) -> Frf:
         raw,
         std_db=np.hypot(raw.std_db, 20 / np.log(10) * size),
         std_deg=np.hypot(raw.std_deg, np.degrees(turn)),
-        valid_band_hz=(low, min(high, _UNTRUSTED_SHARE * rate)),
+        valid_band_hz=(low, min(high, threshold.UNTRUSTED_SHARE * rate)),
     )
 
 
@@ -60,8 +53,13 @@ def ended_where_unknown(frf: Frf) -> Frf:
     above = (f > direct_hz) & (f <= high)
     if not np.any(above):
         return frf
-    rough = np.maximum(frf.std_db / _KNOWN_DB, frf.std_deg / _KNOWN_DEG)[above] * _CI95
-    known = f[above][scipy.ndimage.median_filter(rough, 2 * _AROUND + 1, mode="nearest") <= 1.0]
+    rough = (
+        np.maximum(frf.std_db / threshold.KNOWN_DB, frf.std_deg / threshold.KNOWN_DEG)[above]
+        * _CI95
+    )
+    known = f[above][
+        scipy.ndimage.median_filter(rough, 2 * threshold.AROUND + 1, mode="nearest") <= 1.0
+    ]
     if known.size and known[-1] == f[above][-1]:
         return frf
     return replace(frf, valid_band_hz=(low, float(np.max(known, initial=direct_hz))))
@@ -127,7 +125,7 @@ def without_images(
     """The lines without what sampling folds back, and the band that is left to them."""
     # The correction is as uncertain as the model: a part of it stays in the band, too.
     return replace(
-        widened(direct, factor, _IMAGES_LEFT, uncertainty),
+        widened(direct, factor, threshold.IMAGES_LEFT, uncertainty),
         response=np.asarray(direct.response / factor),
         valid_band_hz=valid_band_hz(
             float(direct.frequency_hz[0]), direct.sample_rate_hz, model=True, jitter_s=jitter_s

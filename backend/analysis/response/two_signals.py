@@ -14,10 +14,7 @@ from backend.analysis.response.sampled_model import SampledFit
 from backend.analysis.response.sampling import SignalPath, delay_response, lag_response
 from backend.analysis.response.uncertainty import Uncertainty
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
-
-#: Of what the two are folded differently by, so much may be wrong: a drive's speed is not quite a
-#: filter of first order.
-_NOT_QUITE = 0.1
+from backend.analysis.thresholds import two_signals as threshold
 
 
 @dataclass(frozen=True)
@@ -74,7 +71,7 @@ def _without_first_image(velocity: Way, position: Way, fit: SampledFit) -> Way:
         return np.asarray(np.abs(share) * a + np.abs(1.0 - share) * b)
 
     one, other = velocity.lines, position.lines
-    apart = _NOT_QUITE * np.abs(velocity.factor - position.factor)
+    apart = threshold.NOT_QUITE * np.abs(velocity.factor - position.factor)
 
     def wider(a: ComplexArray, b: ComplexArray) -> ComplexArray:
         size, turn = both(a.real, b.real), both(a.imag, b.imag)
@@ -90,6 +87,8 @@ def _without_first_image(velocity: Way, position: Way, fit: SampledFit) -> Way:
         distortion=both(one.distortion, other.distortion),
     )
     return Way(
-        lines, mixed(velocity.factor, position.factor),
-        wider(velocity.corrected, position.corrected), wider(velocity.direct, position.direct),
-    )  # fmt: skip
+        lines,
+        mixed(velocity.factor, position.factor),
+        wider(velocity.corrected, position.corrected),
+        wider(velocity.direct, position.direct),
+    )

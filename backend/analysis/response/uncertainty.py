@@ -82,11 +82,13 @@ def uncertainty(
         plain = np.vstack([_late_slopes(problem, view, x), *raw])
         direct.append(_spread(plain, covariance))
     return Uncertainty(
-        tuple(corrected), tuple(direct), step[x.size :],
+        tuple(corrected),
+        tuple(direct),
+        step[x.size :],
         np.sqrt(np.maximum(np.diag(covariance)[x.size :], 0.0)),
         # All lines together may be explained better than each of a few is known.
         covariance[: x.size, : x.size] / min(variance, 1.0),
-    )  # fmt: skip
+    )
 
 
 def _moved(

@@ -23,15 +23,11 @@ from backend.analysis.response.sampling import (
 )
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from backend.analysis.signals.excitation import Excitation, Segment
+from backend.analysis.thresholds import line_spectra as threshold
 
 #: *torque_mode*: nothing but the injection makes torque. *torque_injection*: a speed or position
 #: loop adds its own torque. *closed_loop*: from the loop's reference to the response.
 Quantity = Literal["torque_mode", "torque_injection", "closed_loop"]
-
-#: The lag of the speed is read below this share of the sample rate, and is no longer than this.
-_TELLING, _LATEST_S = 0.2, 2e-3
-#: Points between samples at which the direction of motion is looked at.
-_FINER = 4
 
 
 @dataclass(frozen=True)
@@ -258,14 +254,14 @@ def speed_lag_s(records: tuple[Record, ...], path: SignalPath) -> float:
         good, _ = good_periods(record)
         if not good:
             continue
-        use = e.line_hz <= _TELLING * path.sample_rate_hz
+        use = e.line_hz <= threshold.TELLING * path.sample_rate_hz
         w = 2 * np.pi * e.line_hz[use]
         seen = period_spectra(record.response, e, good).mean(axis=0)[use]
         moved = velocity_from_position(record, e, good, path.sample_rate_hz).mean(axis=0)[use]
         weight = np.abs(seen) * np.abs(moved)
         turned -= float(np.sum(weight * w * np.angle(seen * moved.conj())))
         weights += float(np.sum(weight * w**2))
-    return float(np.clip(turned / weights, 0.0, _LATEST_S)) if weights > 0 else known
+    return float(np.clip(turned / weights, 0.0, threshold.LATEST_S)) if weights > 0 else known
 
 
 def friction_direction(
@@ -289,14 +285,14 @@ def _direction(velocity: FloatArray, lag_s: float, rate_hz: float) -> FloatArray
     lag is taken out of it before (as of a first-order filter). What swings near half the sample
     rate is no straight line from sample to sample; it is interpolated as the band allows.
     """
-    fine = scipy.signal.resample_poly(velocity, _FINER, 1, window=("kaiser", 8.0))
-    fine = fine + lag_s * rate_hz * _FINER * np.gradient(fine)
+    fine = scipy.signal.resample_poly(velocity, threshold.FINER, 1, window=("kaiser", 8.0))
+    fine = fine + lag_s * rate_hz * threshold.FINER * np.gradient(fine)
     after = np.append(fine[1:], fine[-1])
     rise = after - fine
     moving = np.abs(rise) > 1e-12
     safe = np.where(moving, rise, 1.0)
     mean = np.where(moving, (np.abs(after) - np.abs(fine)) / safe, np.sign(fine))
-    return np.asarray(mean.reshape(-1, _FINER).mean(axis=1))
+    return np.asarray(mean.reshape(-1, threshold.FINER).mean(axis=1))
 
 
 def _centre_of_interval(frequency_hz: FloatArray, sample_rate_hz: float) -> ComplexArray:

@@ -15,13 +15,7 @@ import numpy as np
 from backend.analysis.signals.arrays import ComplexArray, FloatArray, IntArray
 from backend.analysis.signals.excitation import Excitation
 from backend.analysis.signals.line_spectra import Record
-
-#: At most so many swings; each must stand so far above what lies around it (power).
-_MOST, _ABOVE = 5, 40.0
-#: Bins around a peak that are looked at, and around which its surroundings are judged.
-_NEAR, _AROUND = 5, 15
-#: A swing that is gone within a period spoils nothing; one that does not decay is none.
-_GONE, _STEADY = 0.02, 0.97
+from backend.analysis.thresholds import transient_removal as threshold
 
 
 @dataclass(frozen=True)
@@ -76,28 +70,28 @@ def _poles(records: tuple[Record, ...]) -> ComplexArray:
     found: list[complex] = []
     power = np.sum(np.abs(spectra) ** 2, axis=0)
     level = _surroundings(power)
-    for _ in range(_MOST):
+    for _ in range(threshold.MOST):
         ratio = power / level
-        ratio[:lowest], ratio[-_NEAR:] = 0.0, 0.0
+        ratio[:lowest], ratio[-threshold.NEAR :] = 0.0, 0.0
         k = int(np.argmax(ratio))
-        if ratio[k] < _ABOVE:
+        if ratio[k] < threshold.ABOVE:
             break
         pole = _pole_at(spectra, k, m)
         shape = _shape(pole, np.arange(spectra.shape[1]), m)
-        near = slice(max(k - _NEAR, 0), k + _NEAR + 1)
+        near = slice(max(k - threshold.NEAR, 0), k + threshold.NEAR + 1)
         size = (spectra[:, near] @ shape[near].conj()) / np.sum(np.abs(shape[near]) ** 2)
         spectra = spectra - size[:, None] * shape
         power = np.sum(np.abs(spectra) ** 2, axis=0)
         power[near] = np.minimum(power[near], level[near])
-        if _GONE < abs(np.exp(pole * e.period_samples)) < _STEADY:
+        if threshold.GONE < abs(np.exp(pole * e.period_samples)) < threshold.STEADY:
             found.append(pole)
     return np.array(found, dtype=np.complex128)
 
 
 def _surroundings(power: FloatArray) -> FloatArray:
     """Running median."""
-    padded = np.pad(power, _AROUND, mode="reflect")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * _AROUND + 1)
+    padded = np.pad(power, threshold.AROUND, mode="reflect")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * threshold.AROUND + 1)
     return np.asarray(np.median(windows, axis=1) + 1e-300)
 
 
@@ -109,7 +103,7 @@ def _shape(pole: complex, bins: IntArray, m: int) -> ComplexArray:
 
 def _pole_at(spectra: ComplexArray, k: int, m: int) -> complex:
     """The pole that explains most of the bins around a peak, by two grids, each finer."""
-    bins = np.arange(max(k - _NEAR, 1), k + _NEAR + 1)
+    bins = np.arange(max(k - threshold.NEAR, 1), k + threshold.NEAR + 1)
     data = spectra[:, bins]
     place, step, decay, factor = float(k), 0.15, 1.0, 1.5
     for _ in range(4):

@@ -366,10 +366,12 @@ async def load_set(bench: TheBench, connected: Controlled, request: LoadSetReque
     bench.journal.add(
         text(
             "journal.load-set-version" if request.version else "journal.load-set",
-            drive=connected.drive.name, file=request.file, version=request.version,
+            drive=connected.drive.name,
+            file=request.file,
+            version=request.version,
         ),
         drive=connected.drive.id,
-    )  # fmt: skip
+    )
     return convert.job(job)
 
 

@@ -32,9 +32,10 @@ from drivers.texts.message import Text, joined, text
 
 router = APIRouter(prefix="/drives/{drive_id}")
 _QUANTITIES = {
-    Quantity.POSITION: text("journal.position"), Quantity.VELOCITY: text("journal.velocity"),
+    Quantity.POSITION: text("journal.position"),
+    Quantity.VELOCITY: text("journal.velocity"),
     Quantity.ACCELERATION: text("journal.acceleration"),
-}  # fmt: skip
+}
 _ORIGINS = {
     Origin.MANUAL: text("journal.origin-manual"),
     Origin.MAKERS_FILE: text("journal.origin-makers-file"),
@@ -42,7 +43,7 @@ _ORIGINS = {
     Origin.USER: text("journal.origin-user"),
     Origin.MEASURED: text("journal.origin-measured"),
     Origin.UNKNOWN: text("journal.origin-unknown"),
-}  # fmt: skip
+}
 _UNITS = {"position": "rev", "velocity": "rpm", "acceleration": "rpm/s"}
 
 
@@ -132,9 +133,10 @@ def _line(scale: Scale) -> Text:
     return text(
         "journal.scale" if known else "journal.scale-not-certain",
         quantity=_QUANTITIES[scale.quantity],
-        raw=f"{scale.raw_per_unit:.6g}" if known else "", unit=_UNITS[scale.quantity],
+        raw=f"{scale.raw_per_unit:.6g}" if known else "",
+        unit=_UNITS[scale.quantity],
         origin=_ORIGINS[scale.origin],
-    )  # fmt: skip
+    )
 
 
 def _info(connected: ConnectedDrive, units: AxisUnits) -> ScalesInfo:

@@ -31,9 +31,10 @@ class HandoverChoice(Message):
     only: list[Annotated[str, Field(max_length=40)]] = Field(default=[], max_length=5000)
     include_motor_individual: bool = False
     esi: list[_Esi] = Field(
-        default=[], max_length=_MOST_AXES,
+        default=[],
+        max_length=_MOST_AXES,
         description="ESI files (base64) of the drives, for an ENI that a master can run",
-    )  # fmt: skip
+    )
 
 
 class HandoverRequest(HandoverChoice):

@@ -30,10 +30,12 @@ class Jogs:
         """A sign of life of a press, or of its release."""
         if (hold := self._holds.get(sign.drive)) is not None:
             hold.renew(
-                sign.press, sign.sign,
+                sign.press,
+                sign.sign,
                 sent_s=None if sign.sent_ms is None else sign.sent_ms / 1e3,
-                silent_s=sign.silent_ms / 1e3, pressed=sign.pressed,
-            )  # fmt: skip
+                silent_s=sign.silent_ms / 1e3,
+                pressed=sign.pressed,
+            )
 
     def release(self, drive: str | None, reason: str, press: int = 0) -> None:
         """End the jog of one axis, or all; of one press, or whatever is held."""

@@ -82,9 +82,11 @@ class JogRenew(Message):
         default=None, allow_inf_nan=False, description="when it was sent, by the sender's own clock"
     )
     silent_ms: float = Field(
-        default=0.0, ge=0, allow_inf_nan=False,
+        default=0.0,
+        ge=0,
+        allow_inf_nan=False,
         description="how long the page had not been heard by its worker then",
-    )  # fmt: skip
+    )
     pressed: bool = Field(default=True, description="False: the button was let go")
 
 

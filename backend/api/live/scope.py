@@ -50,8 +50,9 @@ class _Running:
 class ScopeStreams:
     """All subscriptions of one connection. ``tell`` queues a text message to the page."""
 
-    def __init__(self, bench: Bench, name: str, tell: Callable[[BaseModel], None],
-                 send: SendBytes) -> None:  # fmt: skip
+    def __init__(
+        self, bench: Bench, name: str, tell: Callable[[BaseModel], None], send: SendBytes
+    ) -> None:
         self._bench = bench
         self._name = name
         self._tell = tell

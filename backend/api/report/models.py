@@ -19,9 +19,10 @@ class ReportRequest(Message):
     machine: str = Field(default="", max_length=200)
     notes: str = Field(default="", max_length=8000)
     measurements: list[Annotated[str, Field(max_length=200)]] | None = Field(
-        default=None, max_length=40,
+        default=None,
+        max_length=40,
         description="files; null: the newest of each kind, with the one before tuning",
-    )  # fmt: skip
+    )
 
 
 class ReportInfo(Message):

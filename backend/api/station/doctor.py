@@ -10,7 +10,6 @@ from pydantic import BaseModel
 from backend.api.context import TheBench
 from backend.api.errors import NotFound
 from drivers.doctor.diagnosis import Cause
-from drivers.doctor.examined import Examines
 from drivers.errors import NotAllowed
 
 router = APIRouter()
@@ -58,18 +57,20 @@ async def bus_doctor(
     link = bench.buses.opened.get(url)
     if link is None:
         raise NotFound("api-station.no-opened-bus", value=url)
-    if not isinstance(link, Examines):
+    doctor = link.doctor
+    if doctor is None:
         raise NotAllowed("api-station.doctor-knows-not", value=url)
-    seen = [station] if station is not None else sorted(await link.stations_known())
+    seen = [station] if station is not None else sorted(await doctor.stations_known())
     found = []
     for number in seen:
-        examined = await link.examination(number)
+        examined = await doctor.examination(number)
         found.append(
             StationDiagnosis(
-                station=number, reached=examined.reached,
+                station=number,
+                reached=examined.reached,
                 causes=[_cause(each) for each in examined.causes],
             )
-        )  # fmt: skip
+        )
     return found
 
 

@@ -137,9 +137,7 @@ async def write_alias(
     return Response(status_code=204)
 
 
-@router.post(
-    "/drives/{drive_id}/jobs/firmware", status_code=202, openapi_extra=_FIRMWARE_BODY
-)  # fmt: skip
+@router.post("/drives/{drive_id}/jobs/firmware", status_code=202, openapi_extra=_FIRMWARE_BODY)
 async def load_firmware(
     bench: TheBench,
     connected: Controlled,

@@ -10,7 +10,6 @@ from backend.api.context import TheBench
 from backend.api.errors import NotFound
 from backend.recording.flight import file_name
 from drivers.errors import NotAllowed
-from drivers.link import RecordsFrames
 
 router = APIRouter()
 
@@ -32,8 +31,8 @@ async def bus_flight(
     link = bench.buses.opened.get(url)
     if link is None:
         raise NotFound("api-station.no-opened-bus", value=url)
-    if not isinstance(link, RecordsFrames):
+    if link.frames is None:
         raise NotAllowed("api-station.frames-not-recorded", value=url)
-    data = await link.flight(station)
+    data = await link.frames.flight(station)
     headers = {"content-disposition": f'attachment; filename="{file_name(url)}"'}
     return Response(data, media_type="application/octet-stream", headers=headers)

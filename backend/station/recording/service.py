@@ -25,9 +25,11 @@ from drivers.texts.message import Text, text
 #: Running at once; each has a file and a thread.
 MAX_RUNNING = 8
 _ENDS: dict[EndReason, Text] = {
-    "stopped": text("journal.stopped"), "its time is over": text("journal.time-is-over"),
-    "failed": text("journal.failed"), "servodeck was ended": text("journal.servodeck-ended"),
-}  # fmt: skip
+    "stopped": text("journal.stopped"),
+    "its time is over": text("journal.time-is-over"),
+    "failed": text("journal.failed"),
+    "servodeck was ended": text("journal.servodeck-ended"),
+}
 
 
 class Recordings:
@@ -131,9 +133,11 @@ class Recordings:
         written = recorder.written()
         line = text(
             "journal.recording-ended-lost" if recorder.lost else "journal.recording-ended",
-            name=recorder.name, reason=_ENDS[recorder.ended_by],
-            samples=written.samples, lost=recorder.lost,
-        )  # fmt: skip
+            name=recorder.name,
+            reason=_ENDS[recorder.ended_by],
+            samples=written.samples,
+            lost=recorder.lost,
+        )
         self.bench.journal.add(line, level="warning" if recorder.lost else "info")
 
     async def _prune(self) -> None:

@@ -29,13 +29,8 @@ from backend.tools.autotune.present import Trials, judged
 from backend.tools.autotune.verdict import fixed_of
 from backend.tools.autotune.verify import LOOKS, MOST_PAIRS, Verified, sharp_margins
 from backend.tools.measuring.temporary import write_settings
+from backend.tools.thresholds import autotune_again as threshold
 from drivers.texts.message import Text, joined, text
-
-#: A prediction stands within these: share of the -3 dB point, dB and degrees. The aims are 10 %,
-#: 3 dB and 6° (tuning.md, section 5).
-_WIDTH, _DB, _DEG = 0.08, 3.0, 6.0
-#: Gains that differ by less are the same.
-_SAME = 0.02
 
 #: What came of it. *same*: the design holds for the axis as its loop shows it, too, and was
 #: verified once more; *other*: another one took its place; *not kept*: that one was verified and
@@ -145,7 +140,7 @@ async def first_that_holds(
         held, reported = await again(trials, applied, how)
         if held is not None:
             return held, reported
-        gain = (1.0 - _SAME) * applied.candidate.gains.speed_nms
+        gain = (1.0 - threshold.SAME) * applied.candidate.gains.speed_nms
         order = [row for row in order if row.gains.speed_nms < gain]
     return None, reported
 
@@ -241,13 +236,13 @@ def contradictions(predicted: Figures, measured: Figures) -> list[Text]:
     """What a prediction is too far off by; what is not shown contradicts nothing."""
     said = []
     want, have = predicted.bandwidth_hz, measured.bandwidth_hz
-    if want and have and abs(have / want - 1.0) > _WIDTH:
+    if want and have and abs(have / want - 1.0) > threshold.WIDTH:
         said.append(text("autotune.other-width", have_hz=have, wanted_hz=want))
     want, have = predicted.phase_margin_deg, measured.phase_margin_deg
-    if want is not None and have is not None and abs(have - want) > _DEG:
+    if want is not None and have is not None and abs(have - want) > threshold.DEG:
         said.append(text("autotune.other-phase-margin", have_deg=have, wanted_deg=want))
     want, have = predicted.gain_margin_db, measured.gain_margin_db
-    if want is not None and have is not None and abs(have - want) > _DB:
+    if want is not None and have is not None and abs(have - want) > threshold.DB:
         said.append(text("autotune.other-gain-margin", have_db=have, wanted_db=want))
     return said
 
@@ -269,7 +264,7 @@ def _closed(
 
 
 def _alike(one: Candidate, other: Candidate) -> bool:
-    near = abs(other.gains.speed_nms / one.gains.speed_nms - 1.0) < _SAME
+    near = abs(other.gains.speed_nms / one.gains.speed_nms - 1.0) < threshold.SAME
     return near and one.notches == other.notches and one.filters == other.filters
 
 

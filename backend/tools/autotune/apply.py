@@ -16,14 +16,13 @@ from backend.tools.autotune.time_budget import TimeLeft
 from backend.tools.autotune.verify import HUM_PERCENT, Check, Keep, Verified, of_candidate, verify
 from backend.tools.measuring.interrupted import ends_all
 from backend.tools.measuring.temporary import put_back_in_time, write_settings
+from backend.tools.thresholds import autotune_apply as threshold
 from backend.work.jobs import Progress
 from drivers.errors import DriveError
 from drivers.texts.message import Text, joined, text
 
 #: A candidate with this share of its gain; None where that keeps no margins.
 Softer = Callable[[Candidate, float], Awaitable[Candidate | None]]
-#: So often a candidate that hums is made softer, and to this share of the hum that is permitted.
-_SOFTENED, _QUIETER = 2, 0.85
 
 
 @dataclass(frozen=True)
@@ -90,10 +89,14 @@ async def first_kept(
             if verified.why is not None:
                 tried.append(verified.why)
             await take_back(axis, before)
-        if softer is not None and verified.hum_percent is not None and softened < _SOFTENED:
+        if (
+            softer is not None
+            and verified.hum_percent is not None
+            and softened < threshold.SOFTENED
+        ):
             softened += 1
             # A sensor's noise comes back as torque by the gain.
-            less = await softer(candidate, _QUIETER * HUM_PERCENT / verified.hum_percent)
+            less = await softer(candidate, threshold.QUIETER * HUM_PERCENT / verified.hum_percent)
             if less is not None:
                 waiting = _in_turn(waiting, candidate, less)
     return None

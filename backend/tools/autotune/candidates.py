@@ -20,15 +20,8 @@ from backend.tools.notch import effect as notch_effect
 from backend.tools.notch import filters as notch_tool
 from backend.tools.notch.meaning import meaning_of
 from backend.tools.sweep.evaluation import SweepResult
+from backend.tools.thresholds import autotune_candidates as threshold
 from drivers.texts.message import Text, text
-
-#: A loop can be verified up to this share of the sample rate, so none is designed above it.
-_VERIFIABLE = 0.2
-#: The -3 dB point must lie below this share; the highest gain is lowered so many times for it.
-_SEEN, _NARROWINGS = 0.23, 4
-#: Lines that a cautious design believes.
-_COHERENT = 0.8
-
 
 _UNMET: dict[LoadClass, Text] = {
     "stiff": text("autotune.no-design-stiff"),
@@ -67,7 +60,7 @@ def candidates_for(
     loops = gain_tool.loops_of(drive, facts)
     if filters:
         loops = replace(loops, choices=gain_tool.filter_choices(drive, loops.filters))
-    verifiable = None if sample_rate_hz is None else _VERIFIABLE * sample_rate_hz
+    verifiable = None if sample_rate_hz is None else threshold.VERIFIABLE * sample_rate_hz
     limits = [hz for hz in (loops.highest_speed_bandwidth_hz, verifiable, highest_hz) if hz]
     loops = replace(loops, highest_speed_bandwidth_hz=min(limits, default=None))
     meaning = meaning_of(drive)
@@ -89,12 +82,12 @@ def _seen_by_the_bus(
 ) -> tuple[Candidate, ...]:  # fmt: skip
     """Slower designs as long as the -3 dB point of one lies above what this bus can see."""
     table: tuple[Candidate, ...] = ()
-    for _ in range(_NARROWINGS):
+    for _ in range(threshold.NARROWINGS):
         table = designed(loops)
         widest = max((c.bandwidth_hz or np.inf for c in table if c.marks), default=0.0)
-        if sample_rate_hz is None or widest <= _SEEN * sample_rate_hz:
+        if sample_rate_hz is None or widest <= threshold.SEEN * sample_rate_hz:
             break
-        share = max(_SEEN * sample_rate_hz / widest, 0.5)
+        share = max(threshold.SEEN * sample_rate_hz / widest, 0.5)
         loops = replace(
             loops, highest_speed_bandwidth_hz=share * (loops.highest_speed_bandwidth_hz or 0.0)
         )
@@ -156,7 +149,7 @@ def cautious_plant(
     not known what the measured lines show.
     """
     frf = mechanics.direct
-    use = frf.in_band & (frf.coherence > _COHERENT)
+    use = frf.in_band & (frf.coherence > threshold.COHERENT)
     lightest = inertia_kgm2
     if np.any(use):
         omega = 2.0 * np.pi * frf.frequency_hz[use]

@@ -22,28 +22,13 @@ from backend.tools.measuring.interrupted import ends_all
 from backend.tools.measuring.temporary import temporary
 from backend.tools.step.evaluate import LEAD_S, StepResult, StepSettings
 from backend.tools.step.run import step_response
+from backend.tools.thresholds import autotune_gain_steps as threshold
 from backend.work.jobs import Progress
 from drivers.errors import DriveError
 from drivers.texts.message import text
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
-#: Gains are raised in steps of this many dB, and the last one to what is asked for.
-_STEP_DB = 2.5
-#: Torque of a steady part, root mean square in % of the rated: this is quiet, and noise may rise by
-#: the gain and this factor.
-_QUIET_PERCENT, _NOISE = 1.5, 2.5
-#: An oscillation that grows by this from one half of a steady part to the other is an onset.
-_GROWS = 1.5
-#: A steady part is seen in so many pieces; a band whose power falls by this from each one to the
-#: next decays, as what a step leaves does in a loop that is stable (3 dB over the whole part).
-_PIECES, _DECAYS = 3, 0.5**0.5
-#: Fewer samples than this in a piece show no bands.
-_FEW = 8
-#: Noise passes for growth in one of so many steps at most, over all bands of a spectrum together.
-_FALSE_ALARM = 1e-3
-#: Real degrees of freedom of a band of three lines in one piece, and of the noise beside it in all
-#: pieces of the step with the gain as it is: each line of a Hann window shares with its neighbours.
-_DEGREES, _DEGREES_BEFORE = 3.0, 9.0
+_DECAYS = 0.5**0.5
 
 
 @dataclass(frozen=True)
@@ -111,7 +96,7 @@ async def gain_steps(
 
 def steps_to(wanted_db: float) -> int:
     """How many raised gains lead up to this one."""
-    return max(1, int(np.ceil(wanted_db / _STEP_DB)))
+    return max(1, int(np.ceil(wanted_db / threshold.STEP_DB)))
 
 
 def judged(
@@ -126,16 +111,17 @@ def judged(
     An oscillation is narrow, and persists or grows. What decays in its own band is what the step
     leaves, such as the swing of the load; it counts with what is left of it at the end.
     What persists may rise with the gain and by what a sensitivity with 1 dB left makes of noise
-    (`_NOISE` over all frequencies). A band grows where it is above what noise of the present step
-    reaches there by chance (`_FALSE_ALARM`, F distribution) and larger at the end than before.
+    (`threshold.NOISE` over all frequencies). A band grows where it is above what noise of the
+    present step reaches there by chance (`threshold.FALSE_ALARM`, F distribution) and larger at the
+    end than before.
     """
     before = _steady(present, settings)
     after = _steady(step, settings)
     count = min(before.size, after.size)
     parts = (after, after[:count] - before[:count])
     size = min(_persistent(part) for part in parts)
-    factor = _NOISE * 10 ** (gain_db / 20.0)
-    allowed = max(_QUIET_PERCENT, factor * float(np.std(before)))
+    factor = threshold.NOISE * 10 ** (gain_db / 20.0)
+    allowed = max(threshold.QUIET_PERCENT, factor * float(np.std(before)))
     grows = all(_grows(part, before, factor) for part in parts)
     return GainStep(gain_db, size, size <= allowed and not grows)
 
@@ -145,10 +131,10 @@ def _powers(torque: npt.NDArray[np.float64]) -> npt.NDArray[np.float64] | None:
 
     The lines of one piece add up to its mean square (Parseval).
     """
-    samples = torque.size // _PIECES
-    if samples < _FEW:
+    samples = torque.size // threshold.PIECES
+    if samples < threshold.FEW:
         return None
-    pieces = torque[-samples * _PIECES :].reshape(_PIECES, samples)
+    pieces = torque[-samples * threshold.PIECES :].reshape(threshold.PIECES, samples)
     window = np.hanning(samples + 2)[1:-1]
     lines = np.abs(np.fft.rfft(pieces * window, axis=1)) ** 2
     lines[:, 1 : (samples + 1) // 2] *= 2.0
@@ -174,13 +160,13 @@ def _grows(torque: npt.NDArray[np.float64], before: npt.NDArray[np.float64], fac
     powers, noise = _powers(torque), _powers(before)
     if powers is None or noise is None:
         first, second = (float(np.std(part)) for part in np.array_split(torque, 2))
-        return second > _GROWS * first and second > _QUIET_PERCENT
+        return second > threshold.GROWS * first and second > threshold.QUIET_PERCENT
     bands = np.array([np.convolve(row, np.ones(3), "same") for row in powers])
     usual = np.convolve(np.mean(noise, axis=0), np.ones(3), "same")
-    chance = _FALSE_ALARM / bands.shape[1]
-    beyond = float(scipy.special.fdtri(_DEGREES, _DEGREES_BEFORE, 1.0 - chance))
-    least = np.maximum(_QUIET_PERCENT**2, factor**2 * beyond * usual)
-    return bool(np.any((bands[-1] > least) & (bands[-1] > _GROWS**2 * bands[0])))
+    chance = threshold.FALSE_ALARM / bands.shape[1]
+    beyond = float(scipy.special.fdtri(threshold.DEGREES, threshold.DEGREES_BEFORE, 1.0 - chance))
+    least = np.maximum(threshold.QUIET_PERCENT**2, factor**2 * beyond * usual)
+    return bool(np.any((bands[-1] > least) & (bands[-1] > threshold.GROWS**2 * bands[0])))
 
 
 def oscillation_percent(step: StepResult, settings: StepSettings) -> float:

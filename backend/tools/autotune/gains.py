@@ -16,15 +16,11 @@ from backend.analysis.loop.loop_structure import DriveLoops, Gains, LoopFilters
 from backend.axis.axis import Axis
 from backend.drive.drive import Drive
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts, si, si_raw, si_value
+from backend.tools.thresholds import autotune_gains as threshold
 from drivers.errors import NotAllowed
 from profiles.schema import GainSpec, StiffnessTable
 
 TURN = 2 * np.pi
-#: Filters are widened in so many steps: a torque filter to half its time, a speed filter by √2;
-#: no torque filter is made shorter than this.
-_WIDENINGS, _SHORTEST_S = 3, 0.1e-3
-#: Loop period of the drives: half of it to compute, half of it until the torque's mean follows.
-_LOOP_PERIOD_S = 50e-6
 
 
 @dataclass(frozen=True)
@@ -67,8 +63,9 @@ async def read_gains(axis: Axis, facts: AxisFacts | None = None) -> GainState:
     facts = facts or await read_facts(axis)
     keys = [k for k in (spec.position, spec.speed, spec.integral) if k is not None]
     raw = {key: await drive.raw(key) for key in keys}
-    values = {key: si_value(drive.parameter(key), _engineering(drive, key, r))
-              for key, r in raw.items()}  # fmt: skip
+    values = {
+        key: si_value(drive.parameter(key), _engineering(drive, key, r)) for key, r in raw.items()
+    }
     table, level = _table(drive), None
     if table is not None and table.mode_key is not None:
         raw[table.mode_key] = await drive.raw(table.mode_key)
@@ -161,12 +158,12 @@ def filter_choices(drive: Drive, now: LoopFilters) -> tuple[LoopFilters, ...]:
     spec = spec_of(drive)
     found: list[LoopFilters] = []
     last = now
-    for _ in range(_WIDENINGS):
+    for _ in range(threshold.WIDENINGS):
         speed, torque = last.speed_hz, last.torque_hz
         if spec.speed_filter is not None and speed is not None:
             speed = max(speed, _held(drive, spec.speed_filter, speed * 2**0.5))
         if spec.torque_filter is not None and torque is not None:
-            shorter = max(0.5 / (TURN * torque), _SHORTEST_S)
+            shorter = max(0.5 / (TURN * torque), threshold.SHORTEST_S)
             shorter = _held(drive, spec.torque_filter, shorter)
             torque = max(torque, 1.0 / (TURN * shorter) if shorter else torque)
         wider = LoopFilters(speed, torque)
@@ -265,11 +262,12 @@ def loops_of(drive: Drive, facts: AxisFacts) -> DriveLoops:
     if spec.speed is not None:
         _low, high = drive.parameter(spec.speed).raw_limits
         if high is not None:
-            highest = si_value(drive.parameter(spec.speed),
-                               _engineering(drive, spec.speed, int(high)))  # fmt: skip
+            highest = si_value(
+                drive.parameter(spec.speed), _engineering(drive, spec.speed, int(high))
+            )
     return DriveLoops(
         current_bandwidth_hz=facts.current_bandwidth_hz,
-        delay_s=_LOOP_PERIOD_S,
+        delay_s=threshold.LOOP_PERIOD_S,
         speed_filter_hz=facts.speed_filter_hz,
         torque_filter_hz=facts.torque_filter_hz,
         highest_speed_bandwidth_hz=highest,

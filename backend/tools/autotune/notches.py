@@ -22,14 +22,11 @@ from backend.tools.notch import trials as notch_trials
 from backend.tools.notch.in_loop import measure_meaning_in_loop
 from backend.tools.notch.meaning import NotchMeaning, meaning_of, remember
 from backend.tools.sweep import evaluation as sweep_evaluation
+from backend.tools.thresholds import autotune_notches as threshold
 from backend.work.jobs import Progress
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, text
 
-#: A resonance that rises by less bounds no gain.
-_RISES_DB = 6.0
-#: Without a loop learning takes this share of the time: no trial for its size, one period less.
-_FREE = 0.7
 _NO_TIME = text("autotune.without-notches-time")
 _PARTLY = text("autotune.notch-values-left-out")
 
@@ -65,7 +62,7 @@ async def learn_notches(
     # Where friction rules, a torque that is off by little makes a speed that is off by much.
     ruled = how.scheme == "free" and mechanics.loop != "none"
     beside = _held(how, facts, outcome) or ruled
-    takes_s = notch_trials.least_s(axis.drive) * (1.0 if beside else _FREE)
+    takes_s = notch_trials.least_s(axis.drive) * (1.0 if beside else threshold.FREE)
     repeats = clock.learning()
     if not repeats.allow((1.0 + clock.lossy) * takes_s):
         if meaning_of(axis.drive) is None:
@@ -103,7 +100,7 @@ def learning_s(
     if _known(axis):
         return 0.0
     takes_s = notch_trials.every_s(axis.drive)
-    return takes_s if _held(how, facts, outcome) else _FREE * takes_s
+    return takes_s if _held(how, facts, outcome) else threshold.FREE * takes_s
 
 
 def _known(axis: Axis) -> bool:
@@ -123,7 +120,7 @@ def out_of_sight(mechanics: sweep_evaluation.SweepResult) -> Text | None:
     model, frf = mechanics.model, mechanics.frf
     highest_hz = float(np.max(frf.frequency_hz[frf.in_band], initial=0.0))
     above = [m for m in model.modes if m.frequency_hz > highest_hz] if model is not None else []
-    rising = [m for m in above if model is not None and model.height_db(m) > _RISES_DB]
+    rising = [m for m in above if model is not None and model.height_db(m) > threshold.RISES_DB]
     if not rising:
         return None
     near_hz = min(mode.frequency_hz for mode in rising)

@@ -31,6 +31,7 @@ from backend.tools.measuring.temporary import write_settings
 from backend.tools.notch import filters as notch_tool
 from backend.tools.notch.effect import unknown
 from backend.tools.notch.meaning import meaning_of
+from backend.tools.thresholds import autotune_present as threshold
 from backend.work.jobs import Progress
 from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import Text, text
@@ -38,8 +39,6 @@ from drivers.texts.message import Text, text
 _TURN = 2.0 * np.pi
 #: Said where nothing was changed.
 KEPT = text("autotune.kept-as-it-was")
-#: A design whose speed gain is this much below what the axis has is slower.
-_SLOWER = 0.9
 
 
 @dataclass(frozen=True)
@@ -55,7 +54,10 @@ class Present:
         now, then = self.candidate and self.candidate.bandwidth_hz, design.bandwidth_hz
         if now and then and then > now:
             return False
-        return self.speed_nms is not None and design.gains.speed_nms < _SLOWER * self.speed_nms
+        return (
+            self.speed_nms is not None
+            and design.gains.speed_nms < threshold.SLOWER * self.speed_nms
+        )
 
     def reported(self, design: Candidate, tried: bool) -> Text | None:
         """That a design is slower than what the axis had, and why it is taken all the same."""
@@ -93,9 +95,11 @@ async def present(
     if notches and meaning_of(drive) is None and unknown(drive):
         return reported
     gains = Gains(
-        now.speed_nms, now.integral_hz or 0.0, now.position_1_s or 0.0,
+        now.speed_nms,
+        now.integral_hz or 0.0,
+        now.position_1_s or 0.0,
         now.speed_nms / (_TURN * inertia_kgm2),
-    )  # fmt: skip
+    )
     try:
         candidate, sound = await asyncio.to_thread(
             judged, axis, facts, plant, gains, tuple(notches),
@@ -184,9 +188,11 @@ class Trials:
         async def softer(candidate: Candidate, share: float) -> Candidate | None:
             g = candidate.gains
             gains = Gains(
-                share * g.speed_nms, share * g.integral_hz, share * g.position_1_s,
+                share * g.speed_nms,
+                share * g.integral_hz,
+                share * g.position_1_s,
                 share * g.speed_bandwidth_hz,
-            )  # fmt: skip
+            )
             made, sound = await asyncio.to_thread(
                 judged, self.axis, self.check.facts, plant, gains, candidate.notches,
                 candidate.filters, self.promised,

@@ -10,14 +10,8 @@ from backend.axis.axis import Axis
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.autotune.gain_steps import GainSteps
 from backend.tools.autotune.verdict import MARGIN_DB, in_words, loops_of, misses
+from backend.tools.thresholds import autotune_raising as threshold
 from drivers.texts.message import Text, text
-
-#: So much of a promised gain margin is shown by raising the gain, where the last crossover is above
-#: what was measured: all but this, and no more than that.
-_NOT_SHOWN_DB, _MOST_SHOWN_DB = 1.5, 7.0
-#: A gain is raised by this beyond what excludes a loop, as a parameter has steps; and where that is
-#: more than what must be shown and this, it stays so far below the predicted margin.
-_SURELY_DB, _AT_ONCE_DB, _KEPT_BACK_DB = 0.2, 0.5, 2.5
 
 
 def by_raised_gain(missed: Missed) -> bool:
@@ -29,7 +23,7 @@ def wanted_db(missed: tuple[Missed, ...], promised: Goals) -> float:
     """How much more gain must be shown; where uncertain, the required margin less its tolerance."""
     if any(each.what != "coverage" for each in missed):
         return promised.gain_margin_db - WORST_DB
-    return min(promised.gain_margin_db - _NOT_SHOWN_DB, _MOST_SHOWN_DB)
+    return min(promised.gain_margin_db - threshold.NOT_SHOWN_DB, threshold.MOST_SHOWN_DB)
 
 
 def raised_to(
@@ -40,7 +34,7 @@ def raised_to(
 
     A slow loop of which too few lines stand out may be late by a whole loop period; with so much
     more gain it would oscillate if it were. What is tried beyond `wanted_db` leaves
-    `_KEPT_BACK_DB` of the predicted gain margin.
+    `threshold.KEPT_BACK_DB` of the predicted gain margin.
 
     Raises:
         NotAllowed, ValueError: a part of the loop has no known meaning.
@@ -51,8 +45,10 @@ def raised_to(
         return least
     f = plant.frequency_hz
     every = loops_of(axis, facts, candidate, f, plant.shifted())
-    excludes = excluding_db(verdict, f, every, promised) + _SURELY_DB
-    most = max(predicted.gain_margin_db.value - _KEPT_BACK_DB, least + _AT_ONCE_DB)
+    excludes = excluding_db(verdict, f, every, promised) + threshold.SURELY_DB
+    most = max(
+        predicted.gain_margin_db.value - threshold.KEPT_BACK_DB, least + threshold.AT_ONCE_DB
+    )
     return excludes if least < excludes <= most else least
 
 

@@ -45,19 +45,15 @@ from backend.tools.moves.go_back import go_back
 from backend.tools.step import evaluate as step_evaluation
 from backend.tools.sweep import evaluation as sweep_evaluation
 from backend.tools.sweep import run as sweep_tool
+from backend.tools.thresholds import autotune_run as threshold
 from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import EnvelopeExceeded, NotAllowed
 from drivers.texts.answers import sentences
 from drivers.texts.message import Text, joined, text
 
-#: A response with more of its samples at a torque limit is none.
-_SATURATED = 0.25
 #: Said where no margins could be verified.
 _BY_STEP = text("autotune.verified-by-step")
-#: Gains that hardly any axis oscillates with, for measuring one that does with its own.
-#: With the inertia that the drive holds, and with that of the motor alone.
-_SOFT_HZ, _SOFT_ALONE_HZ = 5.0, 20.0
 #: Said where a load that swings was not moved a second time.
 _ONE_MOVE = text("autotune.not-moved-again")
 #: Deviations to either side that hold 95 of 100 cases.
@@ -256,7 +252,7 @@ def _soft_gains(axis: Axis, facts: AxisFacts) -> dict[str, int]:
     By the motor alone where it is known: what the drive holds as inertia may be what is wrong.
     """
     rotor = facts.motor_inertia_kgm2
-    hz = _SOFT_HZ if rotor is None else _SOFT_ALONE_HZ
+    hz = threshold.SOFT_HZ if rotor is None else threshold.SOFT_ALONE_HZ
     soft = Gains(0.0, 0.1 * hz, hz, hz)
     inertia = rotor or facts.drive_inertia_kgm2 or 1e-4
     return gain_tool.plan_gains(axis.drive, soft, inertia, rotor)
@@ -285,12 +281,12 @@ def _sweep_settings(
 
 
 def _require_torque(axis: Axis, mechanics: sweep_evaluation.SweepResult) -> None:
-    if mechanics.saturated_share > _SATURATED:
+    if mechanics.saturated_share > threshold.SATURATED:
         raise NotAllowed(
             "autotune.torque-limit-not-commanded",
             drive=axis.drive.name,
             value=round(mechanics.saturated_share, 3),
-            limit=f"{_SATURATED:g}",
+            limit=f"{threshold.SATURATED:g}",
             saturated_share=mechanics.saturated_share,
         )
 

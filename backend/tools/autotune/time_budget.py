@@ -10,19 +10,9 @@ from dataclasses import dataclass, field
 
 from backend.analysis.response.sampling import DIRECT_SHARE
 from backend.tools.measuring.repeats import Repeats
+from backend.tools.thresholds import autotune_time_budget as threshold
 from drivers.texts.message import Text, text
 
-#: Writing a design, standing still and a step, beside the measurement of the loop.
-_AROUND_S = 4.0
-#: What follows the measurements: computing designs, writing one and verifying it.
-_DESIGNED_AND_VERIFIED_S = 12.0
-#: A step with a raised gain, how many of them a loop needs that crosses above the measured band,
-#: and up to how many Hz tuned loops cross.
-_GAIN_STEP_S, _GAIN_STEPS, _CROSSES_HZ = 2.1, 3, 400.0
-#: What a verification takes longer at most where samples are lost all the time.
-_LOST_S = 6.0
-#: A frequency response, as far as it must be.
-_SWEEP_S = 16.0
 #: Said where realisations that lost samples count as they are.
 NOT_AGAIN = text("autotune.not-measured-again")
 
@@ -48,13 +38,13 @@ class TimeLeft:
     def of(cls, budget_s: float, cycle_s: float | None = None) -> TimeLeft:
         """From now on, for a bus with this cycle time; None: it shows any loop."""
         time_left = cls(time.monotonic() + budget_s)
-        if cycle_s is not None and DIRECT_SHARE / cycle_s < _CROSSES_HZ:
-            time_left.require_raising(_GAIN_STEPS)
+        if cycle_s is not None and DIRECT_SHARE / cycle_s < threshold.CROSSES_HZ:
+            time_left.require_raising(threshold.GAIN_STEPS)
         return time_left
 
     def require_raising(self, steps: int) -> None:
         """Keep time for so many raised gains."""
-        self.raising_s = _GAIN_STEP_S * steps
+        self.raising_s = threshold.GAIN_STEP_S * steps
 
     def verifications(self) -> float:
         """How many more as long as the longest fit; the first always does."""
@@ -67,15 +57,15 @@ class TimeLeft:
 
         Beside so many ``looks``, further verifications, where there is time for all of them.
         """
-        left_s = self.until_s - self.raising_s - time.monotonic() - _AROUND_S
-        spare_s = looks * (first_s + _AROUND_S)
+        left_s = self.until_s - self.raising_s - time.monotonic() - threshold.AROUND_S
+        spare_s = looks * (first_s + threshold.AROUND_S)
         if left_s >= spare_s:
             left_s -= spare_s
         return max(0, int(min(left_s / max(first_s, 1e-3), float(most))))
 
     def learning(self) -> Repeats:
         """What may be measured before the designs, as long as one is verified in time."""
-        return Repeats(self._measured_by_s - self.lossy * _LOST_S)
+        return Repeats(self._measured_by_s - self.lossy * threshold.LOST_S)
 
     def measuring(self, learning_s: float) -> Repeats:
         """What of a frequency response, where learning what notches do takes so long after it."""
@@ -83,16 +73,16 @@ class TimeLeft:
 
     def moving(self) -> Repeats:
         """What of moves for the inertia; the frequency response comes after them."""
-        return Repeats(self._measured_by_s - _SWEEP_S)
+        return Repeats(self._measured_by_s - threshold.SWEEP_S)
 
     def verifying_again(self) -> Repeats:
         """What of a tuned loop."""
-        return Repeats(self.until_s - _AROUND_S - self.raising_s)
+        return Repeats(self.until_s - threshold.AROUND_S - self.raising_s)
 
     @property
     def _measured_by_s(self) -> float:
         """When designing and verifying must begin at the latest."""
-        return self.until_s - _DESIGNED_AND_VERIFIED_S - self.raising_s
+        return self.until_s - threshold.DESIGNED_AND_VERIFIED_S - self.raising_s
 
     def give_up(self, what: Text) -> None:
         """Note once what was not done for its time."""
@@ -117,7 +107,7 @@ class TimeLeft:
         finally:
             took_s = time.monotonic() - begun_s - (self.extra_s - extra_s)
             # One that fails early may be followed by one that does not.
-            took_s = max(took_s, _AROUND_S)
+            took_s = max(took_s, threshold.AROUND_S)
             self.longest_s = max(self.longest_s, took_s)
 
     def reported(self) -> Text | None:

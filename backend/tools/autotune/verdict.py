@@ -21,14 +21,15 @@ from backend.tools.autotune import gains as gain_tool
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.notch import filters as notch_tool
 from backend.tools.notch.meaning import meaning_of
+from backend.tools.thresholds import autotune_verdict as threshold
 from drivers.texts.message import Text, text
 
-#: What a measured margin is known to; the designs keep more than this in reserve.
-MARGIN_DB, MARGIN_DEG, MS_RATIO = 1.0, 1.0, 1.03
-#: Lines that margins are read from: coherence, standard deviation of the phase, how many at least.
-COHERENT, BLURRED_DEG, LINES = 0.9, 4.0, 12
-#: The measured band ends where the next line is farther than this factor away.
-_GAP = 1.5
+MARGIN_DB = threshold.MARGIN_DB
+MARGIN_DEG = threshold.MARGIN_DEG
+MS_RATIO = threshold.MS_RATIO
+COHERENT = threshold.COHERENT
+BLURRED_DEG = threshold.BLURRED_DEG
+LINES = threshold.LINES
 #: A loop is seen where its lines begin within its bandwidth: its crossover may else be missed.
 WITHIN = 10 ** (-3.0103 / 20.0)
 #: By what is missed and where: the message, and the unit at the end of its facts.
@@ -81,7 +82,7 @@ def telling_lines(frf: Frf) -> Lines | None:
         return None
     parts = (np.log(10.0) / 20.0 * frf.std_db[use], np.radians(frf.std_deg[use]))
     deviation = np.sqrt(0.5 * sum(np.nan_to_num(part, nan=0.0) ** 2 for part in parts))
-    gaps = np.flatnonzero(f[1:] > _GAP * f[:-1])
+    gaps = np.flatnonzero(f[1:] > threshold.GAP * f[:-1])
     # Below 20 Hz lines of a linear grid are far apart by themselves.
     end = next((int(i) + 1 for i in gaps if f[i] > 20.0), f.size)
     return Lines(f[:end], closed[:end], np.asarray(deviation)[:end])

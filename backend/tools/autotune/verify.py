@@ -42,29 +42,15 @@ from backend.tools.step import evaluate as step_evaluation
 from backend.tools.step.run import step_response
 from backend.tools.sweep import evaluation as sweep_evaluation
 from backend.tools.sweep import run as sweep_tool
+from backend.tools.thresholds import autotune_verify as threshold
 from backend.work.jobs import Progress
 from drivers.texts.message import Text, joined, prose, text
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 
-#: Coherence of lines that a bandwidth is read from where those do not hold it.
-_SEEN = 0.8
-#: Pairs of realisations that are measured at most where the first one tells too little: friction
-#: and noise of a heavy or a coarse axis average out, and so does the distortion of play, which a
-#: single pair cannot tell from the response.
-MOST_PAIRS = 4
-#: A loop that contradicts its prediction is verified once more where there is time for so many:
-#: that one, and a more careful design.
-LOOKS = 2
-#: A step, unless noise asks for a larger one, which is made where it is this much larger.
-_USUAL_STEP_RPM, _WORTH_A_STEP = 100.0, 1.2
-#: Where there are fewer, a step may overshoot by this.
-_OVERSHOOT_PERCENT = 40.0
-#: A bandwidth this near to the predicted one is as predicted; one that is measured once more is
-#: less far away, as a single pair of realisations may be off to either side.
-_AS_PREDICTED, _DOUBTED = 0.1, 0.08
-#: Torque of a standing axis, root mean square in % of rated torque, that is a hum.
-HUM_PERCENT = 4.0
+MOST_PAIRS = threshold.MOST_PAIRS
+LOOKS = threshold.LOOKS
+HUM_PERCENT = threshold.HUM_PERCENT
 
 
 @dataclass(frozen=True)
@@ -154,7 +140,7 @@ async def verify(
     missed = worse_than(promised, read)
     blurred = any(each.end == "measured" for each in _misses(verdict, promised))
     blurred = blurred or (verdict is not None and verdict.measured is None)
-    as_predicted = _as_predicted(candidate.bandwidth_hz, _width_of(read), _DOUBTED)
+    as_predicted = _as_predicted(candidate.bandwidth_hz, _width_of(read), threshold.DOUBTED)
     every: Frf | None = None
     if (not read or blurred or not as_predicted) and pairs > 1 and not missed:
         settings = replace(settings, realisations=pairs)
@@ -179,7 +165,7 @@ async def verify(
         settings_of_step = _step_settings(check, candidate)
         step = await step_response(axis, session, settings_of_step, stepping, keep)
         larger = min(step_evaluation.significant_size(step), _largest_step(check, candidate))
-        if step.widened and larger > _WORTH_A_STEP * settings_of_step.size:
+        if step.widened and larger > threshold.WORTH_A_STEP * settings_of_step.size:
             settings_of_step = replace(settings_of_step, size=larger)
             step = await step_response(axis, session, settings_of_step, stepping, keep)
         hums, restless_why = hum(step), None if read else restless(step)
@@ -230,7 +216,7 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
     width = bandwidth(f, closed)
     if width.minus_3db_hz is None:
         # It may fall into an antiresonance, where its lines are weak.
-        seen = frf.in_band & (frf.coherence > _SEEN)
+        seen = frf.in_band & (frf.coherence > threshold.SEEN)
         width = bandwidth(frf.frequency_hz[seen], frf.response[seen])
     return {
         **found,
@@ -244,15 +230,16 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
 def restless(step: step_evaluation.StepResult) -> Text | None:
     """What a step shows of a loop that answers too few lines, such as a slow one; else None."""
     found = step.step
-    if found is not None and found.overshoot_percent <= _OVERSHOOT_PERCENT:
+    if found is not None and found.overshoot_percent <= threshold.OVERSHOOT_PERCENT:
         return None
     return text("autotune.few-lines")
 
 
 def _joined(
-    first: sweep_evaluation.SweepResult, read: dict[str, float | bool | None],
+    first: sweep_evaluation.SweepResult,
+    read: dict[str, float | bool | None],
     more: sweep_evaluation.SweepResult,
-) -> tuple[sweep_evaluation.SweepResult, dict[str, float | bool | None]]:  # fmt: skip
+) -> tuple[sweep_evaluation.SweepResult, dict[str, float | bool | None]]:
     """A loop measured again with more realisations, and what to read from both.
 
     The bandwidth is that of the mean over all of them. What they differ by blurs lines, so margins
@@ -273,7 +260,7 @@ def _width_of(found: dict[str, float | bool | None]) -> float | None:
 
 
 def _as_predicted(
-    predicted_hz: float | None, measured_hz: float | None, within: float = _AS_PREDICTED
+    predicted_hz: float | None, measured_hz: float | None, within: float = threshold.AS_PREDICTED
 ) -> bool:
     """Whether a bandwidth is the predicted one; also where one of them is not known."""
     if not predicted_hz or not measured_hz:
@@ -319,9 +306,11 @@ def unseen(last_hz: float | None, verified: Verified) -> Text | None:
             return None
         top = 0.0 if verdict.measured is None else verdict.measured.high_hz
         return text(
-            "autotune.margins-bounded", crossover_hz=verdict.last_crossover_hz, measured_hz=top,
+            "autotune.margins-bounded",
+            crossover_hz=verdict.last_crossover_hz,
+            measured_hz=top,
             gain_db=verdict.shown_gain_db,
-        )  # fmt: skip
+        )
     frf = verified.sweep.frf
     lines = frf.frequency_hz[frf.in_band & (frf.coherence > COHERENT)]
     if not verified.sweep.margins or last_hz is None or last_hz <= np.max(lines, initial=0.0):
@@ -367,7 +356,7 @@ def _largest_step(check: Check, candidate: Candidate) -> float:
 
 def _step_settings(check: Check, candidate: Candidate) -> step_evaluation.StepSettings:
     """The usual step of speed, or what the axis may do."""
-    size = min(_USUAL_STEP_RPM, _largest_step(check, candidate))
+    size = min(threshold.USUAL_STEP_RPM, _largest_step(check, candidate))
     return step_evaluation.StepSettings(
         check.envelope, size=size, rated_torque_nm=check.rated_torque_nm
     )

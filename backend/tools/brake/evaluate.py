@@ -14,23 +14,13 @@ import numpy.typing as npt
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.brake.result import BrakeResult, BrakeWay, Means, Obstacle, Verdict
 from backend.tools.brake.settings import BrakeSettings
+from backend.tools.thresholds import brake_evaluate as threshold
 from backend.tools.tool import Arrays, Meta
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 _TURN = 2 * np.pi
-#: Share of the test torque that takes up play before travel counts.
-PRELOAD = 0.1
-#: A departure from the elastic line by so many deviations of the position, and by this share of
-#: the slip limit, is slip.
-_DEVIATIONS, _OF_LIMIT = 6.0, 0.05
-#: Parts of the ramp that a compliance is taken of; a slipping part is softer than an elastic one.
-_PARTS, _STIFF_QUANTILE = 8, 0.3
-_ONSET_S = 0.005
-#: Torque is not known better than this share of it, whatever the scatter.
-_SHARE = 0.005
-#: Below this share of what it was the torque counts as gone.
-_GONE = 0.2
+PRELOAD = threshold.PRELOAD
 _POINTS = 200
 
 
@@ -84,11 +74,13 @@ class Trials:
     def facts(self) -> dict[str, object]:
         """For storage, beside the arrays."""
         return {
-            "sample_rate_hz": self.sample_rate_hz, "torque_step_nm": self.torque_step_nm,
-            "test_percent": self.test_percent, "means": self.means,
+            "sample_rate_hz": self.sample_rate_hz,
+            "torque_step_nm": self.torque_step_nm,
+            "test_percent": self.test_percent,
+            "means": self.means,
             "measured_at": self.measured_at,
             "halted": [each.direction for each in self.trials if each.halted],
-        }  # fmt: skip
+        }
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> BrakeResult:
@@ -99,9 +91,11 @@ def reevaluate(arrays: Arrays, meta: Meta) -> BrakeResult:
     """
     given, facts, halted = meta.get("settings"), meta.get("facts"), meta.get("halted")
     if (
-        not isinstance(given, dict) or not isinstance(facts, dict) or "way" not in arrays
+        not isinstance(given, dict)
+        or not isinstance(facts, dict)
+        or "way" not in arrays
         or not isinstance(halted, list)
-    ):  # fmt: skip
+    ):
         raise ValueError("not the raw data of a brake test")
     way = np.asarray(arrays["way"], np.int64)
     trials = []
@@ -111,13 +105,15 @@ def reevaluate(arrays: Arrays, meta: Meta) -> BrakeResult:
         if np.any(at):
             trials.append(
                 Trial(
-                    direction, np.asarray(arrays["position_rad"], np.float64)[at],
+                    direction,
+                    np.asarray(arrays["position_rad"], np.float64)[at],
                     np.asarray(arrays["torque_nm"], np.float64)[at],
                     np.asarray(arrays["sent_nm"], np.float64)[at],
                     np.asarray(arrays["phase"], np.int64)[at],
-                    np.asarray(arrays["valid"], np.bool_)[at], direction in halted,
+                    np.asarray(arrays["valid"], np.bool_)[at],
+                    direction in halted,
                 )
-            )  # fmt: skip
+            )
     test = Trials(
         tuple(trials), float(str(meta["sample_rate_hz"])), float(str(meta["torque_step_nm"])),
         float(str(meta["test_percent"])), "supply" if meta["means"] == "supply" else "output",
@@ -129,9 +125,7 @@ def reevaluate(arrays: Arrays, meta: Meta) -> BrakeResult:
 def evaluate(test: Trials, settings: BrakeSettings, facts: AxisFacts) -> BrakeResult:
     """The verdict of both directions."""
     limit = settings.envelope.travel_rev
-    found = [
-        _Way(trial, test, facts.rated_torque_nm, limit).judged() for trial in test.trials
-    ]  # fmt: skip
+    found = [_Way(trial, test, facts.rated_torque_nm, limit).judged() for trial in test.trials]
     ways = tuple(way for way, _ in found)
     verdict = _worst([way.verdict for way in ways])
     least = min(way.torque_percent for way in ways)
@@ -184,18 +178,16 @@ class _Way:
         """The direction, and the compliance in revolutions per %."""
         phase, valid = self._trial.phase, self._trial.valid
         before = np.arange(phase.size) < self._end
-        loading = np.flatnonzero(
-            ((phase == Phase.RAMP) | (phase == Phase.TOP)) & valid & before
-        )  # fmt: skip
+        loading = np.flatnonzero(((phase == Phase.RAMP) | (phase == Phase.TOP)) & valid & before)
         ramp = loading[phase[loading] == Phase.RAMP]
-        if ramp.size < 2 * _PARTS:
+        if ramp.size < 2 * threshold.PARTS:
             return self._not_closed(), 0.0
         torque_0 = self._still(self._torque, Phase.PRELOADED)
         travel_0 = self._still(self._travel, Phase.PRELOADED)
         way, torque = self._travel - travel_0, self._torque - torque_0
         compliance = _compliance(way[ramp], torque[ramp])
         beyond = way[loading] - compliance * torque[loading]
-        slips = max(_DEVIATIONS * self._noise, _OF_LIMIT * self._limit)
+        slips = max(threshold.DEVIATIONS * self._noise, threshold.OF_LIMIT * self._limit)
         over = np.flatnonzero(beyond > slips)
         top = loading[phase[loading] == Phase.TOP]
         slip = self._slip(travel_0, beyond)
@@ -229,7 +221,7 @@ class _Way:
 
     def _near(self, place: int) -> float:
         """Mean torque of some milliseconds up to here."""
-        begin = max(0, place - round(_ONSET_S * self._rate))
+        begin = max(0, place - round(threshold.ONSET_S * self._rate))
         return float(np.mean(self._torque[begin : place + 1]))
 
     def _made(
@@ -238,7 +230,7 @@ class _Way:
     ) -> BrakeWay:  # fmt: skip
         quiet = self._torque[(self._trial.phase == Phase.LEAD) & self._trial.valid]
         scatter = float(np.std(quiet)) if quiet.size else 0.0
-        half = 0.5 * self._step + scatter + _SHARE * abs(carried)
+        half = 0.5 * self._step + scatter + threshold.SHARE * abs(carried)
         low, high = min(ends) - half, max(ends) + half
         shown = loading[:: max(1, -(-loading.size // _POINTS))]
         most = float(np.max(self._torque[loading])) - self._still(self._torque, Phase.PRELOADED)
@@ -257,7 +249,7 @@ class _Way:
         if not self._trial.halted or not out.size:
             return None
         first = int(out[0])
-        left = _GONE * abs(self._torque[max(first - 1, 0)])
+        left = threshold.GONE * abs(self._torque[max(first - 1, 0)])
         gone = np.flatnonzero((np.abs(self._torque[first:]) <= left) & self._trial.valid[first:])
         return 1e3 * float(gone[0]) / self._rate if gone.size else None
 
@@ -276,10 +268,10 @@ class _Way:
 
 def _compliance(way: FloatArray, torque: FloatArray) -> float:
     """Revolutions per % of the stiffer parts of the ramp; the others may slip."""
-    edges = np.linspace(float(torque[0]), float(np.max(torque)), _PARTS + 1)
+    edges = np.linspace(float(torque[0]), float(np.max(torque)), threshold.PARTS + 1)
     slopes = []
     for low, high in itertools.pairwise(edges):
         at = (torque >= low) & (torque <= high)
         if np.count_nonzero(at) >= 4 and float(np.ptp(torque[at])) > 0.0:
             slopes.append(float(np.polyfit(torque[at], way[at], 1)[0]))
-    return max(float(np.quantile(slopes, _STIFF_QUANTILE)), 0.0) if slopes else 0.0
+    return max(float(np.quantile(slopes, threshold.STIFF_QUANTILE)), 0.0) if slopes else 0.0

@@ -38,6 +38,7 @@ from backend.tools.measuring.recording import (
     takes_torque,
 )
 from backend.tools.measuring.temporary import stopping_hard
+from backend.tools.thresholds import brake_run as threshold
 from backend.tools.tool import Run, Tool
 from drivers import link as bus
 from drivers.cia402 import Mode
@@ -46,12 +47,6 @@ from drivers.halt import HaltCause
 from drivers.texts.message import text
 
 FloatArray = npt.NDArray[np.float64]
-#: Seconds of each part of the sequence beside its ramp.
-_LEAD_S, _PRELOAD_S, _STILL_S, _TOP_S, _DOWN_S, _END_S = 0.2, 0.15, 0.15, 0.25, 0.25, 0.05
-#: The envelope watches the actual torque, which swings about what is sent.
-_ABOVE_SHARE, _ABOVE_PERCENT = 1.08, 3.0
-#: After a halt the loop goes on telling what happens; the torque is gone within that.
-_AFTER_HALT_S = 0.1
 _DIRECTIONS: tuple[Literal[1, -1], ...] = (1, -1)
 
 
@@ -83,11 +78,11 @@ def sequence(
     """Torque [n] of one direction, in the unit of ``peak``, and the phase of each sample."""
     low = PRELOAD * peak
     parts = [
-        (Phase.LEAD, 0.0, 0.0, lead_s), (Phase.PRELOADING, 0.0, low, _PRELOAD_S),
-        (Phase.PRELOADED, low, low, _STILL_S), (Phase.RAMP, low, peak, ramp_s),
-        (Phase.TOP, peak, peak, _TOP_S), (Phase.UNLOADING, peak, low, _DOWN_S),
-        (Phase.UNLOADED, low, low, _STILL_S), (Phase.END, low, 0.0, _PRELOAD_S),
-        (Phase.END, 0.0, 0.0, _END_S),
+        (Phase.LEAD, 0.0, 0.0, lead_s), (Phase.PRELOADING, 0.0, low, threshold.PRELOAD_S),
+        (Phase.PRELOADED, low, low, threshold.STILL_S), (Phase.RAMP, low, peak, ramp_s),
+        (Phase.TOP, peak, peak, threshold.TOP_S), (Phase.UNLOADING, peak, low, threshold.DOWN_S),
+        (Phase.UNLOADED, low, low, threshold.STILL_S), (Phase.END, low, 0.0, threshold.PRELOAD_S),
+        (Phase.END, 0.0, 0.0, threshold.END_S),
     ]  # fmt: skip
     values, phases = [], []
     for phase, begin, end, seconds in parts:
@@ -164,7 +159,7 @@ def _test_percent(settings: BrakeSettings, facts: AxisFacts, name: str) -> float
         if not facts.torque_known:
             raise NotAllowed("brake.rated-torque-not-known", drive=name)
         percent = 100.0 * wanted_nm / facts.rated_torque_nm
-    needed = _ABOVE_SHARE * percent + _ABOVE_PERCENT
+    needed = threshold.ABOVE_SHARE * percent + threshold.ABOVE_PERCENT
     if needed > settings.torque_limit:
         raise OutOfRange(
             "brake.torque-not-permitted", drive=name, value=round(percent, 2),
@@ -210,7 +205,7 @@ async def _trial(
     """
     axis, session = run.axis, run.session
     rate = 1.0 / cycle_s(session)
-    lead_s = _LEAD_S + await brake_opens_s(axis.drive)
+    lead_s = threshold.LEAD_S + await brake_opens_s(axis.drive)
     values, phases = sequence(direction * percent, settings.ramp_s, lead_s, rate)
     raw = np.array([units.torque_raw(value) for value in values], np.int64)
     begins = int(np.flatnonzero(phases == Phase.RAMP)[0])
@@ -245,7 +240,7 @@ async def _played(
         if error.halt.cause not in (HaltCause.POSITION, HaltCause.SPEED):
             raise
         halted = True
-        await asyncio.sleep(_AFTER_HALT_S)
+        await asyncio.sleep(threshold.AFTER_HALT_S)
     finally:
         unsubscribe()
     return catch, halted

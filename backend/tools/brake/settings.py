@@ -28,9 +28,11 @@ class BrakeSettings(ToolSettings):
         default=130.0, gt=0, le=400, description="highest torque, in % of rated"
     )
     test_percent: float = Field(
-        default=100.0, gt=0, le=400,
+        default=100.0,
+        gt=0,
+        le=400,
         description="test torque in % of the brake's rated torque, or of the motor's without it",
-    )  # fmt: skip
+    )
     test_torque_nm: float | None = Field(default=None, gt=0, description="test torque, in N·m")
     brake_rated_nm: float | None = Field(
         default=None, gt=0, description="rated holding torque of the brake, in N·m"
@@ -59,6 +61,8 @@ class BrakeSettings(ToolSettings):
     def envelope(self) -> Envelope:
         """The limits of the motion."""
         return Envelope(
-            min(self.travel_limit, self.slip_limit_rev), self.speed_limit, self.torque_limit,
+            min(self.travel_limit, self.slip_limit_rev),
+            self.speed_limit,
+            self.torque_limit,
             self.time_limit_s,
-        )  # fmt: skip
+        )

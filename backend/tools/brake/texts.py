@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Literal
 
 from backend.tools.brake.result import BrakeResult, BrakeWay, Verdict
+from backend.tools.thresholds import brake_texts as threshold
 from backend.tools.tool import Chart, Line, Note, Row, Section
 
 TEXTS: dict[str, tuple[str, str]] = {
@@ -170,9 +171,6 @@ TEXTS: dict[str, tuple[str, str]] = {
 _TONES: dict[Verdict, Literal["good", "warn"]] = {
     "held": "good", "slipped": "warn", "not_closed": "warn", "cannot_be_tested": "warn",
 }  # fmt: skip
-#: Slip below this share of the limit is what an encoder and a settling hub show.
-_CREPT = 0.05
-_SHORT = 0.95
 
 
 def report(result: BrakeResult) -> Section:
@@ -205,9 +203,10 @@ def notes(result: BrakeResult) -> list[Note]:
     found += [
         Note("crept", "warn", {"value": f"{way.slip_rev:.2g}"})
         for way in result.ways
-        if way.verdict == "held" and way.slip_rev > _CREPT * result.slip_limit_rev
+        if way.verdict == "held" and way.slip_rev > threshold.CREPT * result.slip_limit_rev
     ]
-    if result.verdict == "held" and value is not None and value < _SHORT * result.test_percent:
+    least = threshold.SHORT * result.test_percent
+    if result.verdict == "held" and value is not None and value < least:
         found.append(Note("torque_short", "warn", {"value": shown}))
     if result.means is not None:
         found.append(Note(f"by.{result.means}"))

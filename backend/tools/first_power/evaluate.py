@@ -21,19 +21,12 @@ from backend.tools.first_power.result import (
     Way,
 )
 from backend.tools.first_power.settings import FirstPowerSettings
+from backend.tools.thresholds import first_power_evaluate as threshold
 from backend.tools.tool import Arrays, Meta
 
 FloatArray = npt.NDArray[np.float64]
-#: Share of the permitted travel that the shaft is to go each way.
-GOAL = 0.85
-#: Below this [rev] a pulse has moved nothing; an encoder and a twisting coupling show so much.
-STILL_REV = 5e-4
-#: Less than this share of the goal is no way at all.
-_SOME = 0.02
-#: A person meets a mark within 18° of a revolution.
-_HAND = 0.05
-#: At less DC voltage than this no drive that is served here works.
-_LEAST_V = 10.0
+GOAL = threshold.GOAL
+STILL_REV = threshold.STILL_REV
 _WAYS: tuple[Literal[1, -1], ...] = (1, -1)
 
 
@@ -137,7 +130,7 @@ def way_of(pulses: Sequence[Pulse], goal_rev: float, cap_percent: float) -> Way:
     last = pulses[-1]
     if last.torque_percent < 0.95 * cap_percent:
         return "short"
-    moved = any(abs(each.to_rev - each.from_rev) > _SOME * goal_rev for each in pulses)
+    moved = any(abs(each.to_rev - each.from_rev) > threshold.SOME * goal_rev for each in pulses)
     return "locked" if moved else "none"
 
 
@@ -195,7 +188,7 @@ _OPEN = frozenset(
 
 def supply_sound(seen: Seen) -> bool:
     """Nothing about the supply forbids to energise."""
-    return not seen.faults and (seen.supply_v is None or seen.supply_v >= _LEAST_V)
+    return not seen.faults and (seen.supply_v is None or seen.supply_v >= threshold.LEAST_V)
 
 
 def _supply(seen: Seen) -> Check:
@@ -214,7 +207,7 @@ def counts_sound(seen: Seen, revolutions: int) -> bool | None:
     """Whether the drive counted what a person turned; None where nobody turned."""
     if seen.turned_rev is None:
         return None
-    return abs(abs(seen.turned_rev) - revolutions) <= _HAND
+    return abs(abs(seen.turned_rev) - revolutions) <= threshold.HAND
 
 
 def _turned(seen: Seen, settings: FirstPowerSettings) -> tuple[Check, Check]:

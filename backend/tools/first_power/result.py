@@ -8,9 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from backend.tools.tool import ToolResult
 
-CheckName = Literal[
-    "supply", "resolution", "counts", "direction", "switches", "brake", "phases"
-]  # fmt: skip
+CheckName = Literal["supply", "resolution", "counts", "direction", "switches", "brake", "phases"]
 Status = Literal["passed", "failed", "open"]
 Verdict = Literal["passed", "failed", "incomplete"]
 Phases = Literal[

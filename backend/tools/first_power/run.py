@@ -48,6 +48,7 @@ from backend.tools.measuring.recording import (
     require_signals,
     takes_torque,
 )
+from backend.tools.thresholds import first_power_run as threshold
 from backend.tools.tool import Run, Tool
 from drivers import link as bus
 from drivers.cia402 import Mode, State
@@ -55,18 +56,6 @@ from drivers.errors import EnvelopeExceeded, NotAllowed
 from drivers.halt import HaltCause
 from drivers.texts.message import text
 
-#: Seconds of a pulse, and of no torque before and after it.
-_PULSE_S, _LEAD_S, _AFTER_S, _RAMP_S = 0.03, 0.01, 0.06, 0.004
-#: Each pulse that moves less is followed by one that is stronger by this.
-_STRONGER, _FIRST_PERCENT = 1.35, 1.5
-_SMALL_REV, _LARGE_REV, _WEAKER = 0.003, 0.01, 1.5
-#: A pulse that has moved the shaft so far is over: what is left is what it coasts.
-_CUT_REV = 0.012
-_MOST_PULSES = 60
-_SETTLES_S, _SETTLE_LOOK_S = 1.0, 0.05
-#: A shaft that a person turned counts as at its mark after so long without motion.
-_HAND_STILL_S, _HAND_POLL_S = 2.0, 0.05
-_HAND_LEAST = 0.2
 #: Power off on quick stop, shutdown and "disable operation": no loop is closed for a ramp.
 _COASTING = ("605A:00", "605B:00", "605C:00")
 _WAYS: tuple[Literal[1, -1], ...] = (1, -1)
@@ -96,12 +85,14 @@ async def run(run: Run, settings: FirstPowerSettings) -> FirstPowerResult:
     seen = replace(seen, obstacle=obstacle)
     if run.keep is not None:
         run.keep(
-            "first-power", arrays_of(pulses),
+            "first-power",
+            arrays_of(pulses),
             {
-                "tool": "first-power", "settings": settings.model_dump(mode="json"),
+                "tool": "first-power",
+                "settings": settings.model_dump(mode="json"),
                 "seen": facts_of(seen),
             },
-        )  # fmt: skip
+        )
     return evaluate(seen, pulses, settings)
 
 
@@ -176,14 +167,16 @@ async def _by_hand(run: Run, settings: FirstPowerSettings, seen: Seen) -> Seen:
             for known, state in zip(states, now, strict=True):
                 if state is not None:
                     known.add(state)
-        turned = abs(units.position(position - start)) >= _HAND_LEAST or not settings.hand_turn
+        turned = (
+            abs(units.position(position - start)) >= threshold.HAND_LEAST or not settings.hand_turn
+        )
         operated = not watches or all(len(each) == 2 for each in states)
-        if turned and operated and time.monotonic() - moved_at >= _HAND_STILL_S:
+        if turned and operated and time.monotonic() - moved_at >= threshold.HAND_STILL_S:
             break
-        await asyncio.sleep(_HAND_POLL_S)
+        await asyncio.sleep(threshold.HAND_POLL_S)
     way = units.position(await axis.position_raw() - start)
     both = (len(states[0]) == 2, len(states[1]) == 2) if watches else None
-    turned_rev = way if settings.hand_turn and abs(way) >= _HAND_LEAST else None
+    turned_rev = way if settings.hand_turn and abs(way) >= threshold.HAND_LEAST else None
     return replace(seen, turned_rev=turned_rev, switches=both)
 
 
@@ -245,15 +238,15 @@ class _Test:
         self._pulses = pulses
         self._cap = strongest(settings)
         self._goal = GOAL * settings.travel_limit
-        self._percent, self._still, self._made = _FIRST_PERCENT, 0, 0
+        self._percent, self._still, self._made = threshold.FIRST_PERCENT, 0, 0
 
     async def direction(self, direction: Literal[1, -1]) -> None:
         """Pulses of one sign until the shaft has gone its way or the strongest moves nothing.
 
-        A pulse that moves the shaft by more than `_CUT_REV` is cut off by the loop, which takes
-        the power off: the next one enables the axis again.
+        A pulse that moves the shaft by more than `threshold.CUT_REV` is cut off by the loop, which
+        takes the power off: the next one enables the axis again.
         """
-        self._percent, self._still, self._made = _FIRST_PERCENT, 0, 0
+        self._percent, self._still, self._made = threshold.FIRST_PERCENT, 0, 0
         begin = await self._place()
         while True:
             async with enabled(self._run.axis, self._run.session, Mode.CST):
@@ -263,9 +256,9 @@ class _Test:
 
     async def _until_cut(self, direction: Literal[1, -1], begin: float) -> bool:
         """Whether pulses are to go on after one that was cut off."""
-        while self._made < _MOST_PULSES:
+        while self._made < threshold.MOST_PULSES:
             low = 0.5 if direction > 0 else 0.75
-            done = low + 0.24 * self._made / _MOST_PULSES
+            done = low + 0.24 * self._made / threshold.MOST_PULSES
             self._run.progress(done, text("first-power.pulses"))
             pulse, cut = await self._pulse(direction)
             self._pulses.append(pulse)
@@ -282,14 +275,14 @@ class _Test:
         return False
 
     def _adapt(self, moved: float) -> None:
-        if moved < _SMALL_REV:
-            self._percent = min(self._percent * _STRONGER, self._cap)
-        elif moved > _LARGE_REV:
-            self._percent = max(self._percent / _WEAKER, _FIRST_PERCENT)
+        if moved < threshold.SMALL_REV:
+            self._percent = min(self._percent * threshold.STRONGER, self._cap)
+        elif moved > threshold.LARGE_REV:
+            self._percent = max(self._percent / threshold.WEAKER, threshold.FIRST_PERCENT)
 
     def _far(self, begin: float) -> float:
         """A place from where no further pulse fits into the permitted travel."""
-        return max(self._settings.travel_limit - _LARGE_REV / 2, abs(begin) + STILL_REV)
+        return max(self._settings.travel_limit - threshold.LARGE_REV / 2, abs(begin) + STILL_REV)
 
     async def _place(self) -> float:
         return float(self._units.position(await self._run.axis.position_raw() - self._start))
@@ -309,40 +302,41 @@ class _Test:
             if error.halt.cause not in (HaltCause.POSITION, HaltCause.SPEED):
                 raise
             cut = True
-            await axis.standstill(_SETTLES_S)
+            await axis.standstill(threshold.SETTLES_S)
         after = await self._place()
-        pulse = Pulse(
-            direction=direction, torque_percent=percent, from_rev=before, to_rev=after
-        )  # fmt: skip
+        pulse = Pulse(direction=direction, torque_percent=percent, from_rev=before, to_rev=after)
         return pulse, cut
 
     def _around(self, place_rev: float) -> bus.Envelope:
         """Bounds of one pulse: some degrees, within those of the whole test."""
         limits, here = self._limits, self._start + self._units.position_raw(place_rev)
-        way = abs(self._units.position_raw(_CUT_REV))
+        way = abs(self._units.position_raw(threshold.CUT_REV))
         assert limits.position_min is not None and limits.position_max is not None  # noqa: PT018
         return replace(
-            limits, position_min=max(limits.position_min, here - way),
+            limits,
+            position_min=max(limits.position_min, here - way),
             position_max=min(limits.position_max, here + way),
-        )  # fmt: skip
+        )
 
     def _sequence(self, percent: float) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
         rate = 1.0 / cycle_s(self._run.session)
-        edge = np.linspace(0.0, 1.0, max(2, round(_RAMP_S * rate)))
+        edge = np.linspace(0.0, 1.0, max(2, round(threshold.RAMP_S * rate)))
         shape = np.concatenate(
             [
-                np.zeros(max(1, round(_LEAD_S * rate))), edge,
-                np.ones(max(1, round(_PULSE_S * rate))), edge[::-1],
-                np.zeros(max(1, round(_AFTER_S * rate))),
+                np.zeros(max(1, round(threshold.LEAD_S * rate))),
+                edge,
+                np.ones(max(1, round(threshold.PULSE_S * rate))),
+                edge[::-1],
+                np.zeros(max(1, round(threshold.AFTER_S * rate))),
             ]
-        )  # fmt: skip
+        )
         return np.array([self._units.torque_raw(percent * each) for each in shape], np.int64)
 
     async def _settled(self) -> None:
         """Wait, without torque, until the shaft stands: little friction lets it coast."""
-        deadline, last = time.monotonic() + _SETTLES_S, await self._place()
+        deadline, last = time.monotonic() + threshold.SETTLES_S, await self._place()
         while time.monotonic() < deadline:
-            await dwell(self._run.axis, self._run.session, _SETTLE_LOOK_S)
+            await dwell(self._run.axis, self._run.session, threshold.SETTLE_LOOK_S)
             now = await self._place()
             if abs(now - last) < STILL_REV / 4:
                 return

@@ -264,11 +264,15 @@ TEXTS: dict[str, tuple[str, str]] = {
     "status.open": ("open", "未完成"),
 }
 _TONES: dict[Status, Literal["good", "warn", "plain"]] = {
-    "passed": "good", "failed": "warn", "open": "plain",
-}  # fmt: skip
+    "passed": "good",
+    "failed": "warn",
+    "open": "plain",
+}
 _VERDICTS: dict[Verdict, Literal["good", "warn", "plain"]] = {
-    "passed": "good", "failed": "warn", "incomplete": "warn",
-}  # fmt: skip
+    "passed": "good",
+    "failed": "warn",
+    "incomplete": "warn",
+}
 
 
 def report(result: FirstPowerResult) -> Section:
@@ -277,8 +281,9 @@ def report(result: FirstPowerResult) -> Section:
     charts: tuple[Chart, ...] = ()
     if result.pulses:
         rows = [
-            Row("travel", result.travel_rev, "rev"), Row("torque", result.torque_percent, "%"),
-        ]  # fmt: skip
+            Row("travel", result.travel_rev, "rev"),
+            Row("torque", result.torque_percent, "%"),
+        ]
         charts = (Chart("chart", "chart_number", "chart_place", _lines(result)),)
     return Section(tuple(notes(result)), tuple(rows), charts)
 

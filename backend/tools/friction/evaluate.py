@@ -20,26 +20,13 @@ from backend.tools.friction.result import (
 )
 from backend.tools.friction.settings import FrictionSettings
 from backend.tools.measuring.recording import Recording
+from backend.tools.thresholds import friction_evaluate as threshold
 from backend.tools.tool import Arrays, Meta
 from drivers.errors import NotAllowed
 
 FloatArray = npt.NDArray[np.float64]
 _TURN = 2 * np.pi
 _RPM = 60.0 / _TURN
-#: Blocks that a mean is taken over; a speed that is not held in one of them is uneven.
-_BLOCKS, _EVEN = 8, (0.3, 1.7)
-#: A plateau of which less arrived is not used. What a revolution may lack to be one.
-_ARRIVED, _NEARLY = 0.8, 0.03
-#: The speed loop's torque shows ripple up to this frequency.
-_FOLLOWED_HZ = 25.0
-#: An order stands out so many deviations above the others; and this share of 6077h's step.
-_STANDS_OUT, _OF_STEP = 4.5, 0.25
-_BINS = 360
-#: Torque is not known better than this share of it, whatever the scatter.
-_SHARE = 0.005
-#: Nor an order of the ripple better than this, with the roughly known inertia and friction that are
-#: taken out: one run of each of the five families was off by 2 to 4 %.
-_SHARE_OF_RIPPLE = 0.03
 
 
 @dataclass(frozen=True)
@@ -118,7 +105,7 @@ class _Ripple:
 
     def at(self, angle: FloatArray, rpm: float) -> FloatArray:
         """What the torque shows of it at this speed, [n] in %."""
-        shown = self.stands_out & (self.orders * abs(rpm) / 60.0 <= _FOLLOWED_HZ)
+        shown = self.stands_out & (self.orders * abs(rpm) / 60.0 <= threshold.FOLLOWED_HZ)
         total = np.zeros(angle.size)
         for order, amplitude in zip(self.orders[shown], self.amplitude[shown], strict=True):
             total += np.real(amplitude * np.exp(1j * order * angle))
@@ -154,7 +141,7 @@ def evaluate(data: Map, settings: FrictionSettings, facts: AxisFacts) -> Frictio
     elif ripple is None:
         findings.append(Finding(code="ripple_needs_revolution"))
     elif not np.any(ripple.stands_out):
-        smallest = float(_STANDS_OUT * np.max(ripple.deviation))
+        smallest = float(threshold.STANDS_OUT * np.max(ripple.deviation))
         findings.append(Finding(code="ripple_not_seen", value=smallest, unit="%"))
     if uneven:
         findings.append(Finding(code="uneven_speeds", value=uneven[-1], unit="rpm"))
@@ -211,15 +198,15 @@ def _plateaus(data: Map, rated_nm: float) -> list[_Plateau]:
     found = []
     for number in np.unique(data.plateau[data.plateau != 0]):
         at = np.flatnonzero(data.plateau == number)
-        if at.size < 4 * _BLOCKS or float(np.mean(data.valid[at])) < _ARRIVED:
+        if at.size < 4 * threshold.BLOCKS or float(np.mean(data.valid[at])) < threshold.ARRIVED:
             continue
         angle, torque = data.position_rad[at], data.torque_nm[at] / rated_nm * 100.0
-        edges = np.linspace(0, at.size - 1, _BLOCKS + 1).astype(int)
+        edges = np.linspace(0, at.size - 1, threshold.BLOCKS + 1).astype(int)
         blocks = np.diff(angle[edges]) / np.diff(edges) * data.sample_rate_hz * _RPM
         rpm = float((angle[-1] - angle[0]) / (at.size - 1) * data.sample_rate_hz * _RPM)
-        shares = blocks / rpm if rpm else np.zeros(_BLOCKS)
+        shares = blocks / rpm if rpm else np.zeros(threshold.BLOCKS)
         right = rpm * number > 0
-        even = bool(right and np.all((shares > _EVEN[0]) & (shares < _EVEN[1])))
+        even = bool(right and np.all((shares > threshold.EVEN[0]) & (shares < threshold.EVEN[1])))
         found.append(_Plateau(int(abs(number)) // 100, angle, torque, rpm, even))
     return found
 
@@ -240,7 +227,9 @@ def _points(
         torque, every = float(np.mean(means)), np.concatenate(blocks)
         scatter = float(np.std(every, ddof=1)) / np.sqrt(every.size)
         half = float(scipy.special.stdtrit(every.size - 1, 0.975)) * scatter
-        half = float(np.hypot(np.hypot(half, step / np.sqrt(12.0)), 1.96 * _SHARE * torque))
+        half = float(
+            np.hypot(np.hypot(half, step / np.sqrt(12.0)), 1.96 * threshold.SHARE * torque)
+        )
         points.append(
             FrictionPoint(
                 speed_rpm=float(np.mean([each.rpm for each in same])), torque_percent=torque,
@@ -256,14 +245,14 @@ def _level(
     """Mean torque over whole revolutions where there is one, the means of its blocks, and over
     how many revolutions; without what goes into acceleration."""
     angle, torque = plateau.angle, plateau.torque
-    whole = np.floor(plateau.revolutions + _NEARLY)
+    whole = np.floor(plateau.revolutions + threshold.NEARLY)
     revolutions = plateau.revolutions
     if whole >= 1.0:
         within = np.abs(angle - angle[0]) <= whole * _TURN
         angle, torque, revolutions = angle[within], torque[within], float(whole)
     if ripple is not None:
         torque = torque - ripple.at(angle, plateau.rpm)
-    count = int(whole) if whole >= 4.0 else _BLOCKS
+    count = int(whole) if whole >= 4.0 else threshold.BLOCKS
     parts = np.array([np.mean(part) for part in np.array_split(torque, count)])
     lost = inertia * _acceleration(angle, int(whole), rate)
     return float(np.mean(torque)) - lost, parts - lost, revolutions
@@ -310,7 +299,9 @@ def _ripple(
     # What the loop's delay shifts, it shifts to the other side in the other direction.
     mean, half_difference = 0.5 * (forward + backward), 0.5 * np.abs(forward - backward)
     chance = float(np.median(np.abs(mean))) / np.sqrt(2.0 * np.log(2.0))
-    stands_out = (np.abs(mean) > _STANDS_OUT * chance) & (np.abs(mean) > _OF_STEP * step)
+    stands_out = (np.abs(mean) > threshold.STANDS_OUT * chance) & (
+        np.abs(mean) > threshold.OF_STEP * step
+    )
     stands_out &= half_difference < np.abs(mean)
     # Two revolutions leave two degrees of freedom; `_harmonics` takes 1.96 deviations.
     few = float(scipy.special.stdtrit(2, 0.975)) / 1.96
@@ -347,7 +338,7 @@ def _harmonics(ripple: _Ripple | None) -> tuple[Harmonic, ...]:
     for index in np.flatnonzero(ripple.stands_out):
         # Re(c·exp(jkθ)) = |c|·sin(kθ + arg c + 90°).
         size = float(np.abs(ripple.amplitude[index]))
-        half = float(np.hypot(1.96 * ripple.deviation[index], _SHARE_OF_RIPPLE * size))
+        half = float(np.hypot(1.96 * ripple.deviation[index], threshold.SHARE_OF_RIPPLE * size))
         phase = float(np.degrees(np.angle(ripple.amplitude[index]))) + 90.0
         found.append(
             Harmonic(
@@ -370,11 +361,11 @@ def _by_angle(
         way = [e for e in plateaus if np.sign(e.rpm) == sign]
         angle = np.concatenate([e.angle for e in way])
         torque = np.concatenate([e.torque - np.mean(e.torque) for e in way])
-        place = np.floor(np.mod(angle, _TURN) / _TURN * _BINS).astype(int) % _BINS
-        count = np.bincount(place, minlength=_BINS)
-        total = np.bincount(place, torque, minlength=_BINS)
+        place = np.floor(np.mod(angle, _TURN) / _TURN * threshold.BINS).astype(int) % threshold.BINS
+        count = np.bincount(place, minlength=threshold.BINS)
+        total = np.bincount(place, torque, minlength=threshold.BINS)
         curves.append(tuple(float(s / n) if n else None for s, n in zip(total, count, strict=True)))
-    return tuple((np.arange(_BINS) + 0.5) * 360.0 / _BINS), curves[0], curves[1]
+    return tuple((np.arange(threshold.BINS) + 0.5) * 360.0 / threshold.BINS), curves[0], curves[1]
 
 
 # --- over speed ------------------------------------------------------------------------------

@@ -20,6 +20,7 @@ from backend.tools.inertia.probe import RoughFit
 from backend.tools.measuring.computing import meanwhile
 from backend.tools.measuring.recording import Recording, cycle_s, require_signals, share
 from backend.tools.moves.go_back import go_back
+from backend.tools.thresholds import friction_run as threshold
 from backend.tools.tool import Run, Tool
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
@@ -27,23 +28,6 @@ from drivers.texts.message import Text, text
 
 FloatArray = npt.NDArray[np.float64]
 _TURN = 2 * np.pi
-#: Share of the permitted travel to each side that is used, and of the permitted speed.
-_USED, _FAST = 0.8, 0.9
-#: Time of a ramp at least, and before a plateau counts; standstill between two strokes.
-_RAMP_S, _SETTLE_S, _DWELL_S = 0.15, 0.2, 0.15
-#: Share of the torque beyond friction that ramps take.
-_RAMP_SHARE = 0.35
-#: A plateau lasts so long at least, and no longer for the sake of a whole revolution.
-_LEAST_S, _LONGEST_S = 0.3, 4.0
-#: Plateaus too slow for a whole revolution, in order of preference.
-_SLOW_S = (3.0, 2.0, 1.2)
-#: Without a whole revolution (short travel) a plateau lasts at least this long.
-_SHORT_S = 0.15
-_SLOWEST_RPM = 2.0
-#: The ripple's revolution: with some more on both sides, in this share of the time, at no more
-#: than this frequency of its highest order.
-_RIPPLE_REV, _RIPPLE_SHARE, _RIPPLE_HZ = 1.25, 0.25, 25.0
-_ALIKE = 0.15
 
 
 @dataclass(frozen=True)
@@ -58,13 +42,13 @@ class Stroke:
     @property
     def length_rev(self) -> float:
         """Way of one stroke."""
-        return self.speed_rps * (self.ramp_s + _SETTLE_S + self.plateau_s)
+        return self.speed_rps * (self.ramp_s + threshold.SETTLE_S + self.plateau_s)
 
     @property
     def duration_s(self) -> float:
         """About, with the ways to where it begins and back."""
-        one = 2 * self.ramp_s + _SETTLE_S + self.plateau_s + _DWELL_S
-        return self.strokes * one + 2 * _DWELL_S + 1.0
+        one = 2 * self.ramp_s + threshold.SETTLE_S + self.plateau_s + threshold.DWELL_S
+        return self.strokes * one + 2 * threshold.DWELL_S + 1.0
 
 
 @dataclass(frozen=True)
@@ -78,20 +62,22 @@ class Room:
 
     def stroke(self, speed_rps: float, slow_s: float) -> Stroke | None:
         """Plateaus of this speed; None where the travel has no room for them."""
-        ramp_s = max(_RAMP_S, self.ramp_s_per_rps * speed_rps)
-        left_rev = 2 * self.travel_rev - speed_rps * (ramp_s + _SETTLE_S)
-        wanted = max(1.0, np.ceil(_LEAST_S * speed_rps))
+        ramp_s = max(threshold.RAMP_S, self.ramp_s_per_rps * speed_rps)
+        left_rev = 2 * self.travel_rev - speed_rps * (ramp_s + threshold.SETTLE_S)
+        wanted = max(1.0, np.ceil(threshold.LEAST_S * speed_rps))
         whole = min(wanted, np.floor(left_rev))
-        if whole >= 1.0 and whole / speed_rps <= _LONGEST_S:
+        if whole >= 1.0 and whole / speed_rps <= threshold.LONGEST_S:
             plateau_s = whole / speed_rps
         elif whole >= 1.0:
             plateau_s = slow_s
         else:
             plateau_s = min(left_rev / speed_rps, slow_s)
             # With room for a whole revolution, less would be a worse mean: not so fast then.
-            if plateau_s < _SHORT_S or (2 * self.travel_rev >= 1.5 and speed_rps > 0.5):
+            if plateau_s < threshold.SHORT_S or (2 * self.travel_rev >= 1.5 and speed_rps > 0.5):
                 return None
-        return Stroke(speed_rps, ramp_s, float(plateau_s), 2 if plateau_s >= _LEAST_S else 4)
+        return Stroke(
+            speed_rps, ramp_s, float(plateau_s), 2 if plateau_s >= threshold.LEAST_S else 4
+        )
 
 
 @dataclass(frozen=True)
@@ -114,9 +100,11 @@ def planned(settings: FrictionSettings, room: Room, units: AxisUnits) -> Plan:
         OutOfRange: the limits leave no speed to measure.
     """
     fastest = room.speed_rps
-    while room.stroke(fastest, _SLOW_S[0]) is None and fastest > 1e-3:
+    while room.stroke(fastest, threshold.SLOW_S[0]) is None and fastest > 1e-3:
         fastest *= 0.97
-    slowest = (settings.slowest_rpm or min(_SLOWEST_RPM, 0.05 * settings.speed_limit)) / 60.0
+    slowest = (
+        settings.slowest_rpm or min(threshold.SLOWEST_RPM, 0.05 * settings.speed_limit)
+    ) / 60.0
     if slowest >= 0.5 * fastest:
         raise OutOfRange(
             "friction.between-rpm-rpm-fastest",
@@ -130,16 +118,18 @@ def planned(settings: FrictionSettings, room: Room, units: AxisUnits) -> Plan:
     while True:
         speeds = _representable(np.geomspace(lowest, fastest, count), units)
         if ripple is not None:
-            near = ripple.speed_rps * np.array([1.0 - _ALIKE, 1.0 + _ALIKE])
+            near = ripple.speed_rps * np.array([1.0 - threshold.ALIKE, 1.0 + threshold.ALIKE])
             speeds = [v for v in speeds if not near[0] < v < near[1]]
-        for slow_s in _SLOW_S:
+        for slow_s in threshold.SLOW_S:
             found = [stroke for v in speeds if (stroke := room.stroke(v, slow_s)) is not None]
             whole = sorted([*found, *([ripple] if ripple else [])], key=lambda s: s.speed_rps)
             if whole and sum(stroke.duration_s for stroke in whole) <= room.time_s:
                 return Plan(
-                    tuple(whole), ripple.speed_rps if ripple else None,
-                    fastest < 0.95 * room.speed_rps, lowest > slowest,
-                )  # fmt: skip
+                    tuple(whole),
+                    ripple.speed_rps if ripple else None,
+                    fastest < 0.95 * room.speed_rps,
+                    lowest > slowest,
+                )
         lowest *= 1.3
         if lowest >= 0.5 * fastest:
             raise OutOfRange(
@@ -152,12 +142,12 @@ def planned(settings: FrictionSettings, room: Room, units: AxisUnits) -> Plan:
 
 def _ripple_stroke(settings: FrictionSettings, room: Room, slowest_rps: float) -> Stroke | None:
     """One slow revolution each way; None where it is not asked for or there is no room."""
-    if not settings.ripple or 2 * room.travel_rev < _RIPPLE_REV + 0.1:
+    if not settings.ripple or 2 * room.travel_rev < threshold.RIPPLE_REV + 0.1:
         return None
-    speed = 2 * _RIPPLE_REV / (_RIPPLE_SHARE * room.time_s)
-    speed = min(max(speed, slowest_rps), _RIPPLE_HZ / settings.orders)
-    ramp_s = max(_RAMP_S, room.ramp_s_per_rps * speed)
-    return Stroke(speed, ramp_s, _RIPPLE_REV / speed, 2)
+    speed = 2 * threshold.RIPPLE_REV / (threshold.RIPPLE_SHARE * room.time_s)
+    speed = min(max(speed, slowest_rps), threshold.RIPPLE_HZ / settings.orders)
+    ramp_s = max(threshold.RAMP_S, room.ramp_s_per_rps * speed)
+    return Stroke(speed, ramp_s, threshold.RIPPLE_REV / speed, 2)
 
 
 def _representable(speeds_rps: FloatArray, units: AxisUnits) -> list[float]:
@@ -172,10 +162,10 @@ def speeds_of(stroke: Stroke, rate: float, slow_rps: float) -> tuple[FloatArray,
     The axis goes half a stroke back from where it stands, and comes back there at the end.
     """
     half = _positioning(-0.5 * stroke.length_rev, slow_rps, rate)
-    still = np.zeros(round(_DWELL_S * rate))
+    still = np.zeros(round(threshold.DWELL_S * rate))
     n = max(2, round(stroke.ramp_s * rate))
     rise = 0.5 * (1.0 - np.cos(np.pi * (np.arange(n) + 0.5) / n))
-    settle, plateau = round(_SETTLE_S * rate), round(stroke.plateau_s * rate)
+    settle, plateau = round(threshold.SETTLE_S * rate), round(stroke.plateau_s * rate)
     one = np.concatenate([rise, np.ones(settle + plateau), rise[::-1], still])
     counts = np.zeros(one.size)
     counts[n + settle : n + settle + plateau] = 1.0
@@ -255,9 +245,12 @@ def _room(envelope: Envelope, facts: AxisFacts, rough: RoughFit) -> Room:
     permitted_nm = envelope.torque_percent / 100.0 * facts.rated_torque_nm
     free_nm = permitted_nm - rough.coulomb_nm - abs(rough.gravity_nm)
     # The steepest place of a raised cosine is π/2 times its mean.
-    per_rps = np.pi / 2 * rough.inertia_kgm2 * _TURN / max(_RAMP_SHARE * free_nm, 1e-9)
+    per_rps = np.pi / 2 * rough.inertia_kgm2 * _TURN / max(threshold.RAMP_SHARE * free_nm, 1e-9)
     return Room(
-        _USED * envelope.travel_rev, _FAST * envelope.speed_rpm / 60.0, envelope.time_s, per_rps
+        threshold.USED * envelope.travel_rev,
+        threshold.FAST * envelope.speed_rpm / 60.0,
+        envelope.time_s,
+        per_rps,
     )
 
 

@@ -93,8 +93,10 @@ _TURN_RPM = 9.549296585513721
 """rpm per rad/s."""
 _SHOWN = 8
 _TONES: dict[Code, Literal["good", "warn"]] = {
-    "mapped": "good", "uneven_speeds": "warn", "model_misfit": "warn",
-}  # fmt: skip
+    "mapped": "good",
+    "uneven_speeds": "warn",
+    "model_misfit": "warn",
+}
 
 
 def report(result: FrictionResult) -> Section:
@@ -146,9 +148,11 @@ def _over_speed(result: FrictionResult) -> Chart:
         0.5 * (p.torque_ci95_percent[1] - p.torque_ci95_percent[0]) for p in result.points
     )
     points = Line(
-        "points", tuple(p.speed_rpm for p in result.points),
-        tuple(p.torque_percent for p in result.points), spread,
-    )  # fmt: skip
+        "points",
+        tuple(p.speed_rpm for p in result.points),
+        tuple(p.torque_percent for p in result.points),
+        spread,
+    )
     curve = Line("curve", result.curve_speed_rpm, result.curve_percent)
     return Chart("over_speed", "speed", "torque", (curve, points))
 

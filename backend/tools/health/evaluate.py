@@ -17,12 +17,8 @@ from backend.tools.health.result import (
     HealthValue,
     Quantity,
 )
+from backend.tools.thresholds import health_evaluate as threshold
 from backend.tools.tool import Arrays, Meta
-
-#: So many of a kind are followed, the lowest ones: they are the stiffness of the drive train.
-_FOLLOWED = 3
-#: Speeds of both directions belong together within this share.
-_SAME_SPEED = 0.03
 
 
 def resonances(found: Iterable[Resonance]) -> list[HealthValue]:
@@ -31,7 +27,7 @@ def resonances(found: Iterable[Resonance]) -> list[HealthValue]:
     kinds: tuple[Quantity, ...] = ("resonance", "antiresonance")
     rows = sorted(found, key=lambda row: row.frequency_hz)
     for kind in kinds:
-        own = [row for row in rows if row.kind == kind][:_FOLLOWED]
+        own = [row for row in rows if row.kind == kind][: threshold.FOLLOWED]
         for number, row in enumerate(own, 1):
             low, high = row.frequency_ci95_hz or (None, None)
             values.append(
@@ -51,9 +47,10 @@ def friction(points: Sequence[FrictionPoint]) -> HealthValue | None:
     for ahead in (each for each in points if each.speed_rpm > 0):
         back = min(
             (each for each in points if each.speed_rpm < 0),
-            key=lambda each: abs(each.speed_rpm + ahead.speed_rpm), default=None,
-        )  # fmt: skip
-        if back is None or abs(back.speed_rpm / ahead.speed_rpm + 1.0) > _SAME_SPEED:
+            key=lambda each: abs(each.speed_rpm + ahead.speed_rpm),
+            default=None,
+        )
+        if back is None or abs(back.speed_rpm / ahead.speed_rpm + 1.0) > threshold.SAME_SPEED:
             continue
         halves.append(0.5 * (ahead.torque_percent - back.torque_percent))
         deviations = [
@@ -74,11 +71,13 @@ def arrays_of(rounds: Sequence[HealthRound]) -> dict[str, npt.NDArray[np.generic
     """For storage: one row for each value; a missing quantity is a row without a value."""
     rows = [
         (index, QUANTITIES.index(each.quantity), each.number, each.value, each.low, each.high)
-        for index, one in enumerate(rounds) for each in one.values
+        for index, one in enumerate(rounds)
+        for each in one.values
     ] + [
         (index, QUANTITIES.index(name), 0, math.nan, None, None)
-        for index, one in enumerate(rounds) for name in one.missing
-    ]  # fmt: skip
+        for index, one in enumerate(rounds)
+        for name in one.missing
+    ]
     table = np.array(
         [[math.nan if cell is None else cell for cell in row] for row in rows], np.float64
     ).reshape(-1, 6)

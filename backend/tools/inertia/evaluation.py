@@ -15,15 +15,14 @@ from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.inertia.result import InertiaAnswer, InertiaIntervals, RatioReference
 from backend.tools.measuring.recording import Recording
 from backend.tools.sweep.quiet_velocity import quiet_velocity
+from backend.tools.thresholds import inertia_evaluation as threshold
 from backend.tools.tool import Arrays, Meta
 from drivers.errors import NotAllowed
 from drivers.texts.message import reason_of
 
 Scheme = Literal["free", "limited", "taught"]
 
-CUTOFF_HZ = 25.0
-#: Above this R² nothing is left to explain; below, the load may swing in this range of Hz.
-_EXPLAINED, _SWING_HZ = 0.9995, (4.0, 80.0)
+CUTOFF_HZ = threshold.CUTOFF_HZ
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +96,7 @@ def oscillation_hz(recording: Recording, result: InertiaResult) -> float | None:
     Under its speed loop the motor follows and the load swings behind the coupling, at the
     mechanics' antiresonance.
     """
-    if not np.isfinite(result.inertia_kgm2.value) or result.r2 > _EXPLAINED:
+    if not np.isfinite(result.inertia_kgm2.value) or result.r2 > threshold.EXPLAINED:
         return None
     rate, velocity = recording.sample_rate_hz, recording.velocity_rad_s
     rest = recording.torque_nm - result.inertia_kgm2.value * np.gradient(velocity) * rate
@@ -106,7 +105,9 @@ def oscillation_hz(recording: Recording, result: InertiaResult) -> float | None:
     if result.beside.torque_nm.size:
         rest = rest - result.beside.torque_nm
     density = power_density(rest, rate, round(2.0 * rate))
-    band = (density.frequency_hz >= _SWING_HZ[0]) & (density.frequency_hz <= _SWING_HZ[1])
+    band = (density.frequency_hz >= threshold.SWING_HZ[0]) & (
+        density.frequency_hz <= threshold.SWING_HZ[1]
+    )
     levels = density.value[band]
     peak = int(np.argmax(levels))
     if levels[peak] < 8.0 * float(np.median(levels)):
@@ -177,9 +178,11 @@ def answer_of(outcome: InertiaOutcome) -> InertiaAnswer:
     """The result as page, report, files and command line have it."""
     r = outcome.result
     parts: dict[str, Interval] = {
-        "inertia_kgm2": r.inertia_kgm2, "viscous_nms": r.viscous_nms,
-        "coulomb_nm": r.coulomb_nm, "gravity_nm": r.gravity_nm,
-    }  # fmt: skip
+        "inertia_kgm2": r.inertia_kgm2,
+        "viscous_nms": r.viscous_nms,
+        "coulomb_nm": r.coulomb_nm,
+        "gravity_nm": r.gravity_nm,
+    }
     ratio, spread = r.load_ratio, None
     if ratio is not None and np.isfinite(r.inertia_kgm2.value):
         rotor = r.inertia_kgm2.value / (1.0 + ratio)

@@ -27,47 +27,29 @@ from backend.tools.measuring.recording import (
 from backend.tools.measuring.temporary import stopping_hard
 from backend.tools.moves.go_back import go_back
 from backend.tools.sweep import profile_speed
+from backend.tools.thresholds import inertia_moves as threshold
 from drivers.cia402 import Mode
 from drivers.errors import EnvelopeExceeded, NotAllowed, OutOfRange, exceeded
 from drivers.halt import HaltCause
 from drivers.texts.message import reason_of
 
 _TURN = 2 * np.pi
-#: A ramp shorter than this excites the machine's resonances more than its inertia.
-_RAMP_S = 0.15
-_SMOOTHING_S = 0.03
-_FIRST_REV = 0.12
-#: A first move that gets less than this share of its way is made larger, while it takes little
-#: torque: a heavy load on a loop that was never tuned for it hardly follows.
-_FOLLOWED = 0.2
-#: Of less than this share of its way the loop is soft: it is helped by torque sent ahead of it.
-_FOLLOWS_WELL = 0.7
-#: Moves that take more torque than is permitted become weaker by this factor, so many times.
-_WEAKER, _ATTEMPTS = 0.6, 3
-#: A move is made where its loop is expected to take this share of the permitted torque at most, by
-#: an inertia that is known to so much; else torque is sent ahead, and the move becomes weaker.
-_EXPECTED, _ROUGHLY = 0.8, 0.1
-_SHARES = (1.0, 0.8, _WEAKER, 0.45, _WEAKER**2)
-_FRICTION_RAD_S = 0.5
-#: An axis that moved less than this under too much torque stood: a brake opens within this time.
-_STOOD_REV, _STOOD_SHARE, BRAKE_WAIT_S = 0.005, 0.02, 1.0
-#: Share of the first way at which a free axis has begun to move. A brake that opens later than that
-#: spoils the move, and the loop winds up against it at the beginning of every later one.
-_BEGUN = 0.1
+_SHARES = (1.0, 0.8, threshold.WEAKER, 0.45, threshold.WEAKER**2)
+BRAKE_WAIT_S = threshold.BRAKE_WAIT_S
 
 
 @dataclass(frozen=True)
 class Shape:
     """How gently the moves begin and end."""
 
-    ramp_s: float = _RAMP_S
-    smoothing_s: float = _SMOOTHING_S
+    ramp_s: float = threshold.RAMP_S
+    smoothing_s: float = threshold.SMOOTHING_S
 
     @staticmethod
     def against(swing_hz: float) -> Shape:
         """A mean over one whole swing does not excite it (a finite-impulse input shaper)."""
         period_s = 1.0 / swing_hz
-        return Shape(max(_RAMP_S, 3.0 * period_s), max(_SMOOTHING_S, period_s))
+        return Shape(max(threshold.RAMP_S, 3.0 * period_s), max(threshold.SMOOTHING_S, period_s))
 
 
 @dataclass(frozen=True)
@@ -126,7 +108,7 @@ async def first_look(
         NotAllowed: it hardly moves, it moves the wrong way, or it takes too much torque.
     """
     units, envelope, rate = await axis.units(), settings.envelope, 1.0 / cycle_s(session)
-    aim = min(_FIRST_REV, 0.4 * envelope.travel_rev)
+    aim = min(threshold.FIRST_REV, 0.4 * envelope.travel_rev)
     forward = 1.0
     if ends is not None and units.position(home_raw) + aim > ends[1] - 0.02:
         forward = -1.0
@@ -140,14 +122,13 @@ async def first_look(
         recording = await _first_move(axis, session, envelope, facts, whole)
         moved = float(np.ptp(recording.position_rad)) / _TURN
         peak = float(np.max(np.abs(recording.torque_nm))) / facts.rated_torque_nm
-        if moved >= _FOLLOWED * aim:
+        if moved >= threshold.FOLLOWED * aim:
             break
         # Should it follow all at once, twice the way must still be permitted, and twice the torque.
         way_rev = 2.0 * float(np.sum(np.abs(speed))) / rate / 60.0
         cramped = (
-            way_rev > 0.8 * envelope.travel_rev
-            or 2.0 * float(np.max(np.abs(speed))) > highest_rpm
-        )  # fmt: skip
+            way_rev > 0.8 * envelope.travel_rev or 2.0 * float(np.max(np.abs(speed))) > highest_rpm
+        )
         if cramped or 2.0 * peak > 0.8 * envelope.torque_percent / 100.0:
             raise NotAllowed(
                 "inertia.moves-too-little-cramped" if cramped else "inertia.moves-too-little",
@@ -191,7 +172,7 @@ async def _first_move(
         recording, stood = await moving()
     except EnvelopeExceeded as error:
         moved = abs((await axis.units()).position(await axis.position_raw() - start))
-        waited = axis.brake_wait_s or moved > _STOOD_REV
+        waited = axis.brake_wait_s or moved > threshold.STOOD_REV
         if error.halt.cause is not HaltCause.TORQUE:
             raise
         if waited:
@@ -221,9 +202,9 @@ def _stood(recording: Recording, speed_rpm: npt.NDArray[np.float64]) -> bool:
     shows the same, and no later motion waits.
     """
     demanded = np.abs(np.cumsum(speed_rpm)) / 60.0 / recording.sample_rate_hz
-    begun = int(np.argmax(demanded >= _BEGUN * np.max(demanded)))
+    begun = int(np.argmax(demanded >= threshold.BEGUN * np.max(demanded)))
     position = recording.position_rad / _TURN
-    return bool(abs(position[begun] - position[0]) < _STOOD_SHARE * demanded[begun])
+    return bool(abs(position[begun] - position[0]) < threshold.STOOD_SHARE * demanded[begun])
 
 
 def _too_heavy(axis: Axis, error: EnvelopeExceeded) -> EnvelopeExceeded:
@@ -256,15 +237,15 @@ async def identification_moves(
 
     permitted_nm = envelope.torque_percent / 100.0 * facts.rated_torque_nm
     share, ahead = _bearable(planned, look, permitted_nm, can)
-    for attempt in range(_ATTEMPTS):
-        moves = planned(share * _WEAKER**attempt)
+    for attempt in range(threshold.ATTEMPTS):
+        moves = planned(share * threshold.WEAKER**attempt)
         try:
             return await speed_move(
                 axis, session, moves.speed_rad_s * 60.0 / _TURN, room, facts, reported,
                 torque_nm=moves.torque_nm if ahead else None,
             )  # fmt: skip
         except NotAllowed as error:
-            last = attempt == _ATTEMPTS - 1
+            last = attempt == threshold.ATTEMPTS - 1
             if last or exceeded(error) is not HaltCause.TORQUE:
                 raise
         await quiet(axis)
@@ -276,18 +257,18 @@ def _bearable(
     planned: Callable[[float], _Moves], look: FirstLook, permitted_nm: float, can: bool
 ) -> tuple[float, bool]:
     """How strong the moves may be for this loop, and whether torque is to be sent ahead of it."""
-    ahead = can and look.followed < _FOLLOWS_WELL
+    ahead = can and look.followed < threshold.FOLLOWS_WELL
     if look.loop is None:
         return 1.0, ahead
     pull_nm = abs(look.rough.gravity_nm)
     for share in _SHARES:
         moves = planned(share)
         for sends in (ahead, can):
-            sent_nm = (1.0 - _ROUGHLY) * moves.torque_nm * sends
+            sent_nm = (1.0 - threshold.ROUGHLY) * moves.torque_nm * sends
             expected_nm = look.loop.peak_nm(
                 moves.torque_nm, sent_nm, look.rough.inertia_kgm2, moves.rate_hz
             )
-            if pull_nm + expected_nm <= _EXPECTED * permitted_nm:
+            if pull_nm + expected_nm <= threshold.EXPECTED * permitted_nm:
                 return share, sends
     return _SHARES[-1], can
 
@@ -349,5 +330,5 @@ def _moves(
     tail = np.zeros(round(0.2 * rate))
     played = np.concatenate([trajectory.velocity_rad_s, tail])
     needed = rough.inertia_kgm2 * np.concatenate([trajectory.acceleration_rad_s2, tail])
-    needed += rough.coulomb_nm * np.tanh(played / _FRICTION_RAD_S)
+    needed += rough.coulomb_nm * np.tanh(played / threshold.FRICTION_RAD_S)
     return _Moves(played, needed, rate)

@@ -28,28 +28,13 @@ from backend.tools.measuring.recording import (
     enabled,
     play,
 )
+from backend.tools.thresholds import inertia_probe as threshold
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed
 
 _TURN = 2 * np.pi
-_DURATION_S = 0.28
-#: The axis moves well above this speed, and well above what its sensor and filter blur.
-_ENOUGH_RAD_S = 6.0
-_FIRST_SHARE = 0.02
 
-#: A holding torque above this share of rated torque is a load that pulls.
-PULLED = 0.01
-_SETTLE_S = 0.3
-_READINGS = 12
-_RESTLESS_PERCENT = 5.0
-_RESTLESS_RPM = 3.0
-#: A load that sinks on the softest loop is slower than this long before it is looked at; one that
-#: nothing holds is faster within some hundredths of a second.
-_FALLING_RPM = 30.0
-#: Share of the energy moved to and fro that noise alone does not make.
-_GAINED = 0.1
-#: A motion of some tenths of a second, a mean over so many seconds of which hides nothing.
-_SMOOTHED_S = 0.02
+PULLED = threshold.PULLED
 
 
 @dataclass(frozen=True)
@@ -60,11 +45,6 @@ class Probed:
     coulomb_nm: float
     gravity_nm: float
     rated_nm: float
-
-
-#: Share of the wanted speed below which an axis stood, and how long a brake may take to open after
-#: Operation enabled.
-_STOOD, _BRAKE_S = 0.05, 0.5
 
 
 async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -> float:
@@ -79,21 +59,24 @@ async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -
     units, drive = await axis.units(), axis.drive
     key, speed = drive.require("torque_actual"), drive.require("velocity_actual")
     async with enabled(axis, session, Mode.CSV):
-        await asyncio.sleep(_SETTLE_S)
-        readings = [await drive.read_many([key, speed]) for _ in range(_READINGS)]
+        await asyncio.sleep(threshold.SETTLE_S)
+        readings = [await drive.read_many([key, speed]) for _ in range(threshold.READINGS)]
         # A disabled drive has no torque: a load that it held would seem to pull nothing, and fall.
         await require_enabled(axis)
     raws = [(_integer(r[key].raw), _integer(r[speed].raw)) for r in readings]
     torque = np.array([units.torque(t) for t, _ in raws])
     turning = np.array([units.velocity(v) for _, v in raws])
-    if float(np.std(torque)) > _RESTLESS_PERCENT and float(np.std(turning)) > _RESTLESS_RPM:
+    if (
+        float(np.std(torque)) > threshold.RESTLESS_PERCENT
+        and float(np.std(turning)) > threshold.RESTLESS_RPM
+    ):
         raise NotAllowed(
             "inertia.not-stand-still-under",
             drive=drive.name,
             ptp_percent=float(np.ptp(torque)),
             ptp_rpm=float(np.ptp(turning)),
         )
-    if abs(float(np.mean(turning))) > _FALLING_RPM:
+    if abs(float(np.mean(turning))) > threshold.FALLING_RPM:
         raise Interrupted(
             "inertia.turns-rpm-rated-torque",
             drive=drive.name,
@@ -127,19 +110,19 @@ async def probe_axis(
     step = units.torque(1.0) / 100.0 * rated
     highest = 0.9 * envelope.torque_percent / 100.0 * rated
     limits = await bus_limits(axis, envelope, home_raw)
-    enough = min(_ENOUGH_RAD_S, 0.4 * envelope.speed_rpm * _TURN / 60.0)
-    first = _FIRST_SHARE * rated
+    enough = min(threshold.ENOUGH_RAD_S, 0.4 * envelope.speed_rpm * _TURN / 60.0)
+    first = threshold.FIRST_SHARE * rated
     if inertia_kgm2 is not None:
         # A quarter of the doublet is half a sine: its torque lasts 2/π of its time.
-        needed = enough * inertia_kgm2 / (2.0 / np.pi * _DURATION_S / 4.0)
+        needed = enough * inertia_kgm2 / (2.0 / np.pi * threshold.DURATION_S / 4.0)
         first = max(first, min(0.5 * needed, 0.25 * highest))
     peak = min(first, highest)
     waited = moved_before
     async with enabled(axis, session, Mode.CST):
         # Of the time that a brake may take, the first sequence is a part.
-        open_s = time.monotonic() + _BRAKE_S
+        open_s = time.monotonic() + threshold.BRAKE_S
         while True:
-            values = excite.probe(rate, peak, _DURATION_S, step)
+            values = excite.probe(rate, peak, threshold.DURATION_S, step)
             raw = np.round(values / step).astype(np.int64)
             recording = await play(
                 axis, session, Play(Mode.CST, raw), limits, rated, lambda _fraction: None
@@ -147,7 +130,7 @@ async def probe_axis(
             moved = float(np.max(np.abs(recording.velocity_rad_s)))
             if moved >= enough or peak >= highest:
                 break
-            if moved < _STOOD * enough and not waited:
+            if moved < threshold.STOOD * enough and not waited:
                 # A brake that opens late must not let go of an axis under ever more torque.
                 waited = True
                 # The last setpoint, no torque, is renewed: unrenewed it would expire and disable.
@@ -156,7 +139,7 @@ async def probe_axis(
             # Doubling brings a free axis to the wanted speed without ever jumping past it.
             peak = min(2.0 * peak, highest)
     # An encoder shows a twisting shaft or play in a brake; a turning axis is another matter.
-    if moved < _STOOD * enough:
+    if moved < threshold.STOOD * enough:
         raise NotAllowed(
             "inertia.not-move-rated-torque",
             drive=drive.name,
@@ -183,7 +166,7 @@ def require_right_sign(name: str, recording: Recording) -> None:
         NotAllowed: torque and speed say that it gained some: one of them has the wrong sign.
     """
     power = (recording.torque_nm * recording.velocity_rad_s)[recording.valid]
-    if float(np.sum(power)) < -_GAINED * float(np.sum(np.abs(power))):
+    if float(np.sum(power)) < -threshold.GAINED * float(np.sum(np.abs(power))):
         raise _wrong_sign(name)
 
 
@@ -208,7 +191,7 @@ def smoothed(
     Signals that are smoothed alike still fit each other; the steps of a coarse encoder, which are
     no acceleration, mostly go.
     """
-    window = np.ones(2 * round(0.5 * _SMOOTHED_S * rate) + 1)
+    window = np.ones(2 * round(0.5 * threshold.SMOOTHED_S * rate) + 1)
     taken = np.convolve(np.where(valid, signal, 0.0), window, "same")
     return np.asarray(taken / np.maximum(np.convolve(valid.astype(np.float64), window, "same"), 1))
 

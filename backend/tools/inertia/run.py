@@ -36,15 +36,12 @@ from backend.tools.measuring.recording import require_signals, share
 from backend.tools.measuring.repeats import Repeats
 from backend.tools.moves.end_search import find_ends
 from backend.tools.moves.go_back import go_back
+from backend.tools.thresholds import inertia_run as threshold
 from backend.tools.tool import Keep, Run, Tool
 from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import text
-
-_END_MARGIN_REV = 0.15
-#: Gentle moves last about so many times as long; seconds beside them, such as going back.
-_GENTLY, _AROUND_S = 1.5, 2.0
 
 
 async def inertia(
@@ -100,7 +97,9 @@ async def inertia(
 
     result, swing_hz = await meanwhile(evaluated, back_to(home))
     played_s = recording.velocity_rad_s.size / recording.sample_rate_hz
-    if swing_hz is not None and (repeats or Repeats()).allow(_GENTLY * played_s + _AROUND_S):
+    if swing_hz is not None and (repeats or Repeats()).allow(
+        threshold.GENTLY * played_s + threshold.AROUND_S
+    ):
         # A load that swings in another way than couplings let it is moved again so that it does
         # not.
         gentle = Shape.against(swing_hz)
@@ -141,7 +140,7 @@ def _where(
     """Travel of the moves and where they begin, in rev."""
     if ends is None:
         return settings.envelope.travel_rev, home_rev
-    margin = min(_END_MARGIN_REV, 0.15 * (ends[1] - ends[0]))
+    margin = min(threshold.END_MARGIN_REV, 0.15 * (ends[1] - ends[0]))
     travel = min(ends[1] - ends[0] - 2 * margin, settings.envelope.travel_rev)
     return travel, ends[0] + margin
 

@@ -13,12 +13,9 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-FloatArray = npt.NDArray[np.float64]
+from backend.tools.thresholds import inertia_soft_loop as threshold
 
-#: Gains that explain less of the torque of a move (share of its variance) are not the loop's.
-_EXPLAINED = 0.98
-#: The loop's torque follows its error by so many cycles at most.
-_LATEST = 6
+FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -48,8 +45,8 @@ def soft_loop_of(
 ) -> SoftLoop | None:  # fmt: skip
     """The gains that explain the torque of a move best; None where none do, as of a stiff loop."""
     error = wanted_rad_s - velocity_rad_s
-    best, found = _EXPLAINED, None
-    for late in range(_LATEST):
+    best, found = threshold.EXPLAINED, None
+    for late in range(threshold.LATEST):
         seen = np.concatenate([np.zeros(late), error[: error.size - late]])
         columns = np.column_stack([seen, np.cumsum(seen) / rate_hz, np.ones(seen.size)])[valid]
         torque = torque_nm[valid]

@@ -26,6 +26,7 @@ from backend.scales.units import AxisUnits
 from backend.scales.words import halt_remedy, halt_words
 from backend.tools.jog.hold import Hold
 from backend.tools.jog.run import JogSettings, require_scale
+from backend.tools.thresholds import jog_cyclic as threshold
 from backend.work.jobs import JobResult, Progress
 from drivers import link as bus
 from drivers.cia402 import Mode
@@ -33,11 +34,6 @@ from drivers.errors import LinkTimeout, NotAllowed, OutOfRange, motion_halted
 from drivers.motion.setpoint_plan import Phase
 from drivers.texts import limits
 from drivers.texts.message import text
-
-_RENEW_S, _LOOK_S = 0.05, 0.02
-_STATE_TIMEOUT_S = 5.0
-_MAX_S = 120.0
-_PATIENCE = 10
 
 Signal = npt.NDArray[np.float64]
 
@@ -66,9 +62,12 @@ def signal(settings: GeneratorSettings, cycle_s: float) -> Signal:
     Raises:
         OutOfRange: duration or frequencies that make no sense at this cycle time.
     """
-    if not 0 < settings.duration_s <= _MAX_S:
+    if not 0 < settings.duration_s <= threshold.MAX_S:
         raise OutOfRange(
-            "jog.duration-outside", value=settings.duration_s, limit=f"0…{_MAX_S:g} s", max_s=_MAX_S
+            "jog.duration-outside",
+            value=settings.duration_s,
+            limit=f"0…{threshold.MAX_S:g} s",
+            max_s=threshold.MAX_S,
         )
     nyquist = 0.5 / cycle_s
     highest = max(settings.frequency_hz, settings.frequency_end_hz)
@@ -144,7 +143,10 @@ async def generate(
     values = signal(settings, cycle_s)
     mode = Mode[settings.mode]
     _require_inside(drive, settings)
-    async with keeping_mode(axis, session), axis.enabled_cyclic(session, mode, _STATE_TIMEOUT_S):
+    async with (
+        keeping_mode(axis, session),
+        axis.enabled_cyclic(session, mode, threshold.STATE_TIMEOUT_S),
+    ):
         start = await axis.position_raw()
         if settings.mode == "CSP":
             raw = start + np.round(values * units.position_raw(1.0)).astype(np.int64)
@@ -194,11 +196,11 @@ async def jog_cyclic(
     cycle_s = _cycle(session)
     require_scale(axis, units, settings)
     progress(0.0, text("jog.enabling"))
-    enabled = axis.enabled_cyclic(session, Mode.CSP, _STATE_TIMEOUT_S)
+    enabled = axis.enabled_cyclic(session, Mode.CSP, threshold.STATE_TIMEOUT_S)
     async with keeping_mode(axis, session), enabled:
         start = await axis.position_raw()
         envelope = Envelope(
-            settings.travel_rev, settings.speed_rpm, settings.torque_percent, _MAX_S
+            settings.travel_rev, settings.speed_rpm, settings.torque_percent, threshold.MAX_S
         )
         station = session.station(drive)
         target = address_of(drive.profile.by_role["position_target"])
@@ -216,10 +218,6 @@ async def jog_cyclic(
                 await loop.play(session, drive, trajectory, axis.grant())
             reason = await _while_held(axis, session, hold)
             if reason:
-                break
-            if not isinstance(session.cyclic, bus.Pauses):
-                hold.release("no sign of life from the page for 200 ms")
-                reason = hold.ended()
                 break
             await session.cyclic.pause(station)
             if reason := await _alive(axis, session, hold):
@@ -248,7 +246,7 @@ def run_up(travel: float, speed: float, slope: float, cycle_s: float) -> Signal:
     peak = slope * ramp
     cruise = max(0.0, (travel - peak * ramp) / peak)
     total = 2 * ramp + cruise
-    t = np.arange(min(math.ceil(total / cycle_s) + 1, round(_MAX_S / cycle_s))) * cycle_s
+    t = np.arange(min(math.ceil(total / cycle_s) + 1, round(threshold.MAX_S / cycle_s))) * cycle_s
     rising = 0.5 * slope * t**2
     level = 0.5 * peak * ramp + peak * (t - ramp)
     falling = travel - 0.5 * slope * np.maximum(total - t, 0.0) ** 2
@@ -261,7 +259,7 @@ async def _while_held(axis: Axis, session: CyclicSession, hold: Hold) -> str:
     while not (reason := hold.ended()) and not hold.braking():
         await session.cyclic.renew(station)
         _raise_if_ended(axis, session)
-        await asyncio.sleep(_RENEW_S)
+        await asyncio.sleep(threshold.RENEW_S)
     return reason
 
 
@@ -270,7 +268,7 @@ async def _alive(axis: Axis, session: CyclicSession, hold: Hold) -> str:
     station = session.station(axis.drive)
     while not (reason := hold.ended()) and (hold.braking() or _brakes(session, station)):
         _raise_if_ended(axis, session)
-        await asyncio.sleep(_LOOK_S)
+        await asyncio.sleep(threshold.LOOK_S)
     _raise_if_ended(axis, session)
     return reason
 
@@ -309,7 +307,7 @@ async def play_through(
     await loop.play(session, axis.drive, trajectory, axis.grant())
     began = time.monotonic()
     while (elapsed := time.monotonic() - began) < duration_s or _plays(session, station):
-        if elapsed > _PATIENCE * duration_s + _STATE_TIMEOUT_S:
+        if elapsed > threshold.PATIENCE * duration_s + threshold.STATE_TIMEOUT_S:
             raise LinkTimeout(
                 "jog.station-signal-not-end",
                 station=station,
@@ -320,7 +318,7 @@ async def play_through(
         _raise_if_ended(axis, session)
         progress(min(elapsed / duration_s, 1.0), text("jog.playing"))
         left_s = duration_s - elapsed
-        await asyncio.sleep(min(_RENEW_S, left_s) if left_s > 0 else _RENEW_S)
+        await asyncio.sleep(min(threshold.RENEW_S, left_s) if left_s > 0 else threshold.RENEW_S)
     _raise_if_ended(axis, session)
 
 

@@ -12,12 +12,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-#: Longest time between signs of life before the axis brakes.
-GAP_S = 0.2
-#: From the last sign before a gap to the one that ends it, at most.
-RESUME_S = 0.5
-#: Between the arrivals of two signs of life that end a gap, at least.
-CONFIRM_S = 0.05
+from backend.tools.thresholds import jog_hold as threshold
+
+GAP_S = threshold.GAP_S
+RESUME_S = threshold.RESUME_S
+CONFIRM_S = threshold.CONFIRM_S
 _EXPIRED = f"no sign of life from the page for {1e3 * RESUME_S:.0f} ms"
 
 

@@ -17,6 +17,7 @@ from backend.drive.optional import ramp_keys
 from backend.motion.travel_unit import REVOLUTIONS, TravelUnit
 from backend.scales.units import AxisUnits, ramp_raw
 from backend.tools.jog.hold import GAP_S, Hold
+from backend.tools.thresholds import jog_run as threshold
 from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
@@ -24,10 +25,8 @@ from drivers.errors import DriveError, NotAllowed, OutOfRange
 from drivers.texts import limits
 from drivers.texts.message import text
 
-#: Period of target renewals to the drive (20 Hz or faster).
-PERIOD_S = 0.04
-#: The axis may leave the travel limit by this much before the jog ends with an error.
-TRAVEL_MARGIN_REV = 0.05
+PERIOD_S = threshold.PERIOD_S
+TRAVEL_MARGIN_REV = threshold.TRAVEL_MARGIN_REV
 
 
 @dataclass(frozen=True, slots=True)

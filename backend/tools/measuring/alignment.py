@@ -12,6 +12,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from backend.tools.thresholds import measuring_alignment as threshold
 from drivers.errors import LinkLost
 
 FloatArray = npt.NDArray[np.float64]
@@ -20,10 +21,6 @@ Run: TypeAlias = tuple[int, FloatArray, BoolArray]
 """Cycles missing before it, samples [n, k], validity [n]."""
 
 _IntArray = npt.NDArray[np.int64]
-#: Rows of a run that are compared: enough to tell one place of a sequence from another.
-_COMPARED = 400
-#: Moved setpoints that must agree before a place is believed, where a sequence has as many.
-_SURE = 15
 
 
 def aligned(
@@ -45,7 +42,7 @@ def aligned(
     valid = np.zeros(len(sent), dtype=np.bool_)
     of_sent, *echoes = _keys([sent, *(samples[:, -wide:] for _, samples, _ in runs)])
     moves = int(np.count_nonzero(np.diff(of_sent)))
-    needed = _SURE if moves >= _SURE else min(1, moves)
+    needed = threshold.SURE if moves >= threshold.SURE else min(1, moves)
     # Rows that the next sample may belong to. Recording begins before the sequence does.
     low, high, found = -sum(missing + len(samples) for missing, samples, _ in runs), 0, False
     for (missing, samples, good), echo in zip(runs, echoes, strict=True):
@@ -85,7 +82,7 @@ def _places(sent: _IntArray, echo: _IntArray, low: int, high: int) -> tuple[int,
     """
     moved = np.diff(echo, prepend=echo[:1]) != 0
     begin = max(0, int(np.argmax(moved)) - 1)
-    window = slice(begin, begin + _COMPARED)
+    window = slice(begin, begin + threshold.COMPARED)
     places = np.arange(low, high + 1)
     hits, score = _score(sent, echo[window], moved[window], places + begin)
     best = np.flatnonzero(score == np.max(score))

@@ -15,24 +15,11 @@ import numpy.typing as npt
 
 from backend.analysis.signals.excitation import BaseMotion, Excitation, scaled
 from backend.tools.measuring.waveform import Band, Waveform, grid, periodic, stepped, tones_hz
+from backend.tools.thresholds import measuring_excite as threshold
 from drivers.texts.message import Unsuitable, text
 
 FloatArray = npt.NDArray[np.float64]
 TURN = 2.0 * np.pi
-
-#: Below half of its own torque's share a line is lost in friction; above it, speed runs away.
-_LOOP_CORNER_HZ = 60.0
-_PERIOD_S = 0.65
-#: Base motion as a multiple of the excitation's own speed, so that the speed seldom reverses.
-_BASE_OVER_RMS = 8.0
-_BASE_LEAST_RAD_S = 12.0
-#: Share of the envelope's speed for the base motion; its way in overshoots.
-_BASE_SHARE = 0.4
-#: Share of the speed that it takes where torque affords it: a load that swings moves the motor
-#: more than a rigid one, by how much nobody knows before.
-_BASE_GLADLY = 0.25
-#: Without a loop, lines rise from this frequency on, up to this factor.
-_RISE_HZ, _RISE_MOST = 120.0, 2.5
 
 
 @dataclass(frozen=True)
@@ -78,7 +65,7 @@ def _speed_of(samples: npt.NDArray[np.floating], rate: float, inertia: float) ->
 
 def base_torque_nm(inertia_kgm2: float, speed_rpm: float) -> float:
     """Torque that the base motion's acceleration takes at most in `torque_mode`."""
-    return inertia_kgm2 * TURN / _PERIOD_S * _BASE_SHARE * speed_rpm * TURN / 60.0
+    return inertia_kgm2 * TURN / threshold.PERIOD_S * threshold.BASE_SHARE * speed_rpm * TURN / 60.0
 
 
 def torque_mode(
@@ -107,7 +94,7 @@ def torque_mode(
     slow = TURN * of.slow_hz
 
     # Inertia takes the answer down as frequency rises, but friction needs its share below.
-    shape = np.minimum(np.hypot(1.0, of.line_hz / _RISE_HZ), _RISE_MOST)
+    shape = np.minimum(np.hypot(1.0, of.line_hz / threshold.RISE_HZ), threshold.RISE_MOST)
 
     def one(number: int, motion: BaseMotion | None) -> Excitation:
         return periodic(of, shape, number, base=motion, integrations=2, ramp_samples=of.period // 4)
@@ -115,13 +102,15 @@ def torque_mode(
     unit_speed = _speed_of(one(0, None).one_period, rate, rigid.inertia_kgm2)
     own_rms, own_peak = float(np.std(unit_speed)), float(np.max(np.abs(unit_speed)))
     peak_nm = min(share * room.torque_nm, 0.25 * room.speed_rad_s / own_peak)
-    wanted = max(_BASE_OVER_RMS * own_rms * peak_nm, _BASE_LEAST_RAD_S)
+    wanted = max(threshold.BASE_OVER_RMS * own_rms * peak_nm, threshold.BASE_LEAST_RAD_S)
     affordable = share * room.torque_nm / (rigid.inertia_kgm2 * slow)
-    gladly = max(wanted, min(affordable, _BASE_GLADLY * room.speed_rad_s))
+    gladly = max(wanted, min(affordable, threshold.BASE_GLADLY * room.speed_rad_s))
     # The way in overshoots the steady base motion by about its amplitude.
     travelled = 2.2 / slow
     base_speed = (
-        min(gladly, _BASE_SHARE * room.speed_rad_s, room.travel_rad / travelled) if base else 0.0
+        min(gladly, threshold.BASE_SHARE * room.speed_rad_s, room.travel_rad / travelled)
+        if base
+        else 0.0
     )
     if base and base_speed < 1.0:
         raise Unsuitable(text("measuring.travel-too-little", travel_rev=room.travel_rad / TURN))
@@ -163,7 +152,7 @@ def beside_loop(
     """
 
     def size(f: FloatArray) -> FloatArray:
-        return np.asarray(f / np.hypot(f, _LOOP_CORNER_HZ))
+        return np.asarray(f / np.hypot(f, threshold.LOOP_CORNER_HZ))
 
     sequences = []
     for e, reference in _referenced(rate, band, room, size, realisations, position, base, waveform,

@@ -28,6 +28,7 @@ from backend.tools.measuring.interrupted import (
     raise_if_ended,
     require_held,
 )
+from backend.tools.thresholds import measuring_recording as threshold
 from backend.work.jobs import Progress
 from drivers import link as bus
 from drivers.cia402 import Mode
@@ -35,16 +36,12 @@ from drivers.errors import LinkLost, LinkTimeout, NotAllowed
 from drivers.feedback import FeedbackScale
 from drivers.texts.message import Text
 
-_RENEW_S = 0.03
-_STATE_TIMEOUT_S = 5.0
-#: Samples arrive in bunches; this long after the last setpoint all of them have come.
-_TAIL_S = 1.0
-#: Cycles that are kept from before the motion: its first setpoint goes out in the next one.
-_RUN_IN = 8
 _ROLES = ("position_actual", "velocity_actual", "torque_actual", "status_word")
 _TARGET_OF = {
-    Mode.CSP: "position_target", Mode.CSV: "velocity_target", Mode.CST: "torque_target",
-}  # fmt: skip
+    Mode.CSP: "position_target",
+    Mode.CSV: "velocity_target",
+    Mode.CST: "torque_target",
+}
 
 
 @dataclass(frozen=True)
@@ -106,7 +103,7 @@ class _Catch:
         """What may belong to it; everything as long as the number is not known."""
         if self.first is None or block.cycle is None:
             return [block]
-        early = self.first - _RUN_IN - block.cycle
+        early = self.first - threshold.RUN_IN - block.cycle
         if early <= 0:
             return [block]
         if early >= len(block.samples):
@@ -206,7 +203,9 @@ async def enabled(
     inside = False
     if not by_increments:
         await axis.require_certain_scales()
-    entered = axis.enabled_cyclic(session, mode, _STATE_TIMEOUT_S, by_increments=by_increments)
+    entered = axis.enabled_cyclic(
+        session, mode, threshold.STATE_TIMEOUT_S, by_increments=by_increments
+    )
     try:
         async with entered:
             await _forgotten(axis, session)
@@ -223,11 +222,11 @@ async def enabled(
 async def _forgotten(axis: Axis, session: CyclicSession) -> None:
     """Wait until the loop no longer tells why the motion before this one ended."""
     power, station = session.power(), session.station(axis.drive)
-    deadline = time.monotonic() + _TAIL_S
+    deadline = time.monotonic() + threshold.TAIL_S
     while time.monotonic() < deadline:
         if power is None or not power.axis_state(station).halted:
             return
-        await asyncio.sleep(_RENEW_S / 2)
+        await asyncio.sleep(threshold.RENEW_S / 2)
 
 
 async def dwell(axis: Axis, session: CyclicSession, seconds: float) -> None:
@@ -240,7 +239,7 @@ async def dwell(axis: Axis, session: CyclicSession, seconds: float) -> None:
     while time.monotonic() < end:
         raise_if_ended(axis, session)
         await session.cyclic.renew(station)
-        await asyncio.sleep(_RENEW_S)
+        await asyncio.sleep(threshold.RENEW_S)
 
 
 async def bus_limits(axis: Axis, envelope: Envelope, start_raw: int) -> bus.Envelope:
@@ -340,12 +339,12 @@ async def _drive_through(
         catch.begin(await loop.play(session, axis.drive, trajectory, axis.grant()))
     except NotAllowed as error:
         raise interrupted(error) from error
-    heard, deadline, judged = 0, time.monotonic() + _TAIL_S, 0
+    heard, deadline, judged = 0, time.monotonic() + threshold.TAIL_S, 0
     while True:
         arrived = catch.arrived
         if arrived > heard:
             # A bus may be slow where a busy computer simulates it; one that is silent is gone.
-            heard, deadline = arrived, time.monotonic() + _TAIL_S
+            heard, deadline = arrived, time.monotonic() + threshold.TAIL_S
         # Some bunches beyond the end: the first samples may be older than the first setpoint.
         if arrived * period_s > count * period_s + 0.15:
             # What happened since the last look, in the tail, is no better than before it.
@@ -358,7 +357,7 @@ async def _drive_through(
                 arrived=arrived,
                 count=count,
             )
-        await asyncio.sleep(_RENEW_S)
+        await asyncio.sleep(threshold.RENEW_S)
         raise_if_ended(axis, session)
         await session.cyclic.renew(station)
         progress(min(1.0, arrived / count))

@@ -5,12 +5,11 @@ from __future__ import annotations
 from backend.axis.axis import Axis
 from backend.drive.identity import confirm_identity
 from backend.tools.measuring.temporary import put_back_in_time
+from backend.tools.thresholds import measuring_restore as threshold
 from backend.work.jobs import JobResult
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
 from profiles.schema import Raw
-
-_STANDS_S = 0.5
 
 
 async def settle(axis: Axis, *, asked: bool) -> JobResult:
@@ -24,7 +23,9 @@ async def settle(axis: Axis, *, asked: bool) -> JobResult:
         RestoreFailed: naming what could not be restored; it stays pending.
     """
     drive = axis.drive
-    if await axis.state() is State.OPERATION_ENABLED or not await axis.standstill(_STANDS_S):
+    if await axis.state() is State.OPERATION_ENABLED or not await axis.standstill(
+        threshold.STANDS_S
+    ):
         raise NotAllowed("measuring.values-put-back-axis", drive=drive.name)
     await confirm_identity(drive)
     back: dict[str, Raw] = {}

@@ -23,17 +23,14 @@ from backend.analysis.signals.excitation import (
 )
 from backend.analysis.signals.prbs import prbs_period
 from backend.analysis.signals.stepped_sine import stepped_sine
+from backend.tools.thresholds import measuring_waveform as threshold
 from drivers.texts.message import Unsuitable, text
 
 Waveform = Literal["multisine", "chirp", "prbs", "stepped"]
 FloatArray = npt.NDArray[np.float64]
 
-_PERIOD_S = 0.65
 #: Registers that `prbs_period` knows.
 _ORDERS = range(7, 16)
-#: A stepped sine has at most this many tones, and fewer where they would take longer than this.
-_MOST_TONES, _FEWEST_TONES, _STEPPED_S = 40, 14, 9.0
-_CYCLES, _SETTLE_CYCLES, _SETTLE_S, _MEASURE_S, _TONE_RAMP_S = 4, 2, 0.03, 0.08, 0.02
 
 
 @dataclass(frozen=True)
@@ -71,7 +68,7 @@ def grid(waveform: Waveform, rate_hz: float, band: Band) -> Grid:
     Raises:
         ValueError: no line lies in the band.
     """
-    period = round(_PERIOD_S * rate_hz)
+    period = round(threshold.PERIOD_S * rate_hz)
     if waveform == "prbs":
         order = int(np.clip(np.log2(period + 1), _ORDERS[0], _ORDERS[-1]))
         period = 2**order - 1
@@ -116,11 +113,14 @@ def tones_hz(band: Band) -> FloatArray:
     Raises:
         ValueError: even the fewest take too long.
     """
-    for count in range(_MOST_TONES, _FEWEST_TONES - 1, -1):
+    for count in range(threshold.MOST_TONES, threshold.FEWEST_TONES - 1, -1):
         tones = np.geomspace(band.f_min_hz, band.f_max_hz, count)
-        settle = np.maximum(_SETTLE_CYCLES / tones, _SETTLE_S)
-        measure = np.maximum(_CYCLES / tones, _MEASURE_S)
-        if float(np.sum(settle + measure + np.maximum(_TONE_RAMP_S, 1.0 / tones))) <= _STEPPED_S:
+        settle = np.maximum(threshold.SETTLE_CYCLES / tones, threshold.SETTLE_S)
+        measure = np.maximum(threshold.CYCLES / tones, threshold.MEASURE_S)
+        if (
+            float(np.sum(settle + measure + np.maximum(threshold.TONE_RAMP_S, 1.0 / tones)))
+            <= threshold.STEPPED_S
+        ):
             return np.asarray(tones)
     raise Unsuitable(text("measuring.stepped-sine-too-long", f_min_hz=band.f_min_hz))
 
@@ -131,7 +131,12 @@ def stepped(
     """A stepped sine, or its mirror image; peak of the largest tone 1."""
     sign = -1.0 if invert else 1.0
     return stepped_sine(
-        sample_rate_hz=rate_hz, frequency_hz=tones, settle_cycles=_SETTLE_CYCLES,
-        measure_cycles=_CYCLES, measure_s=_MEASURE_S, settle_s=_SETTLE_S, ramp_s=_TONE_RAMP_S,
+        sample_rate_hz=rate_hz,
+        frequency_hz=tones,
+        settle_cycles=threshold.SETTLE_CYCLES,
+        measure_cycles=threshold.CYCLES,
+        measure_s=threshold.MEASURE_S,
+        settle_s=threshold.SETTLE_S,
+        ramp_s=threshold.TONE_RAMP_S,
         amplitude=np.asarray(sign * amplitude / np.max(np.abs(amplitude))),
-    )  # fmt: skip
+    )

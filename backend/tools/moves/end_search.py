@@ -16,14 +16,13 @@ from backend.tools.inertia.moves import speed_move
 from backend.tools.inertia.probe import RoughFit
 from backend.tools.measuring.recording import cycle_s
 from backend.tools.measuring.temporary import temporary
+from backend.tools.thresholds import moves_end_search as threshold
 from backend.work.jobs import Progress
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts import limits as limit_texts
 from drivers.texts.message import text
 
 _TURN = 2 * np.pi
-#: So long at rest is an end; the axis' own start is not judged.
-_STALL_S, _START_S = 0.12, 0.25
 
 
 async def find_ends(
@@ -96,7 +95,7 @@ async def _creep(
     ramp = np.minimum(np.arange(n) / (0.1 * rate), 1.0)
     ramp[-1] = 0.0
     slow = 0.25 * units.velocity_raw(speed)
-    stall = _Stall(slow, round(_STALL_S * rate), round(_START_S * rate))
+    stall = _Stall(slow, round(threshold.STALL_S * rate), round(threshold.START_S * rate))
 
     envelope = replace(settings.envelope, travel_rev=way * 1.1)
     recording = await speed_move(

@@ -10,21 +10,12 @@ from backend.axis.axis import Axis, Envelope
 from backend.axis.cyclic import CyclicSession
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Play, bus_limits, cycle_s, enabled, play, quiet
+from backend.tools.thresholds import moves_go_back as threshold
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, exceeded
 from drivers.halt import HaltCause
 
 _TURN = 2 * np.pi
-#: Nearer than the larger of these (turns, share of the travel) is near enough.
-_NEAR_REV, _NEAR = 0.02, 0.0125
-_ATTEMPTS = 3
-#: So much more is asked for at most, in turns and as a share of the travel.
-_MISSED_REV, _MISSED = 0.3, 0.2
-#: What share of a way a loop goes, and moves that are different enough to tell.
-_SHARES, _DISTINGUISHED_REV = (0.4, 1.5), 0.02
-#: So many times slower a move becomes at most that takes too much torque: a sixteenth of it goes
-#: into acceleration then.
-_SLOWEST = 4.0
 
 
 async def go_back(
@@ -41,11 +32,11 @@ async def go_back(
     """
     units = await axis.units()
     rest = units.position(goal_raw - await axis.position_raw())
-    most = min(_MISSED_REV, _MISSED * envelope.travel_rev)
+    most = min(threshold.MISSED_REV, threshold.MISSED * envelope.travel_rev)
     moves: list[tuple[float, float]] = []
     slower = 1.0
-    while len(moves) < _ATTEMPTS:
-        if abs(rest) < max(_NEAR_REV, _NEAR * envelope.travel_rev):
+    while len(moves) < threshold.ATTEMPTS:
+        if abs(rest) < max(threshold.NEAR_REV, threshold.NEAR * envelope.travel_rev):
             return
         distance = float(np.clip(_to_ask(rest, moves), rest - most, rest + most))
         around = abs(rest) + envelope.travel_rev
@@ -55,7 +46,7 @@ async def go_back(
                 facts,
             )  # fmt: skip
         except NotAllowed as error:
-            if slower >= _SLOWEST or exceeded(error) is not HaltCause.TORQUE:
+            if slower >= threshold.SLOWEST or exceeded(error) is not HaltCause.TORQUE:
                 raise
             slower *= 2.0
             await quiet(axis)
@@ -97,7 +88,7 @@ def _to_ask(rest: float, moves: list[tuple[float, float]]) -> float:
         return rest
     asked, gone = moves[-1]
     share = 1.0
-    if len(moves) > 1 and abs(asked - moves[-2][0]) > _DISTINGUISHED_REV:
+    if len(moves) > 1 and abs(asked - moves[-2][0]) > threshold.DISTINGUISHED_REV:
         share = (gone - moves[-2][1]) / (asked - moves[-2][0])
-        share = float(np.clip(share, *_SHARES))
+        share = float(np.clip(share, *threshold.SHARES))
     return (rest + share * asked - gone) / share

@@ -11,13 +11,13 @@ from backend.axis.polled import PolledGuard
 from backend.drive.readings import Reading
 from backend.scales.units import ramp_raw
 from backend.tools.autotune.axis_facts import brake_opens_s
+from backend.tools.thresholds import moves_homing as threshold
 from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
 from drivers.texts.message import text
 
-_POLL_S = 0.02
 _START_HOMING = 0x10
 
 
@@ -135,4 +135,4 @@ async def _attained(axis: Axis, settings: HomingSettings, progress: Progress) ->
                 "moves.not-find-home-within", drive=drive.name, time_s=settings.envelope.time_s
             )
         progress(min(0.95, elapsed / settings.envelope.time_s), text("moves.searching-home"))
-        await asyncio.sleep(_POLL_S)
+        await asyncio.sleep(threshold.POLL_S)

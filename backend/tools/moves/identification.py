@@ -7,16 +7,13 @@ import time
 from dataclasses import dataclass
 
 from backend.axis.axis import Axis, Envelope
+from backend.tools.thresholds import moves_identification as threshold
 from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, Rejected
 from drivers.texts.message import prose
 from profiles.functions import DriveIdentification
-
-_POLL_S = 0.02
-#: The drive must show within this time that it has begun.
-_BEGIN_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +97,7 @@ async def _until_done(
                 parameter=spec.status_key,
                 value=status,
             )
-        if not busy and elapsed > _BEGIN_S:
+        if not busy and elapsed > threshold.BEGIN_S:
             raise LinkTimeout(
                 "moves.not-begin-identification-state",
                 drive=drive.name,
@@ -120,4 +117,4 @@ async def _until_done(
                 "moves.identification-took-longer", drive=drive.name, time_s=limit.time_s
             )
         progress(min(0.95, elapsed / limit.time_s), prose(name))
-        await asyncio.sleep(_POLL_S)
+        await asyncio.sleep(threshold.POLL_S)

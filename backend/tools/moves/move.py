@@ -12,15 +12,13 @@ from backend.axis.polled import PolledGuard
 from backend.drive.optional import ramp_keys
 from backend.scales.units import AxisUnits, ramp_raw
 from backend.tools.autotune.axis_facts import brake_opens_s
+from backend.tools.thresholds import moves_move as threshold
 from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
 from drivers.texts import limits
 from drivers.texts.message import text
-
-_POLL_S = 0.02
-_ACKNOWLEDGE_S = 0.1
 
 CONSENT = (
     "No watchdog of the drive is active on this link: if the cable is pulled or this program dies, "
@@ -214,7 +212,7 @@ async def _dwell(axis: Axis, dwell_s: float, watch: _Watch) -> None:
     """Wait, and notice when the axis is pushed away or leaves Operation enabled meanwhile."""
     end = time.monotonic() + dwell_s
     while (left := end - time.monotonic()) > 0:
-        await asyncio.sleep(min(left, 5 * _POLL_S))
+        await asyncio.sleep(min(left, 5 * threshold.POLL_S))
         await _still_inside(axis, watch)
 
 
@@ -253,7 +251,7 @@ async def _to(
                 time_s=envelope.time_s,
                 say=envelope.shown.say(units.position(position - target), "+.4g"),
             )
-        await asyncio.sleep(_POLL_S)
+        await asyncio.sleep(threshold.POLL_S)
 
 
 async def _handed_over(axis: Axis, word: int, opens_s: float) -> None:
@@ -277,11 +275,11 @@ async def _acknowledged(axis: Axis) -> bool:
     Families print the acknowledge in different bits (004:3765 has it in 13), so its absence
     is no error here; whether the axis arrives is judged afterwards.
     """
-    deadline = time.monotonic() + _ACKNOWLEDGE_S
+    deadline = time.monotonic() + threshold.ACKNOWLEDGE_S
     while not await axis.status_word() & cia402.STATUS_SET_POINT_ACKNOWLEDGE:
         if time.monotonic() > deadline:
             return False
-        await asyncio.sleep(_POLL_S / 2)
+        await asyncio.sleep(threshold.POLL_S / 2)
     return True
 
 
@@ -318,7 +316,7 @@ async def _hold(axis: Axis, settings: MoveSettings, start: int, progress: Progre
     while (elapsed := time.monotonic() - began) < envelope.time_s:
         progress(elapsed / envelope.time_s, text("moves.running"))
         await _still_inside(axis, watch)
-        await asyncio.sleep(_POLL_S)
+        await asyncio.sleep(threshold.POLL_S)
     await drive.relax(drive.require(role), 0)
 
 

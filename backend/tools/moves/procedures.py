@@ -10,6 +10,7 @@ from contextlib import AsyncExitStack, nullcontext
 from backend.axis.axis import Axis
 from backend.drive.drive import Drive
 from backend.motion.classes import motion_of
+from backend.tools.thresholds import moves_procedures as threshold
 from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, Rejected
@@ -24,8 +25,6 @@ from profiles.schema import (
     WaitStep,
     WriteStep,
 )
-
-_POLL_S = 0.1
 
 
 def describe(procedure: Procedure) -> list[str]:
@@ -170,7 +169,7 @@ async def _poll(axis: Axis, step: PollStep) -> None:
                 limit=text("limit.within-time", wanted=str(step.equals), timeout_s=step.timeout_s),
                 timeout_s=step.timeout_s,
             )
-        await asyncio.sleep(_POLL_S)
+        await asyncio.sleep(threshold.POLL_S)
 
 
 async def _reconnect(axis: Axis, timeout_s: float) -> None:
@@ -178,7 +177,7 @@ async def _reconnect(axis: Axis, timeout_s: float) -> None:
     axis.drive.forget()
     axis.forget()
     deadline = time.monotonic() + timeout_s
-    await asyncio.sleep(_POLL_S)
+    await asyncio.sleep(threshold.POLL_S)
     while True:
         try:
             await axis.status_word()
@@ -187,7 +186,7 @@ async def _reconnect(axis: Axis, timeout_s: float) -> None:
                 raise LinkTimeout(
                     "moves.not-answer-after-restart", drive=axis.drive.name, timeout_s=timeout_s
                 ) from error
-            await asyncio.sleep(_POLL_S)
+            await asyncio.sleep(threshold.POLL_S)
         else:
             return
 

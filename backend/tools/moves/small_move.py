@@ -19,19 +19,16 @@ from backend.drive.ports import address_of
 from backend.scales.compare import FloatArray, measured_scale
 from backend.tools.jog.cyclic import play_through
 from backend.tools.measuring.recording import cycle_s, enabled, quiet, require_signals
+from backend.tools.thresholds import moves_small_move as threshold
 from backend.work.jobs import JobResult, Progress
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import text
 
-#: Increments of the first move at most, and by how much the next may be longer.
-FIRST_INCREMENTS, LONGER = 1_000, 10
+FIRST_INCREMENTS = threshold.FIRST_INCREMENTS
+LONGER = threshold.LONGER
 _MOST_INCREMENTS = 2**30
-_MOVE_S, _REST_S = 2.0, 0.25
-_TORQUE_PERCENT = (1.0, 50.0)
-_MARGIN, _MARGIN_INCREMENTS = 0.25, 50
-_ARRIVED = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +67,11 @@ async def small_move(
             await quiet(axis)
             target = drive.parameter(drive.require("position_target"))
             trajectory = bus.Trajectory(
-                session.station(drive), address_of(target), start + path,
+                session.station(drive),
+                address_of(target),
+                start + path,
                 await _envelope(axis, settings, start),
-            )  # fmt: skip
+            )
             seen = _Seen(axis)
             leave = session.cyclic.blocks(seen.take)
             try:
@@ -81,7 +80,7 @@ async def small_move(
                 leave()
             await quiet(axis)
             moved = await axis.position_raw() - start
-    if abs(moved - settings.increments) > _ARRIVED * abs(settings.increments) + 2:
+    if abs(moved - settings.increments) > threshold.ARRIVED * abs(settings.increments) + 2:
         raise NotAllowed(
             "moves.moved-increments",
             drive=drive.name,
@@ -92,8 +91,10 @@ async def small_move(
     scale = measured_scale(*seen.evenly(), cycle)
     axis.moved_small(moved, scale)
     return {
-        "moved_increments": moved, "raw_per_inc_s": scale, "next_most": longest_allowed(axis),
-    }  # fmt: skip
+        "moved_increments": moved,
+        "raw_per_inc_s": scale,
+        "next_most": longest_allowed(axis),
+    }
 
 
 class _Seen:
@@ -132,7 +133,7 @@ def _check(axis: Axis, settings: SmallMoveSettings) -> None:
             limit=f"1…{most}",
             most=most,
         )
-    low, high = _TORQUE_PERCENT
+    low, high = threshold.TORQUE_PERCENT
     if not low <= settings.torque_percent <= high:
         raise OutOfRange(
             "moves.small-move-takes-rated",
@@ -146,7 +147,7 @@ def _check(axis: Axis, settings: SmallMoveSettings) -> None:
 
 def _path(increments: int, cycle: float) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     """A raised cosine from 0 to the end, with a rest before and behind."""
-    count, rest = round(_MOVE_S / cycle), round(_REST_S / cycle)
+    count, rest = round(threshold.MOVE_S / cycle), round(threshold.REST_S / cycle)
     way = 0.5 * increments * (1.0 - np.cos(np.pi * np.arange(count + 1) / count))
     ends = np.zeros(rest), np.full(rest, float(increments))
     return np.round(np.concatenate([ends[0], way, ends[1]])).astype(np.int64)
@@ -154,10 +155,12 @@ def _path(increments: int, cycle: float) -> np.ndarray[tuple[int], np.dtype[np.i
 
 async def _envelope(axis: Axis, settings: SmallMoveSettings, start: int) -> bus.Envelope:
     """By position and torque alone: what a speed means is what is to be found out."""
-    margin = round(_MARGIN * abs(settings.increments)) + _MARGIN_INCREMENTS
+    margin = round(threshold.MARGIN * abs(settings.increments)) + threshold.MARGIN_INCREMENTS
     low, high = sorted((start, start + settings.increments))
     torque = (await axis.units()).torque_raw(settings.torque_percent)
     return bus.Envelope(
-        position_min=low - margin, position_max=high + margin, torque_max=torque,
+        position_min=low - margin,
+        position_max=high + margin,
+        torque_max=torque,
         following_error_max=margin,
-    )  # fmt: skip
+    )

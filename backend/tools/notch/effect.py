@@ -43,6 +43,7 @@ from backend.tools.moves.go_back import go_back
 from backend.tools.notch.filters import plan_notches
 from backend.tools.notch.meaning import NotchMeaning
 from backend.tools.notch.trials import BEFORE, Trial, least_of, limits_of, raw_of, trials_of
+from backend.tools.thresholds import notch_effect as threshold
 from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, exceeded
@@ -50,20 +51,7 @@ from drivers.halt import HaltCause
 from drivers.texts.message import reason_of, text
 
 _TURN = 2 * np.pi
-#: Where the notch is tried: share of the sample rate, and limits in Hz.
-_PLACE, _LOWEST_HZ, _HIGHEST_HZ = 0.12, 55.0, 400.0
-_SHARE_OF_TORQUE = 0.35
-#: What was too fast for the envelope is played with so much less torque and speed.
-_SLOWER = 0.7
-#: A trial that lost samples is made again, so many times in all.
-ATTEMPTS = 3
-#: Share of the travel within which the next trial may begin.
-_NEAR = 0.4
-#: An axis that only trembles: its lines begin here, and it may go so far and so fast. Nothing
-#: holds it, so that rounded torques let it drift by some hundredths of a revolution.
-_STILL_FROM_HZ, _STILL_REV, _STILL_RPM = 30.0, 0.3, 150.0
-#: Less than this to the nearest end is too little for it.
-_LEAST_ROOM_REV = 0.1
+ATTEMPTS = threshold.ATTEMPTS
 
 
 def unknown(drive: Drive) -> bool:
@@ -97,13 +85,13 @@ async def measure_meaning(
     rate = 1.0 / cycle_s(session)
 
     def designed(attempt: int) -> excite.Sequence:
-        return _sequence(rate, envelope, facts, rigid, still, _SLOWER**attempt)
+        return _sequence(rate, envelope, facts, rigid, still, threshold.SLOWER**attempt)
 
     sequence = await asyncio.to_thread(designed, 0)
     home = await axis.position_raw()
     repeats = repeats or Repeats()
     free = _Free(axis, session, envelope, facts, path, sequence, home, designed, repeats)
-    near_rev = 0.0 if still else _NEAR * envelope.travel_rev
+    near_rev = 0.0 if still else threshold.NEAR * envelope.travel_rev
     return await tried_with(free, axis, session, envelope, facts, progress, near_rev, repeats)
 
 
@@ -155,7 +143,12 @@ async def tried_with(
             lowest = await player.plain(
                 share(progress, 0.0, part, text("notch.trying-without-notch"))
             )
-        centre = round(min(max(_PLACE / cycle_s(session), _LOWEST_HZ, lowest), _HIGHEST_HZ))
+        centre = round(
+            min(
+                max(threshold.PLACE / cycle_s(session), threshold.LOWEST_HZ, lowest),
+                threshold.HIGHEST_HZ,
+            )
+        )
         if not clock.allow(least_of(slot) * (time.monotonic() - begun_s) / BEFORE):
             raise samples_lost(axis, 0)
         effects: list[tuple[Trial, NotchEffect | None]] = []
@@ -188,11 +181,13 @@ def room_to_tremble(
     envelope: Envelope, at_rev: float, ends_rev: tuple[float, float] | None
 ) -> Envelope | None:
     """The envelope of an axis that stays where it stands; None too near to an end for it."""
-    to_end = _STILL_REV if ends_rev is None else min(at_rev - ends_rev[0], ends_rev[1] - at_rev)
-    room_rev = min(_STILL_REV, envelope.travel_rev, 0.8 * to_end)
-    if room_rev < _LEAST_ROOM_REV:
+    to_end = (
+        threshold.STILL_REV if ends_rev is None else min(at_rev - ends_rev[0], ends_rev[1] - at_rev)
+    )
+    room_rev = min(threshold.STILL_REV, envelope.travel_rev, 0.8 * to_end)
+    if room_rev < threshold.LEAST_ROOM_REV:
         return None
-    speed_rpm = min(envelope.speed_rpm, _STILL_RPM)
+    speed_rpm = min(envelope.speed_rpm, threshold.STILL_RPM)
     return replace(envelope, travel_rev=room_rev, speed_rpm=speed_rpm)
 
 
@@ -203,10 +198,11 @@ def _sequence(
     """The excitation of a frequency response, one realisation, or ``part`` of its size."""
     rated = facts.rated_torque_nm
     room = excite.Room(
-        envelope.torque_percent / 100.0 * rated, part * envelope.speed_rpm * _TURN / 60.0,
+        envelope.torque_percent / 100.0 * rated,
+        part * envelope.speed_rpm * _TURN / 60.0,
         envelope.travel_rev * _TURN,
-    )  # fmt: skip
-    band = excite.band_for(rate, _STILL_FROM_HZ if still else 5.0, None)
+    )
+    band = excite.band_for(rate, threshold.STILL_FROM_HZ if still else 5.0, None)
     try:
         made = excite.torque_mode(
             rate,
@@ -214,7 +210,7 @@ def _sequence(
             room,
             rigid,
             0.0,
-            share=part * _SHARE_OF_TORQUE,
+            share=part * threshold.SHARE_OF_TORQUE,
             realisations=1,
             base=not still,
         )
@@ -385,6 +381,7 @@ def _every_level(drive: Drive, points: list[tuple[int, float]]) -> tuple[tuple[i
 
 def path_of(rate: float, facts: AxisFacts, hold: str | None, delay_s: float) -> SignalPath:
     """The path between setpoint and torque, as a frequency response found it."""
-    path = SignalPath(rate, current_bandwidth_hz=facts.current_bandwidth_hz,
-                      command_delay_s=delay_s)  # fmt: skip
+    path = SignalPath(
+        rate, current_bandwidth_hz=facts.current_bandwidth_hz, command_delay_s=delay_s
+    )
     return replace(path, hold="linear") if hold == "linear" else path

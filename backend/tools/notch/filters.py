@@ -29,14 +29,12 @@ from backend.drive.drive import Drive
 from backend.tools.measuring.temporary import write_settings
 from backend.tools.notch.meaning import NotchMeaning
 from backend.tools.notch.steps import attenuation_steps, hz_steps, level_steps
+from backend.tools.thresholds import notch_filters as threshold
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import Text, Unsuitable, reason_of, text
 from profiles.schema import NotchSlot, NotchSpec, Parameter, Profile
 
-#: Depth shown for families whose manual prints none; the effect has to be measured.
-UNKNOWN_DEPTH_DB = -40.0
-#: A notch that is read back this far from its centre is another one.
-_ELSEWHERE = 0.1
+UNKNOWN_DEPTH_DB = threshold.UNKNOWN_DEPTH_DB
 
 
 @dataclass(frozen=True)
@@ -160,7 +158,7 @@ def _require_meant(
         got = _decoded(profile, spec, slot, number, raw, on, meaning).notch if on else None
     except ValueError:
         got = None
-    if got is None or abs(got.center_hz / notch.center_hz - 1.0) > _ELSEWHERE:
+    if got is None or abs(got.center_hz / notch.center_hz - 1.0) > threshold.ELSEWHERE:
         raise OutOfRange(
             "notch.read-back-other", drive=drive, value=f"{notch.center_hz:g} Hz",
             limit=text("limit.notch-there"), number=number + 1,
@@ -373,9 +371,11 @@ async def write_notches(
 
 
 def combined(
-    profile: Profile, notches: Sequence[Notch], frequency_hz: FloatArray,
+    profile: Profile,
+    notches: Sequence[Notch],
+    frequency_hz: FloatArray,
     meaning: NotchMeaning | None = None,
-) -> ComplexArray:  # fmt: skip
+) -> ComplexArray:
     """All notches in series as the drive makes them."""
     total: ComplexArray = np.ones(frequency_hz.shape, dtype=np.complex128)
     for notch in notches:

@@ -38,23 +38,15 @@ from backend.tools.sweep.evaluation import SweepResult, SweepSettings
 from backend.tools.sweep.plan import Setup, sequences_of, setup_of
 from backend.tools.sweep.play import play_fitting, scaled_by_speed
 from backend.tools.sweep.run import filters_off
+from backend.tools.thresholds import notch_in_loop as threshold
 from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed
 from drivers.texts.message import reason_of
 
 _TURN = 2.0 * np.pi
-#: Whatever a notch may be, the loop's sensitivity stays below this while it is tried.
-_HIGHEST_MS = 3.0
-#: What a notch may be: width as a share of its centre, depth in dB.
-_WIDTHS, _DEPTHS = (0.05, 0.3, 1.0, 2.5), (-6.0, -20.0, -45.0)
-#: Share of the travel within which the next trial may begin: the loop leads the axis back
-#: but for what friction and a pull take of it.
-_NEAR = 0.15
 #: Centres to try, Hz.
 _CENTRES = np.geomspace(50.0, 400.0, 19)
-#: Fewer tell nothing of noise.
-_FEWEST_PERIODS = 2
 
 
 async def measure_meaning_in_loop(
@@ -85,7 +77,14 @@ async def measure_meaning_in_loop(
     player = _Beside(axis, session, settings, setup, plant, await axis.position_raw(), repeats)
     async with temporary(axis, await filters_off(axis, settings)):
         return await tried_with(
-            player, axis, session, envelope, facts, progress, _NEAR * envelope.travel_rev, repeats
+            player,
+            axis,
+            session,
+            envelope,
+            facts,
+            progress,
+            threshold.NEAR * envelope.travel_rev,
+            repeats,
         )
 
 
@@ -123,7 +122,7 @@ class _Beside:
         except ValueError as error:
             raise NotAllowed(
                 "notch.loop-not-identified", drive=name, cause=reason_of(error)
-            ) from error  # fmt: skip
+            ) from error
         self._loop, self._path = found.loop.controller, found.loop.path
         fixed = gains.loops_of(self.axis.drive, replace(facts, torque_filter_hz=None))
         lowest = safe_centre_hz(self._loop, self.plant, fixed.response)
@@ -167,7 +166,7 @@ class _Beside:
                 # The same was played before: its periods tell as much.
                 found = (np.concatenate([kept[0], found[0]]), np.concatenate([kept[1], found[1]]))
             kept, before = (found, e.samples) if len(found[0]) else (kept, before)
-            if len(found[0]) >= _FEWEST_PERIODS:
+            if len(found[0]) >= threshold.FEWEST_PERIODS:
                 lines = LoopLines.of(np.fft.rfft(period)[e.lines], *found)
                 return sent, recording, lines
         raise samples_lost(self.axis, tries)
@@ -184,10 +183,10 @@ def safe_centre_hz(
     f = plant.frequency_hz
     bare = plant.shifted() * (loop.response(f) * fixed(f))
     for centre in _CENTRES:
-        shapes = itertools.product(_WIDTHS, _DEPTHS)
+        shapes = itertools.product(threshold.WIDTHS, threshold.DEPTHS)
         notches = [Notch(centre, w * centre, depth).response(f) for w, depth in shapes]
         loops = np.concatenate([bare, *(bare * notch for notch in notches)])
-        if bool(np.all(stable(loops))) and sensitivity_peak(loops) < _HIGHEST_MS:
+        if bool(np.all(stable(loops))) and sensitivity_peak(loops) < threshold.HIGHEST_MS:
             return float(centre)
     return None
 

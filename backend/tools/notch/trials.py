@@ -6,13 +6,10 @@ from dataclasses import dataclass
 
 from backend.drive.drive import Drive
 from backend.tools.notch.steps import hz_steps
+from backend.tools.thresholds import notch_trials as threshold
 from profiles.schema import NotchSlot
 
-#: Widths in shares of the centre (Hz), or level pairs (width, depth).
-_WIDTHS = (0.5, 0.2)
-#: Values that are tried at least, of a width alone and of levels; plays before the first of them;
-#: seconds that each takes with all that comes around it.
-_LEAST_WIDTHS, _LEAST_LEVELS, BEFORE, _TRIAL_S = 1, 4, 2, 2.9
+BEFORE = threshold.BEFORE
 
 
 @dataclass(frozen=True)
@@ -26,7 +23,7 @@ class Trial:
 def trials_of(drive: Drive, slot: NotchSlot, centre: int) -> list[Trial]:
     """Values that show how width and depth go."""
     if slot.depth_key is None:
-        return [Trial(round(share * centre), None) for share in _WIDTHS]
+        return [Trial(round(share * centre), None) for share in threshold.WIDTHS]
     low_w, high_w = limits_of(drive, slot.width_key)
     low_d, high_d = limits_of(drive, slot.depth_key)
     middle = round(0.5 * (low_w + high_w))
@@ -40,19 +37,19 @@ def trials_of(drive: Drive, slot: NotchSlot, centre: int) -> list[Trial]:
 
 def least_of(slot: NotchSlot) -> int:
     """How many of the trials, from the first, tell what there is to tell."""
-    return _LEAST_WIDTHS if slot.depth_key is None else _LEAST_LEVELS
+    return threshold.LEAST_WIDTHS if slot.depth_key is None else threshold.LEAST_LEVELS
 
 
 def least_s(drive: Drive) -> float:
     """About how long it takes to try what must be tried."""
     slot = _slot(drive)
-    return 0.0 if slot is None else _TRIAL_S * (BEFORE + least_of(slot))
+    return 0.0 if slot is None else threshold.TRIAL_S * (BEFORE + least_of(slot))
 
 
 def every_s(drive: Drive) -> float:
     """About how long it takes to try all that is worth it, beside a loop."""
     slot = _slot(drive)
-    return 0.0 if slot is None else _TRIAL_S * (BEFORE + len(trials_of(drive, slot, 1)))
+    return 0.0 if slot is None else threshold.TRIAL_S * (BEFORE + len(trials_of(drive, slot, 1)))
 
 
 def _slot(drive: Drive) -> NotchSlot | None:

@@ -14,13 +14,11 @@ from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring.figures import figures_of
 from backend.tools.measuring.recording import Recording
 from backend.tools.step.result import MoveNumbers, StepAnswer, StepNumbers
+from backend.tools.thresholds import step_evaluate as threshold
 from backend.tools.tool import Arrays, Meta
 
 _TURN = 2 * np.pi
-#: A settling window is so many times the noise at least: what leaves a narrower one is noise.
-_NOISES = 10.0
-#: Rest before the step.
-LEAD_S = 0.05
+LEAD_S = threshold.LEAD_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,16 +77,16 @@ def evaluate(
         noise = _noise(actual[begin + (end - begin) // 2 : end])
         if window is None:
             usual = 0.02 * abs(settings.size)
-            window, widened = max(usual, _NOISES * noise), _NOISES * noise > usual
+            window, widened = max(usual, threshold.NOISES * noise), threshold.NOISES * noise > usual
         step = step_metrics(
             time[begin:end], actual[begin:end], target=settings.size, initial=0.0, window=window
-        )  # fmt: skip
+        )
     else:
         actual = (recording.position_rad - recording.position_rad[0]) / _TURN
         noise = _noise(actual[-round(0.5 * settings.hold_s * rate) :])
         if window is None:
             usual = 0.02 * abs(settings.size)
-            window, widened = max(usual, _NOISES * noise), _NOISES * noise > usual
+            window, widened = max(usual, threshold.NOISES * noise), threshold.NOISES * noise > usual
         move = move_metrics(time, demand, actual, window=window, torque=torque)
     return StepResult(
         settings.kind, time, demand, actual, torque, step, move,
@@ -107,7 +105,7 @@ def _noise(part: npt.NDArray[np.float64]) -> float:
 
 def significant_size(result: StepResult) -> float:
     """The size in rpm whose usual settling window is ten times the noise that this step shows."""
-    return _NOISES * result.noise / 0.02
+    return threshold.NOISES * result.noise / 0.02
 
 
 def raw_of(

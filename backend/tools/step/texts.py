@@ -69,10 +69,12 @@ def report(result: StepAnswer) -> Section:
         Row("torque_rms", result.torque_rms_percent, "%"),
     ]
     chart = Chart(
-        "chart", "chart.time", f"chart.{result.kind}",
+        "chart",
+        "chart.time",
+        f"chart.{result.kind}",
         (
             Line("chart.demand", result.time_s, result.demand),
             Line("chart.actual", result.time_s, result.actual),
         ),
-    )  # fmt: skip
+    )
     return Section(tuple(notes), tuple(rows), (chart,))

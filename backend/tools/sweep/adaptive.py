@@ -38,7 +38,7 @@ async def play_telling(
     if not setup.by_speed or count <= _PAIR or settings.excitation == "stepped":
         return await play_fitting(
             axis, session, settings, setup, sequences, home, progress, spare, None, repeats
-        )  # fmt: skip
+        )
     pair = sequences[:_PAIR]
     first = await play_fitting(
         axis, session, settings, setup, pair, home, progress, min(spare, _PAIR), (0, count),

@@ -40,6 +40,7 @@ from backend.tools.measuring.recording import Recording
 from backend.tools.measuring.waveform import Waveform
 from backend.tools.sweep.result import SweepAnswer
 from backend.tools.sweep.speed_injection import speed_gain
+from backend.tools.thresholds import sweep_evaluation as threshold
 from drivers.texts.answers import sentences
 from drivers.texts.message import Text, Unsuitable, text
 
@@ -49,16 +50,8 @@ Loop = Literal["auto", "none", "speed", "position"]
 
 _COMMANDED = text("sweep.torque-is-commanded")
 _SLOW = text("sweep.torque-follows-slowly")
-#: A current loop is not slower than this, nor than this share of what the drive tells.
-_SLOW_HZ, _SLOWER = 450.0, 0.7
 _SLOW_OR_FILTERED = text("sweep.slow-or-filtered")
 _DROPPED = text("sweep.torque-not-used")
-#: What is charged to all lines where a speed loop's reference was the excitation, one deviation:
-#: a setpoint that is held until it is sampled tells next to nothing of current loop and delay,
-#: which the loop's own torque has to, and that is small on heavy axes.
-_BY_REFERENCE_S = 15e-6
-#: A speed loop's gain and the mechanics are found in turn, so often at most.
-_ROUNDS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +192,7 @@ def _widened(
         found = replace(found, direct=direct, corrected=direct, trusted=False)
         said.append(_SLOW_OR_FILTERED)
     if by_speed:
-        found = _charged(found, 2j * np.pi * lines * _BY_REFERENCE_S)
+        found = _charged(found, 2j * np.pi * lines * threshold.BY_REFERENCE_S)
     return found, tuple(said)
 
 
@@ -245,7 +238,9 @@ def _mechanics(
 def _slow(corner_hz: float, facts: AxisFacts) -> bool:
     """Whether the torque follows more slowly than the drive tells, or than current loops do."""
     as_reported = facts.current_bandwidth_hz
-    return corner_hz < (_SLOW_HZ if as_reported is None else _SLOWER * as_reported)
+    return corner_hz < (
+        threshold.SLOW_HZ if as_reported is None else threshold.SLOWER * as_reported
+    )
 
 
 def _taken(records: Records) -> tuple[Record, ...]:
@@ -264,7 +259,7 @@ def _by_reference(
     The loop's gains need the mechanics, as a light axis' own speed is sampled, too.
     """
     as_reported = speed_gain(records, path, integral_hz, hold_known=hold_known)
-    for _ in range(_ROUNDS):
+    for _ in range(threshold.ROUNDS):
         taken = _taken(as_reported.played)
         found = identify_with_path(
             taken,

@@ -28,6 +28,7 @@ from backend.tools.moves.go_back import go_back
 from backend.tools.sweep import speed_injection
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.plan import Setup, sequences_of
+from backend.tools.thresholds import sweep_play as threshold
 from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange, exceeded
@@ -36,12 +37,6 @@ from drivers.texts.message import text
 
 _TURN = 2 * np.pi
 MODE_OF = {"none": Mode.CST, "speed": Mode.CSV, "position": Mode.CSP}
-#: Share of the travel from home beyond which nothing more begins.
-_AWAY = 0.15
-#: A sequence that lost samples is played again, so many times at most, where no period is whole.
-_AGAIN = 2
-#: What came to the envelope is played again, this much smaller and with so much less base motion.
-_ATTEMPTS, _WEAKER, _SLOWER = 4, 0.4, 0.7
 
 Recorded: TypeAlias = tuple[excite.Sequence, Recording]
 Records = tuple[Recorded, ...]
@@ -127,7 +122,7 @@ async def _near_home(
 ) -> None:
     """Back to where all began if the axis is so far away that travel may run out."""
     away = abs((await axis.units()).position(await axis.position_raw() - home_raw))
-    if away > _AWAY * settings.envelope.travel_rev:
+    if away > threshold.AWAY * settings.envelope.travel_rev:
         await go_back(axis, session, home_raw, settings.envelope, setup.facts)
 
 
@@ -147,7 +142,7 @@ async def _play_one(
 
 def _worth_another(tries: list[Recorded]) -> bool:
     """Whether another try may bring more: one that has a whole period already gets one more."""
-    if len(tries) > _AGAIN or _whole(*tries[-1]):
+    if len(tries) > threshold.AGAIN or _whole(*tries[-1]):
         return False
     return len(tries) == 1 or all(_kept(*each)[0] == 0 for each in tries)
 
@@ -189,14 +184,14 @@ async def play_fitting(
     Raises:
         NotAllowed: something else ended it, or even the smallest excitation is too much.
     """
-    for attempt in range(1, _ATTEMPTS + 1):
+    for attempt in range(1, threshold.ATTEMPTS + 1):
         try:
             return await _play_all(
                 axis, session, settings, setup, sequences, home_raw, progress, spare, place,
                 repeats or Repeats(),
             )  # fmt: skip
         except NotAllowed as error:
-            if attempt == _ATTEMPTS or not _too_much(error, setup):
+            if attempt == threshold.ATTEMPTS or not _too_much(error, setup):
                 raise
             smaller = await asyncio.to_thread(_smaller, sequences, setup, settings, attempt)
             if not smaller:
@@ -228,12 +223,13 @@ def _smaller(
     if setup.loop != "none":
         return tuple(
             replace(
-                s, excitation=scaled(s.excitation, _WEAKER),
-                base=None if s.base is None else s.base * _SLOWER,
+                s,
+                excitation=scaled(s.excitation, threshold.WEAKER),
+                base=None if s.base is None else s.base * threshold.SLOWER,
             )
             for s in sequences
-        )  # fmt: skip
-    share = _SLOWER**attempt
+        )
+    share = threshold.SLOWER**attempt
     slower = replace(setup, room=replace(setup.room, speed_rad_s=share * setup.room.speed_rad_s))
     try:
         return sequences_of(slower, replace(settings, share=share * settings.share))
@@ -271,7 +267,7 @@ async def _as_sent(
     setup: Setup,
     sent: Play,
     start: int,
-) -> excite.Sequence:  # fmt: skip
+) -> excite.Sequence:
     """The excitation as the rounded setpoints say; estimators must know what really went out."""
     if settings.kind == "mechanics" and not setup.by_speed:
         return sequence

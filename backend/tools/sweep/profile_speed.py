@@ -21,25 +21,17 @@ from backend.drive.drive import Drive
 from backend.drive.optional import existing
 from backend.drive.terminals import read_terminals
 from backend.tools.measuring.recording import Play, bus_limits, cycle_s, enabled, play, quiet
+from backend.tools.thresholds import sweep_profile_speed as threshold
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, exceeded
 from drivers.halt import HaltCause
-from drivers.link import Link, TakesSpeeds
+from drivers.link import Link
 
 CONSENT = (
     "the drive has no watchdog that ends a speed when this computer falls silent: if the cable is "
     "pulled or the program dies during the measurement, the axis goes on with its last speed "
     "until its own travel limit or its emergency stop"
 )
-#: Ramps that are times may be 0 (003:318); others become as steep as this.
-_RAMP_MS = 0
-_RAMP_RPM_S = 1e6
-#: While the sign of a speed is tried: from 0 to the highest speed in this time, at this speed.
-_SLOW_RPM_S = 1500.0
-_TRIED_RPM, _TRIED_S = 20.0, 0.25
-_ALLOWED_RPM, _ALLOWED_REV = 60.0, 0.25
-#: The drive's own torque limit lies above the envelope's, so that the loop sees who exceeds it.
-_ABOVE = 1.2
 #: Bit 8 of DS_C's status word (003:305).
 _HOMED = 1 << 8
 _WHOLE_RANGE = 2**31
@@ -51,7 +43,8 @@ def needed(drive: Drive, link: Link) -> bool:
     target = drive.profile.by_role.get("velocity_target")
     mapped = target is not None and target.pdo in ("rx", "rxtx")
     only_profile = Mode.PV in modes and not modes & {Mode.CSP, Mode.CSV, Mode.CST}
-    return mapped and only_profile and isinstance(link.cyclic, TakesSpeeds)
+    cyclic = link.cyclic
+    return mapped and only_profile and cyclic is not None and cyclic.speeds is not None
 
 
 def require_consent(session: CyclicSession, drive: Drive, consent: bool) -> None:
@@ -127,8 +120,8 @@ async def _prepare(
 ) -> None:  # fmt: skip
     for key in modes:
         modes_of_the_loop(axis.drive, session, key)
-    await axis.limit_torque(limits, _ABOVE * envelope.torque_percent)
-    await _write_ramps(axis, ramps, _SLOW_RPM_S)
+    await axis.limit_torque(limits, threshold.ABOVE * envelope.torque_percent)
+    await _write_ramps(axis, ramps, threshold.SLOW_RPM_S)
     await _require_signed(axis, session, envelope)
     await _write_ramps(axis, ramps, None)
 
@@ -158,9 +151,9 @@ async def _write_ramps(axis: Axis, keys: list[str], rpm_per_s: float | None) -> 
     drive, units = axis.drive, await axis.units()
     times = units.spec.acceleration.startswith("ms")
     for key in keys:
-        raw = units.acceleration_raw(rpm_per_s or _RAMP_RPM_S)
+        raw = units.acceleration_raw(rpm_per_s or threshold.RAMP_RPM_S)
         if rpm_per_s is None and times:
-            raw = _RAMP_MS
+            raw = threshold.RAMP_MS
         low, high = drive.parameter(key).raw_limits
         raw = int(max(raw, raw if low is None else low))
         await drive.write(key, int(min(raw, raw if high is None else high)))
@@ -172,14 +165,16 @@ async def _require_signed(axis: Axis, session: CyclicSession, envelope: Envelope
     60FFh of DS_C is printed as an unsigned number (003:317), with which −1 would be the highest.
     """
     drive, units = axis.drive, await axis.units()
-    steps = round(_TRIED_S / cycle_s(session))
-    speed = -min(_TRIED_RPM, 0.3 * envelope.speed_rpm)
+    steps = round(threshold.TRIED_S / cycle_s(session))
+    speed = -min(threshold.TRIED_RPM, 0.3 * envelope.speed_rpm)
     pause = np.zeros(steps // 4, dtype=np.int64)
     values = np.concatenate([pause, np.full(steps, units.velocity_raw(speed)), pause])
     room = Envelope(
-        min(_ALLOWED_REV, envelope.travel_rev), min(_ALLOWED_RPM, envelope.speed_rpm),
-        envelope.torque_percent, envelope.time_s,
-    )  # fmt: skip
+        min(threshold.ALLOWED_REV, envelope.travel_rev),
+        min(threshold.ALLOWED_RPM, envelope.speed_rpm),
+        envelope.torque_percent,
+        envelope.time_s,
+    )
     try:
         async with enabled(axis, session, Mode.CSV) as start:
             await quiet(axis)
@@ -194,7 +189,7 @@ async def _require_signed(axis: Axis, session: CyclicSession, envelope: Envelope
     if not await axis.standstill(2.0):
         raise LinkTimeout("sweep.still-turns-after-speed", drive=drive.name)
     turned = recording.position_rad[-1] - recording.position_rad[0]
-    if turned > 0.1 * abs(speed) / 60.0 * 2 * np.pi * _TRIED_S:
+    if turned > 0.1 * abs(speed) / 60.0 * 2 * np.pi * threshold.TRIED_S:
         raise _other_way(drive)
 
 

@@ -12,13 +12,9 @@ import numpy.typing as npt
 
 from backend.analysis.signals.spectrum import power_density
 from backend.tools.measuring.recording import Recording
+from backend.tools.thresholds import sweep_quiet_velocity as threshold
 
 _TURN = 2 * np.pi
-#: Nothing of a slow move is up here, so what is there is noise; shares of the sample rate.
-_NOISE = (0.2, 0.45)
-#: The position must be quieter by this much (power): the drive's own speed knows more otherwise.
-_CLEARLY = 4.0
-_WINDOW = 512
 
 
 def quiet_velocity(recording: Recording, cutoff_hz: float) -> npt.NDArray[np.float64]:
@@ -26,20 +22,20 @@ def quiet_velocity(recording: Recording, cutoff_hz: float) -> npt.NDArray[np.flo
     reported, rate = recording.velocity_rad_s, recording.sample_rate_hz
     count = np.arange(reported.size)
     good = recording.valid
-    if np.count_nonzero(good) < _WINDOW or not np.any(recording.position_rad):
+    if np.count_nonzero(good) < threshold.WINDOW or not np.any(recording.position_rad):
         return reported
     position = np.interp(count, count[good], recording.position_rad[good])
     given = np.interp(count, count[good], reported[good])
     # Noise of the position, as a speed at the cutoff.
     from_position = _noise(position, rate) * (_TURN * cutoff_hz) ** 2
-    if from_position * _CLEARLY > _noise(given, rate):
+    if from_position * threshold.CLEARLY > _noise(given, rate):
         return reported
     return np.asarray(np.gradient(position) * rate)
 
 
 def _noise(signal: npt.NDArray[np.float64], rate: float) -> float:
     """Power density of white noise; differences keep the move itself out of the window's skirts."""
-    density = power_density(np.diff(signal, 2), rate, _WINDOW)
+    density = power_density(np.diff(signal, 2), rate, threshold.WINDOW)
     f = density.frequency_hz / rate
-    use = (f >= _NOISE[0]) & (f <= _NOISE[1])
+    use = (f >= threshold.NOISE[0]) & (f <= threshold.NOISE[1])
     return float(np.median(density.value[use] / (2.0 * np.sin(np.pi * f[use])) ** 4))

@@ -21,27 +21,12 @@ from backend.analysis.signals.line_spectra import good_periods, period_spectra
 from backend.tools.measuring import excite
 from backend.tools.measuring.recording import Recording
 from backend.tools.measuring.waveform import Band, Waveform
+from backend.tools.thresholds import sweep_speed_injection as threshold
 
 _TURN = 2 * np.pi
-#: Peak of the first trial in rad/s: even a high gain makes little torque of it.
-FIRST_RAD_S = 0.3
-#: Shares of the permitted speed: for what the axis makes of the excitation, and for the highest
-#: setpoint. A drive that nothing watches goes on with that when the computer falls silent.
-_SPEED_SHARE, _REFERENCE_SHARE = 0.3, 0.9
-_UNWATCHED_SPEED_SHARE, _UNWATCHED_REFERENCE_SHARE = 0.15, 0.5
-#: Share of the permitted torque for excitation and base motion together, and what is left of the
-#: base motion at least.
-_TORQUE_SHARE, _LEAST_BASE = 0.7, 0.4
-#: Deviations of lines are taken to differ by so much, relative to the median; and the power of it.
-_WEIGHTS, _BY_DOUBT = (0.1, 4.0), 0.5
-#: Peak of what the axis makes of it over its deviation: mechanics turn the phases that make it low.
-_PEAK_OVER_RMS = 2.5
-#: Deviation of the reference over its peak.
-_RMS_OVER_PEAK = 0.7
+FIRST_RAD_S = threshold.FIRST_RAD_S
 #: Cycles by which the torque may follow the reference.
 _CYCLES = np.arange(0.0, 4.01, 0.125)
-#: Only above this share of the lines does the reference alone make the torque.
-_UPPER = 0.75
 
 
 def sequences(
@@ -80,20 +65,20 @@ def fitting_size(
     as that lies near its resonance: the base motion gets what the excitation leaves. ``watched``:
     the drive ends a motion whose setpoints stop coming.
     """
-    speed_share = _SPEED_SHARE if watched else _UNWATCHED_SPEED_SHARE
-    reference_share = _REFERENCE_SHARE if watched else _UNWATCHED_REFERENCE_SHARE
+    speed_share = threshold.SPEED_SHARE if watched else threshold.UNWATCHED_SPEED_SHARE
+    reference_share = threshold.REFERENCE_SHARE if watched else threshold.UNWATCHED_REFERENCE_SHARE
     record = _record(sequence, recording)
     gain = _rough_gain(record)
     by_torque = torque_nm / gain
     base = 0.0 if sequence.base is None else float(np.max(np.abs(sequence.base)))
     least = speed_share * room.speed_rad_s
     moves = _speed_over_peak(record, gain) if base else 1.0
-    by_speed = least / (_PEAK_OVER_RMS * moves)
+    by_speed = least / (threshold.PEAK_OVER_RMS * moves)
     most = min(by_speed, reference_share * room.speed_rad_s - base)
     peak = min(by_torque, max(most, least))
-    left_nm = _TORQUE_SHARE * room.torque_nm - torque_nm * peak / by_torque
+    left_nm = threshold.TORQUE_SHARE * room.torque_nm - torque_nm * peak / by_torque
     taken_nm = float(np.max(np.abs(recording.torque_nm)))
-    return Size(peak, base * float(np.clip(left_nm / taken_nm, _LEAST_BASE, 1.0)))
+    return Size(peak, base * float(np.clip(left_nm / taken_nm, threshold.LEAST_BASE, 1.0)))
 
 
 def telling_weight(
@@ -111,7 +96,7 @@ def telling_weight(
     reported = estimate_periodic(taken, SignalPath(rate), "closed_loop", position=True)
     uncertainty = np.nan_to_num(reported.std_db, nan=1.0)
     relative = uncertainty / float(np.median(uncertainty))
-    return np.asarray(np.clip(relative, *_WEIGHTS) ** _BY_DOUBT)
+    return np.asarray(np.clip(relative, *threshold.WEIGHTS) ** threshold.BY_DOUBT)
 
 
 @dataclass(frozen=True)
@@ -188,7 +173,7 @@ class _Upper:
             length, bins = e.period_samples, e.lines
             begins = [e.first_sample + n * length for n in range(max(e.periods - 2, 0), e.periods)]
             cuts = [slice(first, first + length) for first in begins]
-        upper = bins[int(_UPPER * bins.size) :]
+        upper = bins[int(threshold.UPPER * bins.size) :]
         return _Upper(
             tuple(cuts), upper, np.asarray(upper * (e.sample_rate_hz / length), np.float64)
         )
@@ -233,4 +218,4 @@ def _speed_over_peak(record: Record, gain_nms: float) -> float:
     turning = _TURN * e.line_hz
     inertia = float((torque / speed).imag) / (_TURN * e.sample_rate_hz / e.period_samples)
     follows = 1.0 / np.hypot(1.0, turning * max(inertia, 0.0) / gain_nms)
-    return _RMS_OVER_PEAK * float(np.sqrt(np.mean(follows**2)))
+    return threshold.RMS_OVER_PEAK * float(np.sqrt(np.mean(follows**2)))

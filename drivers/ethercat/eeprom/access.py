@@ -72,9 +72,11 @@ class EepromAccess:
         if digest != plan.digest:
             raise NotAllowed("ethercat.eeprom-plan-changed", digest=plan.digest)
         message = {
-            "op": "eeprom_write", "station": station,
-            "present": plan.present.data, "target": plan.target.data,
-        }  # fmt: skip
+            "op": "eeprom_write",
+            "station": station,
+            "present": plan.present.data,
+            "target": plan.target.data,
+        }
         await self._call(message, _WRITE_S, progress)
 
 

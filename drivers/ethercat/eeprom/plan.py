@@ -39,9 +39,7 @@ class Plan:
     def words(self) -> int:
         """How many words are written."""
         before, after = self.present.data, self.target.data
-        return sum(
-            before[at : at + 2] != after[at : at + 2] for at in range(0, len(after), 2)
-        )  # fmt: skip
+        return sum(before[at : at + 2] != after[at : at + 2] for at in range(0, len(after), 2))
 
     @property
     def digest(self) -> str:

@@ -129,10 +129,12 @@ def choose_fixed(
     return max(
         usable,
         key=lambda c: (
-            len(set(want) & set(keys_of(c))), {s.index for s in c} == default,
-            any(s.index in default for s in c), -len(c),
+            len(set(want) & set(keys_of(c))),
+            {s.index for s in c} == default,
+            any(s.index in default for s in c),
+            -len(c),
         ),
-    )  # fmt: skip
+    )
 
 
 def _with(rules: AssignmentRules, chosen: Sequence[PdoSet]) -> tuple[PdoSet, ...]:

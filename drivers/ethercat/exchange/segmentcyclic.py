@@ -81,6 +81,15 @@ class EthercatCyclic:
 
     # Cyclic --------------------------------------------------------------------------------
 
+    @property
+    def power(self) -> EthercatCyclic:
+        """Its loop writes the control words."""
+        return self
+
+    @property
+    def speeds(self) -> None:
+        """Speeds are given to drives with a cyclic mode only."""
+
     async def configure(
         self, inputs: Sequence[CyclicSignal], outputs: Sequence[CyclicSignal], cycle_s: float
     ) -> tuple[CyclicSignal, ...]:
@@ -177,7 +186,7 @@ class EthercatCyclic:
         await self._host.call({"op": "halt", "station": station}, _ANSWER_S)
 
     async def pause(self, station: int) -> None:
-        """See `drivers.link.Pauses`."""
+        """Brake now and hold, enabled, for the next motion."""
         await self._host.call({"op": "pause", "station": station}, _ANSWER_S)
 
     def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:
@@ -192,7 +201,7 @@ class EthercatCyclic:
         return unsubscribe
 
     def newest(self, channels: Sequence[str], within_s: float) -> dict[str, int | float]:
-        """See `drivers.link.TellsNewest`."""
+        """Raw values of the last cycle, see `drivers.link.Cyclic`."""
         sample = None if self._reader is None or not self.running else self._reader.newest()
         if sample is None or not int(sample["flags"][0]) & VALID:
             return {}

@@ -61,11 +61,13 @@ def _registers(found: Message, setup: StationSetup | None) -> Steps[None]:
     if managers is not None:
         found["managers"] = [
             [
-                number, *struct.unpack_from("<HHB", managers, 8 * number),
-                managers[8 * number + 6] & 1, sizes[number - 2] if number > 1 else None,
+                number,
+                *struct.unpack_from("<HHB", managers, 8 * number),
+                managers[8 * number + 6] & 1,
+                sizes[number - 2] if number > 1 else None,
             ]
             for number in range(4)
-        ]  # fmt: skip
+        ]
     if eeprom is not None:
         status = int.from_bytes(eeprom, "little")
         found["eeprom_busy"] = bool(status & _EEPROM_BUSY)

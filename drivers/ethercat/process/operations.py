@@ -284,12 +284,14 @@ class Operations:
             "stations": [
                 self._found(station)
                 | {
-                    "lost": station.lost, "al": station.al_state, "al_code": station.al_code,
+                    "lost": station.lost,
+                    "al": station.al_state,
+                    "al_code": station.al_code,
                     "clock_ahead_ns": station.clock_ahead_ns,
                 }
                 for station in stations
             ],
-        }  # fmt: skip
+        }
 
     def _examine(self, message: Message, done: Done) -> None:
         station = self.roster.station(message)

@@ -180,10 +180,11 @@ class Roster:
             self._powered.discard(station.number)
             station.al_state = 0
             self.event(
-                "lost", station.number,
+                "lost",
+                station.number,
                 f"station {station.number} ({station.name}) no longer answers:"
                 " supply off or cable cut",
-            )  # fmt: skip
+            )
             self.exchange.station_lost(station.number)
         if self.segment.recover(station.number):
             self._returned(station, restarted=True)

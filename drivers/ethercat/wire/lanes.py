@@ -120,9 +120,11 @@ class Lanes:
         if found is None:
             found = self._lanes[station, lane] = _Lane(station)
             self._order.append(found)
-        late = [] if urgency is not Urgency.STOP else [
-            job for job in found.waiting if job.urgency is Urgency.WRITE
-        ]  # fmt: skip
+        late = (
+            []
+            if urgency is not Urgency.STOP
+            else [job for job in found.waiting if job.urgency is Urgency.WRITE]
+        )
         place = sum(job.urgency >= urgency for job in found.waiting)
         found.waiting.insert(place, _Job(steps, done, urgency, self._clock()))
         for job in late:

@@ -363,8 +363,10 @@ class DeviceControl:
     def _echo_status(self) -> int:
         """Status word of the DS_C (003:298-308): bits 0 to 2 echo the state."""
         word = {
-            State.READY: 1, State.SWITCHED_ON: 3, State.OPERATION_ENABLED: 7,
-        }.get(self.state, 0)  # fmt: skip
+            State.READY: 1,
+            State.SWITCHED_ON: 3,
+            State.OPERATION_ENABLED: 7,
+        }.get(self.state, 0)
         s = self._axis.s
         word |= (self.state in (State.FAULT, State.FAULT_REACTION)) << 7
         word |= self.homed << 8

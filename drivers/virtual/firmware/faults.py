@@ -41,10 +41,12 @@ class Faults:
         self._traits = core.family.traits
         self._tripped = tripped
         self.alarms = Alarms(
-            core.profile, self._traits.faults, core.axis,
+            core.profile,
+            self._traits.faults,
+            core.axis,
             FaultLog(self._traits.history_size) if log is None else log,
             unknown_end=self._traits.unknown_faults_end,
-        )  # fmt: skip
+        )
         self.emergencies: list[Emergency] = []
         self.levels: Callable[[], tuple[int, int]] = lambda: (0, 0)
         """Levels of inputs and outputs, for the record of a fault."""

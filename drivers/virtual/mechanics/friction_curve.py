@@ -24,9 +24,11 @@ def ripple_nm(spec: MechanicsSpec, angle_rad: npt.ArrayLike) -> Array:
     """Periodic torque of the motor in Nm by its angle, as the motor has to make it."""
     angle, of = np.asarray(angle_rad, dtype=np.float64), spec.ripple
     harmonics = (
-        (1, of.revolution_nm), (of.pole_pairs, of.pole_pair_nm),
-        (of.cogging_per_rev, of.cogging_nm), (2 * of.cogging_per_rev, of.cogging_second_nm),
-    )  # fmt: skip
+        (1, of.revolution_nm),
+        (of.pole_pairs, of.pole_pair_nm),
+        (of.cogging_per_rev, of.cogging_nm),
+        (2 * of.cogging_per_rev, of.cogging_second_nm),
+    )
     return np.asarray(
         sum((nm * np.sin(order * angle + of.phase_rad) for order, nm in harmonics), 0.0 * angle)
     )

@@ -9,10 +9,10 @@ from random_axes import RATED_NM, Case, errors, played, result_of
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from backend.analysis.mechanics import identify
+from backend.analysis.mechanics import identification_trials
+from backend.analysis.mechanics.identification_trials import Task
 from backend.analysis.mechanics.identify import (
     Identification,
-    _Task,
     _undecided,
     _without_path,
     identify_with_path,
@@ -192,7 +192,7 @@ def test_minimum_is_that_of_a_general_solver():
 def test_uncertainty_tells_how_far_a_path_that_is_off_bends_the_answer():
     case = case_of(1000.0, late_steps=0, current_hz=1000.0)
     path = SignalPath(1000.0, current_bandwidth_hz=1000.0, response_bandwidth_hz=1000.0)
-    task = _Task(records_of(case), "torque_mode")
+    task = Task(records_of(case), "torque_mode")
     found = task.trial(path)
     uncertainty = task.uncertainty(found, corner_known=True)
     # One deviation of the delay, as the covariance of the torque's fit has it, and the same again.
@@ -211,7 +211,7 @@ def test_uncertainty_tells_how_far_a_path_that_is_off_bends_the_answer():
 def test_what_else_may_be_true_widens_the_band():
     case = case_of(1000.0, late_steps=0, current_hz=1000.0)
     path = SignalPath(1000.0, current_bandwidth_hz=1000.0, response_bandwidth_hz=1000.0)
-    task = _Task(records_of(case), "torque_mode")
+    task = Task(records_of(case), "torque_mode")
     best = task.trial(path)
     other = task.trial(replace(path, current_bandwidth_hz=500.0), start=best.solution)
     frf = best.views.velocity
@@ -238,14 +238,14 @@ def test_a_filtered_torque_costs_no_search_with_its_own_path(monkeypatch):
         for r in records_of(case)
     )
     searched = []
-    fit = identify.fit_sampled_model
+    fit = identification_trials.fit_sampled_model
 
     def fitted(raw, path, **given):
         if given.get("start") is None:
             searched.append(path)
         return fit(raw, path, **given)
 
-    monkeypatch.setattr(identify, "fit_sampled_model", fitted)
+    monkeypatch.setattr(identification_trials, "fit_sampled_model", fitted)
     found = identify_with_path(filtered, SignalPath(1000.0), "torque_mode", hold_known=False)
     assert found.torque_dropped
     assert {path.hold for path in searched} == {"zero", "linear"}

@@ -139,6 +139,7 @@ class LateCyclic:
 
     def __init__(self) -> None:
         self.running = False
+        self.power = self.speeds = None
 
     async def configure(
         self, inputs: list[CyclicSignal], _outputs: object, _cycle_s: float

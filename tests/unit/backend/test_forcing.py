@@ -111,7 +111,7 @@ def axis(io_profile: Profile, io_link: MemoryLink) -> Axis:
 
 @pytest.fixture
 def sessions() -> ForcingSessions:
-    return ForcingSessions(JobRunner(), Leases())
+    return ForcingSessions(JobRunner(), Leases().taken_by)
 
 
 def outputs(link: MemoryLink) -> tuple[int, int]:
@@ -210,7 +210,7 @@ async def test_stop_ends_it(axis: Axis, io_link: MemoryLink, sessions: ForcingSe
 
 async def test_control_that_passes_to_another_ends_it(axis: Axis, io_link: MemoryLink) -> None:
     leases = Leases()
-    sessions = ForcingSessions(JobRunner(), leases)
+    sessions = ForcingSessions(JobRunner(), leases.taken_by)
     session = await sessions.start(axis, "outputs", confirmed=True, connection="me")
     await session.set({"DO1": True})
     leases.take("x", "other", "Kim")

@@ -24,6 +24,9 @@ from profiles.schema import LinkSpec, Profile
 from tests.support.memory_link import MemoryLink
 
 TOY: Any = "toy"
+_SEAM = ("drivers.link", "drivers.bus", "drivers.doctor", *(f"drivers.{k}" for k in urls.SCHEMES))
+#: Records of the seam that are no buses: a message may be one of several kinds.
+_VALUES = {"ObjectInfo", "FileTask"}
 STATUS, POSITION = (0x6041, 0), (0x6064, 0)
 
 
@@ -130,3 +133,24 @@ def test_nothing_in_the_backend_asks_for_a_kind_of_bus() -> None:
                 found.append(f"{file.name}:{node.lineno}")
     # `servodeck virtual` may: it refuses to answer on a real network.
     assert found == ["virtual.py:34"]
+
+
+def test_nothing_in_the_backend_asks_which_class_a_bus_or_an_exchange_has() -> None:
+    """What a bus may lack is a part that is None, so that the types say it."""
+    found = []
+    for file in sorted(Path(bench_module.__file__).parents[1].rglob("*.py")):
+        tree = ast.parse(file.read_text("utf-8"))
+        seam = {
+            alias.asname or alias.name
+            for node in ast.walk(tree)
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(_SEAM)
+            for alias in node.names
+        }
+        for node in ast.walk(tree):
+            if not isinstance(node, ast.Call) or ast.unparse(node.func) != "isinstance":
+                continue
+            asked = {part.split(".")[-1] for part in ast.unparse(node.args[1]).split(" | ")}
+            of_the_seam = ast.unparse(node.args[1]).startswith("bus.")
+            if of_the_seam or asked & seam - _VALUES:
+                found.append(f"{file.name}:{node.lineno}")
+    assert found == []

@@ -150,6 +150,8 @@ class DirectLink:
     url = "direct://virtual"
     traits = bus_kind("ethercat").traits
     left_over = ()
+    doctor = frames = speeds = None
+    trouble = ""
 
     def __init__(self, device: Device, profile: Profile) -> None:
         self.device = device
@@ -403,7 +405,15 @@ class DirectLink:
         self._consumers.append(consumer)
         return lambda: self._consumers.remove(consumer)
 
+    def newest(self, channels: Sequence[str], within_s: float) -> dict[str, int | float]:
+        del channels, within_s
+        return {}
+
     # OwnsPowerState ------------------------------------------------------------------------
+
+    @property
+    def power(self) -> DirectLink:
+        return self
 
     async def drive_to(self, station: int, goal: State, mode: int | None = None) -> None:
         del station

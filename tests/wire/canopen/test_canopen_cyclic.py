@@ -19,7 +19,6 @@ from drivers.link import (
     CyclicSignal,
     Envelope,
     LinkEvent,
-    OwnsPowerState,
     ScopeBlock,
     Trajectory,
 )
@@ -103,13 +102,13 @@ async def test_no_node_may_have_the_number_of_our_heartbeat(bench: Bench, option
 async def test_the_loop_owns_the_power_state(bench: Bench, link: CanopenLink) -> None:
     await _run(link, [CONTROL, TARGET])
     cyclic = _cyclic(link)
-    assert isinstance(cyclic, OwnsPowerState)
+    assert cyclic.power is not None
     await _enable(link, CSP)
     assert bench.device.value(0x6040) == 15
     assert bench.device.value(0x6061) == CSP  # by SDO, as the mode is not in the PDOs
     with pytest.raises(NotAllowed, match="the cyclic exchange writes 6040h"):
         await link.write(5, CONTROL.address, b"\x00\x00")
-    await cyclic.drive_to(5, State.SWITCH_ON_DISABLED)
+    await cyclic.power.drive_to(5, State.SWITCH_ON_DISABLED)
     await until(lambda: bench.device.value(0x6041) == 0x0250)
 
 

@@ -13,11 +13,12 @@ import serial
 
 from drivers.errors import LinkLost, OutOfRange
 from drivers.link import Address, LinkEvent
+from drivers.mlink.bus import BUS
 from drivers.modbus.line import Line
 from drivers.modbus.link import RegisterLink, modbus_link
 from drivers.modbus.port import LineSettings, SerialPort
 from drivers.modbus.search import search_line_settings
-from drivers.urls import link_for
+from drivers.urls import link_for, parse_url
 from drivers.virtual.wires.modbus import Trouble
 from drivers.virtual.wires.pty import PtyWire, WireTime
 from tests.support.machine import OwnTime
@@ -197,7 +198,7 @@ async def test_search_of_line_settings_finds_the_rate_the_drive_has(port: Path) 
     said: list[str] = []
     with serving(port, {1: ShelfDevice()}, client_baudrate=460_800):
         found = await search_line_settings(
-            f"mlink://{port}", lambda _fraction, text: said.append(text),
+            parse_url(f"mlink://{port}"), BUS, lambda _fraction, text: said.append(text),
             baudrates=(2_500_000, 115_200, 460_800, 9600), parities=("N",),
         )  # fmt: skip
     assert found is not None
@@ -209,8 +210,9 @@ async def test_search_of_line_settings_finds_the_rate_the_drive_has(port: Path) 
 async def test_search_that_finds_nothing(port: Path) -> None:
     with serving(port, {7: ShelfDevice()}):
         nothing = await search_line_settings(
-            f"mlink://{port}", lambda *_: None, baudrates=(9600,), parities=("N",), stations=(1, 2)
-        )
+            parse_url(f"mlink://{port}"), BUS, lambda *_: None,
+            baudrates=(9600,), parities=("N",), stations=(1, 2),
+        )  # fmt: skip
     assert nothing is None
 
 

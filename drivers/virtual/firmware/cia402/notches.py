@@ -30,8 +30,10 @@ def _notch(profile: Profile, od: ObjectDictionary, encoding: str, slot: NotchSlo
         if not on:
             return None
     centre, width, depth = (
-        value(slot.frequency_key), value(slot.width_key), value(slot.depth_key),
-    )  # fmt: skip
+        value(slot.frequency_key),
+        value(slot.width_key),
+        value(slot.depth_key),
+    )
     if encoding == "hz_levels":
         # No formula is printed: width level/20 of the centre, depth level in percent of the
         # amplitude that is left (0 is deepest). The default, the highest frequency, is off.

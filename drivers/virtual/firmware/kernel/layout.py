@@ -16,7 +16,7 @@ LOOP_OFF, LOOP_POSITION, LOOP_SPEED, LOOP_TORQUE, LOOP_IMPEDANCE = range(5)
 # --- events that end a run early, as bits --------------------------------------------------
 EV_FAULT, EV_STOPPED, EV_ARRIVED, EV_SIGNAL, EV_INDEX, EV_STALL, EV_ALARM_CLOCK, EV_LIMIT = (
     1 << bit for bit in range(8)
-)  # fmt: skip
+)
 # --- protections: bits of the MMS7's error status 200Bh:0Bh (004:6254-6282), then those that
 #     other families have ------------------------------------------------------------------
 (

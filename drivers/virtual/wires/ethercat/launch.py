@@ -52,9 +52,11 @@ class VirtualSegment:
         words = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
         process = subprocess.Popen(
             namespace.command(argv) if namespace else argv,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=words,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=words,
             env=child_environment(),
-        )  # fmt: skip
+        )
         segment = cls(process, words)
         try:
             segment.description = segment._receive(START_TIMEOUT_S)

@@ -1,0 +1,284 @@
+"""Trials of an identification: estimates and fits with one path, refined in turn. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from backend.analysis.loop.loop_fit import fit_loop
+from backend.analysis.mechanics.fit_problem import KnownInertia
+from backend.analysis.mechanics.mode_uncertainty import ModeUncertainty, mode_uncertainties
+from backend.analysis.mechanics.model_fit import Solution, fit_sampled_model, views_of
+from backend.analysis.mechanics.reversals import with_balanced_reversals
+from backend.analysis.response.frf import Frf, estimate_periodic
+from backend.analysis.response.path_fit import (
+    at_whole_cycles,
+    moved_path,
+    path_between,
+    path_covariance,
+)
+from backend.analysis.response.sampled_model import LoopModel, SampledFit
+from backend.analysis.response.sampling import (
+    Hold,
+    SignalPath,
+    command_delay_s,
+    cycles_of,
+)
+from backend.analysis.response.uncertainty import Shifted, Uncertainty
+from backend.analysis.response.uncertainty import uncertainty as joint_uncertainty
+from backend.analysis.signals.line_spectra import Quantity, Record, loop_spectra, speed_lag_s
+from backend.analysis.thresholds import identify as threshold
+
+TRUSTED_ERROR = threshold.TRUSTED_ERROR
+
+
+@dataclass(frozen=True)
+class Views:
+    """The same mechanics by way of the reported velocity and of the reported position."""
+
+    velocity: Frf
+    position: Frf | None
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A fit, and the estimates and the path that it was made with."""
+
+    views: Views
+    path: SignalPath
+    solution: Solution
+
+    @property
+    def fit(self) -> SampledFit:
+        """What it says."""
+        return self.solution.fit
+
+
+@dataclass(frozen=True)
+class Task:
+    """What stays the same from trial to trial."""
+
+    records: tuple[Record, ...]
+    quantity: Quantity
+    max_modes: int = 4
+    jitter_s: float = 0.0
+    inertia: KnownInertia | None = None
+    loop: LoopModel | None = None
+
+    def trial(
+        self, path: SignalPath, coulomb_nm: float | None = None, motion: SampledFit | None = None,
+        start: Solution | None = None,
+    ) -> Trial:  # fmt: skip
+        """Estimates and fit with one path; ``motion`` is a fit before, which tells the images."""
+        if self.quantity == "closed_loop":
+            raise ValueError("mechanics are identified from torque, not from a loop's reference")
+        views = self.views(path, coulomb_nm)
+        solution = fit_sampled_model(
+            views.velocity, path, from_position=views.position, loop=self._loop(path, motion),
+            max_modes=self.max_modes, start=start, inertia=self.inertia,
+        )  # fmt: skip
+        return Trial(views, path, solution)
+
+    def trials(self, paths: tuple[SignalPath, ...]) -> list[Trial]:
+        """All that are worth it, best first: fractions of a cycle where no whole ones do.
+
+        Torque and motion are reported together, so a path that leaves much delay is a wrong one.
+        """
+        first = [p for p in paths if at_whole_cycles(p)] or list(paths)
+        tried = sorted((self.trial(p) for p in first), key=rank)
+        if abs(tried[0].fit.delay_s) * paths[0].sample_rate_hz > threshold.LEFT_LATE:
+            tried += [self.trial(p) for p in paths if p not in first]
+        return sorted(tried, key=rank)
+
+    def at_cycles(self, path: SignalPath, hold: Hold) -> Trial:
+        """A fit with this hold and the whole cycles of delay that leave the least of one."""
+        rate = path.sample_rate_hz
+        # What is too early shows as a delay that is left, what is too late may not.
+        cycles = max(math.floor(path.command_delay_s * rate - 0.25), 0)
+        late_s = command_delay_s(cycles, hold, rate)
+        trial = self.trial(replace(path, hold=hold, command_delay_s=late_s))
+        more = round(trial.fit.delay_s * rate)
+        if more == 0 or cycles + more < 0:
+            return trial
+        late_s = command_delay_s(cycles + more, hold, rate)
+        other = self.trial(replace(path, hold=hold, command_delay_s=late_s))
+        return min(trial, other, key=rank)
+
+    def by_motion(self, trial: Trial) -> Trial:
+        """The same with a path that only the motion moves, from where it is usual."""
+        for _ in range(threshold.MOTION_PASSES):
+            uncertainty = self.uncertainty(trial, corner_known=False)
+            finite = np.all(np.isfinite(uncertainty.path_step))
+            if not finite or np.all(
+                np.abs(uncertainty.path_step) < threshold.SETTLED * uncertainty.path_std
+            ):
+                break
+            moved = self.moved(trial, uncertainty)
+            if moved.fit.score >= trial.fit.score:
+                break
+            trial = moved
+        return trial
+
+    def views(self, path: SignalPath, coulomb_nm: float | None) -> Views:
+        """Estimates from what was recorded."""
+        velocity = estimate_periodic(
+            self.records, path, self.quantity, coulomb_nm=coulomb_nm, jitter_s=self.jitter_s
+        )
+        if any(record.position is None for record in self.records):
+            return Views(velocity, None)
+        position = estimate_periodic(
+            self.records, path, self.quantity, coulomb_nm=velocity.coulomb_nm,
+            jitter_s=self.jitter_s, position=True,
+        )  # fmt: skip
+        return Views(velocity, position)
+
+    def refined(self, first: Trial, path_of: Callable[[SampledFit], SignalPath]) -> Trial:
+        """Loop, path and mechanics in turn: each is needed to take the images out of the others."""
+        last = first
+        for _ in range(threshold.PASSES if self.quantity == "torque_injection" else 0):
+            path = path_of(last.fit)
+            change = abs(self._loop(path, last.fit).c0 / last.fit.loop.c0 - 1.0)
+            if _alike(path, last.path) and change < 0.003:
+                break
+            last = self.trial(path, last.views.velocity.coulomb_nm, last.fit)
+        return last
+
+    def balanced(self, trial: Trial) -> tuple[Task, Trial]:
+        """The same refined with friction as the balance of torques tells it at reversals.
+
+        The round whose friction leaves the realisations most alike: a balance that is off bends
+        friction and damping against each other.
+        """
+        task, last = self, trial
+        best = task, last
+        lag_s = speed_lag_s(self.records, trial.path)
+        motion = trial.fit if self.quantity == "torque_injection" else None
+        for n in range(threshold.BALANCES):
+            if last.fit.error > max(TRUSTED_ERROR, 1.5 * last.fit.noise):
+                break
+            friction_nm = last.views.velocity.coulomb_nm
+            reported = with_balanced_reversals(
+                self.records, self.quantity, last.fit, friction_nm, lag_s
+            )
+            task = replace(self, records=reported)
+            anew = n == 0 and _hidden_by_friction(trial)
+            last = task.trial(trial.path, None, motion, None if anew else last.solution)
+            least = best[1].views.velocity.scatter_left
+            if last.views.velocity.scatter_left < threshold.AS_ALIKE * least:
+                best = task, last
+        return best
+
+    def with_sure_modes(
+        self, trial: Trial, uncertainty: Uncertainty, corner_known: bool
+    ) -> tuple[Trial, Uncertainty]:
+        """The same with fewer modes as long as one of them may as well be none.
+
+        Two that share what one does are as little known, each by itself.
+        """
+        motion = trial.fit if self.quantity == "torque_injection" else None
+        while trial.fit.error <= TRUSTED_ERROR and _unsure(trial, uncertainty):
+            task = replace(self, max_modes=len(trial.fit.model.modes) - 1)
+            fewer = task.trial(trial.path, trial.views.velocity.coulomb_nm, motion)
+            if fewer.fit.score > trial.fit.score + threshold.WORTH_A_MODE:
+                break
+            trial, uncertainty = fewer, task.uncertainty(fewer, corner_known)
+        return trial, uncertainty
+
+    def moved(self, trial: Trial, uncertainty: Uncertainty) -> Trial:
+        """The same mechanics refined on the path that torque and motion together would have."""
+        most = np.maximum(2.0 * uncertainty.path_std, threshold.LONGEST_STEP)
+        step = np.clip(uncertainty.path_step, -most, most)
+        path = moved_path(trial.path, float(step[0]), float(step[1]) if step.size > 1 else 0.0)
+        motion = trial.fit if self.quantity == "torque_injection" else None
+        return self.trial(path, trial.views.velocity.coulomb_nm, motion, trial.solution)
+
+    def uncertainty(
+        self, trial: Trial, corner_known: bool, by_torque: SignalPath | None = None
+    ) -> Uncertainty:
+        """How far path and mechanics may be off together.
+
+        ``by_torque`` is the path that the torque alone tells, where the trial has another one.
+        """
+        closed = self.quantity == "torque_injection"
+        covariance = path_covariance(
+            self.records, trial.path, loop_closed=closed, corner_known=corner_known,
+            motion=trial.fit if closed else None, controller=self.loop,
+        )  # fmt: skip
+        problem = trial.solution.problem
+        shifted = []
+        for n in range(len(covariance)):
+            path = moved_path(trial.path, threshold.STEP * (n == 0), threshold.STEP * (n == 1))
+            other = self.views(path, trial.views.velocity.coulomb_nm)
+            seen = views_of(other.velocity, other.position, path, trial.fit.loop)
+            views = tuple(
+                replace(v, g=o.g, sampler=o.sampler)
+                for v, o in zip(problem.views, seen, strict=True)
+            )
+            shifted.append(Shifted(views, threshold.STEP))
+        moved = path_between(by_torque or trial.path, trial.path)[: len(covariance)]
+        return joint_uncertainty(problem, trial.solution.x, shifted, covariance, moved)
+
+    def _loop(self, path: SignalPath, motion: SampledFit | None) -> LoopModel:
+        """The controller that is closed meanwhile."""
+        if self.quantity == "torque_mode":
+            return LoopModel()
+        if self.loop is not None:
+            return self.loop
+        own, velocity = loop_spectra(self.records, path)
+        lines = self.records[0].excitation.line_hz
+        if motion is not None:
+            own = own / motion.loop_image_factor(lines)
+        return fit_loop(lines, own, velocity, path)
+
+
+def _alike(one: SignalPath, other: SignalPath) -> bool:
+    """Whether another fit of the mechanics would give the same."""
+    apart = abs(one.command_delay_s - other.command_delay_s) * one.sample_rate_hz
+    corners = (one.current_bandwidth_hz or 1.0) / (other.current_bandwidth_hz or 1.0)
+    return one.hold == other.hold and apart < 0.01 and abs(np.log(corners)) < 0.03
+
+
+def rank(trial: Trial) -> float:
+    """Less is better."""
+    return trial.fit.score + _implausible(trial.fit)
+
+
+def _implausible(fit: SampledFit) -> float:
+    """A drive does not report what has not happened yet, and takes setpoints at whole cycles."""
+    path = fit.path
+    first_s = min(fit.delay_s, fit.position_delay_s)
+    early = max(-first_s * path.sample_rate_hz - 0.1, 0.0)
+    cycles = cycles_of(path)
+    return threshold.EARLY * early + threshold.FRACTION * abs(cycles - round(cycles))
+
+
+def _hidden_by_friction(trial: Trial) -> bool:
+    """Whether lines were so uncertain by friction that other mechanics may have been there."""
+    uncertainty = trial.views.velocity.friction
+    return (
+        uncertainty is not None
+        and float(np.mean(np.abs(uncertainty) > threshold.HIDDEN)) > threshold.HIDDEN_SHARE
+    )
+
+
+def _unsure(trial: Trial, uncertainty: Uncertainty) -> bool:
+    """Whether a mode within the band has a part in the response that may be nothing."""
+    low, high = trial.views.velocity.frequency_hz[0], trial.fit.valid_band_hz[1]
+    pairs = zip(trial.fit.model.modes, mode_uncertainties_of(trial, uncertainty), strict=True)
+    return any(d.residue > threshold.UNSURE and low < m.frequency_hz < high for m, d in pairs)
+
+
+def mode_uncertainties_of(trial: Trial, uncertainty: Uncertainty) -> tuple[ModeUncertainty, ...]:
+    """With what friction may do to all lines together."""
+    given = [view for view in (trial.views.velocity, trial.views.position) if view is not None]
+    together = [
+        np.zeros(v.frequency_hz.size, np.complex128) if v.friction is None else v.friction
+        for v in given
+    ]
+    return mode_uncertainties(
+        trial.solution.problem, trial.solution.x, uncertainty.covariance, together,
+        friction_seen=trial.views.velocity.coulomb_nm > 0,
+    )  # fmt: skip

@@ -1,0 +1,1008 @@
+"""Thresholds of the tools: every number that was chosen and not derived, in one table.
+
+One namespace for each module, which imports it as ``threshold``. Behind each number stands its
+unit in brackets ("ratio" and "count" have none), what it decides, and its origin: the commit that
+set it, with the benchmark or page of figures that the commit changed, where it changed one.
+`python -m benchmarks.thresholds` halves and doubles the numbers of the analysis; what half and
+twice of those here do was not measured, as each case would need a whole tool on a virtual drive.
+Numbers that follow from a definition (bits of a status word, the range of an object) stand in
+their modules.
+"""
+
+from __future__ import annotations
+
+
+class autotune_again:
+    """`autotune/again.py`."""
+
+    # WIDTH, DB, DEG: A prediction stands within these: share of the -3 dB point, dB and degrees.
+    # The aims are 10 %, 3 dB and 6° (tuning.md, section 5).
+    WIDTH = 0.08
+    """[ratio] Origin: 5caa8367."""
+    DB = 3.0
+    """[dB] Origin: 5caa8367."""
+    DEG = 6.0
+    """[deg] Origin: 5caa8367."""
+    SAME = 0.02
+    """[ratio] Gains that differ by less are the same. Origin: 5caa8367."""
+
+
+class autotune_apply:
+    """`autotune/apply.py`."""
+
+    # SOFTENED, QUIETER: So often a candidate that hums is made softer, and to this share of the hum
+    # that is permitted.
+    SOFTENED = 2
+    """[count] Origin: 33aa8ae7."""
+    QUIETER = 0.85
+    """[ratio] Origin: 33aa8ae7."""
+
+
+class autotune_candidates:
+    """`autotune/candidates.py`."""
+
+    VERIFIABLE = 0.2
+    """[ratio] A loop can be verified up to this share of the sample rate, so none is designed above
+    it. Origin: e01bb3d6."""
+    # SEEN, NARROWINGS: The -3 dB point must lie below this share; the highest gain is lowered so
+    # many times for it.
+    SEEN = 0.23
+    """[ratio] Origin: 7166e5a3 with benchmarks/tune_accuracy."""
+    NARROWINGS = 4
+    """[count] Origin: 7166e5a3 with benchmarks/tune_accuracy."""
+    COHERENT = 0.8
+    """[ratio] Lines that a cautious design believes. Origin: 66bd184e with
+    benchmarks/tune_accuracy."""
+
+
+class autotune_gain_steps:
+    """`autotune/gain_steps.py`."""
+
+    STEP_DB = 2.5
+    """[dB] Gains are raised in steps of this many dB, and the last one to what is asked for.
+    Origin: 17b160fe."""
+    # QUIET_PERCENT, NOISE: Torque of a steady part, root mean square in % of the rated: this is
+    # quiet, and noise may rise by the gain and this factor.
+    QUIET_PERCENT = 1.5
+    """[%] Origin: 17b160fe."""
+    NOISE = 2.5
+    """[ratio] Origin: 17b160fe."""
+    GROWS = 1.5
+    """[ratio] An oscillation that grows by this from one half of a steady part to the other is an
+    onset. Origin: 17b160fe."""
+    # PIECES, DECAYS: A steady part is seen in so many pieces; a band whose power falls by this from
+    # each one to the next decays, as what a step leaves does in a loop that is stable (3 dB over
+    # the whole part).
+    PIECES = 3
+    """[count] Origin: d16e3511."""
+    FEW = 8
+    """[count] Fewer samples than this in a piece show no bands. Origin: d16e3511."""
+    FALSE_ALARM = 1e-3
+    """[ratio] Noise passes for growth in one of so many steps at most, over all bands of a spectrum
+    together. Origin: d16e3511."""
+    # DEGREES, DEGREES_BEFORE: Real degrees of freedom of a band of three lines in one piece, and of
+    # the noise beside it in all pieces of the step with the gain as it is: each line of a Hann
+    # window shares with its neighbours.
+    DEGREES = 3.0
+    """[deg] Origin: d16e3511."""
+    DEGREES_BEFORE = 9.0
+    """[deg] Origin: d16e3511."""
+
+
+class autotune_gains:
+    """`autotune/gains.py`."""
+
+    # WIDENINGS, SHORTEST_S: Filters are widened in so many steps: a torque filter to half its time,
+    # a speed filter by √2; no torque filter is made shorter than this.
+    WIDENINGS = 3
+    """[count] Origin: 66bd184e with benchmarks/tune_accuracy."""
+    SHORTEST_S = 0.1e-3
+    """[s] Origin: 66bd184e with benchmarks/tune_accuracy."""
+    LOOP_PERIOD_S = 50e-6
+    """[s] Loop period of the drives: half of it to compute, half of it until the torque's mean
+    follows. Origin: e01bb3d6."""
+
+
+class autotune_notches:
+    """`autotune/notches.py`."""
+
+    RISES_DB = 6.0
+    """[dB] A resonance that rises by less bounds no gain. Origin: 97ed310d."""
+    FREE = 0.7
+    """[ratio] Without a loop learning takes this share of the time: no trial for its size, one
+    period less. Origin: 76c87fed with docs/tuning-accuracy.md."""
+
+
+class autotune_present:
+    """`autotune/present.py`."""
+
+    SLOWER = 0.9
+    """[ratio] A design whose speed gain is this much below what the axis has is slower. Origin:
+    e15b4fe3 with docs/tuning-accuracy.md."""
+
+
+class autotune_raising:
+    """`autotune/raising.py`."""
+
+    # NOT_SHOWN_DB, MOST_SHOWN_DB: So much of a promised gain margin is shown by raising the gain,
+    # where the last crossover is above what was measured: all but this, and no more than that.
+    NOT_SHOWN_DB = 1.5
+    """[dB] Origin: 17b160fe."""
+    MOST_SHOWN_DB = 7.0
+    """[dB] Origin: 17b160fe."""
+    # SURELY_DB, AT_ONCE_DB, KEPT_BACK_DB: A gain is raised by this beyond what excludes a loop, as
+    # a parameter has steps; and where that is more than what must be shown and this, it stays so
+    # far below the predicted margin.
+    SURELY_DB = 0.2
+    """[dB] Origin: d16e3511."""
+    AT_ONCE_DB = 0.5
+    """[dB] Origin: d16e3511."""
+    KEPT_BACK_DB = 2.5
+    """[dB] Origin: d16e3511."""
+
+
+class autotune_run:
+    """`autotune/run.py`."""
+
+    SATURATED = 0.25
+    """[ratio] A response with more of its samples at a torque limit is none. Origin: 7166e5a3 with
+    benchmarks/tune_accuracy."""
+    # SOFT_HZ, SOFT_ALONE_HZ: Gains that hardly any axis oscillates with, for measuring one that
+    # does with its own. With the inertia that the drive holds, and with that of the motor alone.
+    SOFT_HZ = 5.0
+    """[Hz] Origin: 66bd184e with benchmarks/tune_accuracy."""
+    SOFT_ALONE_HZ = 20.0
+    """[Hz] Origin: 66bd184e with benchmarks/tune_accuracy."""
+
+
+class autotune_time_budget:
+    """`autotune/time_budget.py`."""
+
+    AROUND_S = 4.0
+    """[s] Writing a design, standing still and a step, beside the measurement of the loop. Origin:
+    e3bffcb4 with benchmarks/tune_accuracy."""
+    DESIGNED_AND_VERIFIED_S = 12.0
+    """[s] What follows the measurements: computing designs, writing one and verifying it. Origin:
+    76c87fed with docs/tuning-accuracy.md."""
+    # GAIN_STEP_S, GAIN_STEPS, CROSSES_HZ: A step with a raised gain, how many of them a loop needs
+    # that crosses above the measured band, and up to how many Hz tuned loops cross.
+    GAIN_STEP_S = 2.1
+    """[s] Origin: 7c9ae141."""
+    GAIN_STEPS = 3
+    """[count] Origin: 7c9ae141."""
+    CROSSES_HZ = 400.0
+    """[Hz] Origin: 7c9ae141."""
+    LOST_S = 6.0
+    """[s] What a verification takes longer at most where samples are lost all the time. Origin:
+    76c87fed with docs/tuning-accuracy.md."""
+    SWEEP_S = 16.0
+    """[s] A frequency response, as far as it must be. Origin: 76c87fed with
+    docs/tuning-accuracy.md."""
+
+
+class autotune_verdict:
+    """`autotune/verdict.py`."""
+
+    # MARGIN_DB, MARGIN_DEG, MS_RATIO: What a measured margin is known to; the designs keep more
+    # than this in reserve.
+    MARGIN_DB = 1.0
+    """[dB] Origin: 66bd184e with benchmarks/tune_accuracy."""
+    MARGIN_DEG = 1.0
+    """[deg] Origin: 66bd184e with benchmarks/tune_accuracy."""
+    MS_RATIO = 1.03
+    """[ratio] Origin: 66bd184e with benchmarks/tune_accuracy."""
+    # COHERENT, BLURRED_DEG, LINES: Lines that margins are read from: coherence, standard deviation
+    # of the phase, how many at least.
+    COHERENT = 0.9
+    """[ratio] Origin: 17b160fe."""
+    BLURRED_DEG = 4.0
+    """[deg] Origin: 17b160fe."""
+    LINES = 12
+    """[count] Origin: 17b160fe."""
+    GAP = 1.5
+    """[ratio] The measured band ends where the next line is farther than this factor away. Origin:
+    17b160fe."""
+
+
+class autotune_verify:
+    """`autotune/verify.py`."""
+
+    SEEN = 0.8
+    """[ratio] Coherence of lines that a bandwidth is read from where those do not hold it. Origin:
+    29633e14."""
+    MOST_PAIRS = 4
+    """[count] Pairs of realisations that are measured at most where the first one tells too little:
+    friction and noise of a heavy or a coarse axis average out, and so does the distortion of play,
+    which a single pair cannot tell from the response. Origin: 5caa8367."""
+    LOOKS = 2
+    """[count] A loop that contradicts its prediction is verified once more where there is time for
+    so many: that one, and a more careful design. Origin: 5caa8367."""
+    # USUAL_STEP_RPM, WORTH_A_STEP: A step, unless noise asks for a larger one, which is made where
+    # it is this much larger.
+    USUAL_STEP_RPM = 100.0
+    """[rpm] Origin: ed1a5f9a with benchmarks/rough_campaign."""
+    WORTH_A_STEP = 1.2
+    """[ratio] Origin: ed1a5f9a with benchmarks/rough_campaign."""
+    OVERSHOOT_PERCENT = 40.0
+    """[%] Where there are fewer, a step may overshoot by this. Origin: 691daa5e with
+    docs/tuning-accuracy.md."""
+    # AS_PREDICTED, DOUBTED: A bandwidth this near to the predicted one is as predicted; one that is
+    # measured once more is less far away, as a single pair of realisations may be off to either
+    # side.
+    AS_PREDICTED = 0.1
+    """[ratio] Origin: 5caa8367."""
+    DOUBTED = 0.08
+    """[ratio] Origin: 5caa8367."""
+    HUM_PERCENT = 4.0
+    """[%] Torque of a standing axis, root mean square in % of rated torque, that is a hum. Origin:
+    33aa8ae7."""
+
+
+class brake_evaluate:
+    """`brake/evaluate.py`."""
+
+    PRELOAD = 0.1
+    """[ratio] Share of the test torque that takes up play before travel counts. Origin:
+    ca58f5df."""
+    # DEVIATIONS, OF_LIMIT: A departure from the elastic line by so many deviations of the position,
+    # and by this share of the slip limit, is slip.
+    DEVIATIONS = 6.0
+    """[ratio] Origin: ca58f5df."""
+    OF_LIMIT = 0.05
+    """[ratio] Origin: ca58f5df."""
+    # PARTS, STIFF_QUANTILE: Parts of the ramp that a compliance is taken of; a slipping part is
+    # softer than an elastic one.
+    PARTS = 8
+    """[count] Origin: ca58f5df."""
+    STIFF_QUANTILE = 0.3
+    """[ratio] Origin: ca58f5df."""
+    ONSET_S = 0.005
+    """[s] Time before a motion that still belongs to it. Origin: ca58f5df."""
+    SHARE = 0.005
+    """[ratio] Torque is not known better than this share of it, whatever the scatter. Origin:
+    16e1fbc9."""
+    GONE = 0.2
+    """[ratio] Below this share of what it was the torque counts as gone. Origin: ca58f5df."""
+
+
+class brake_texts:
+    """`brake/texts.py`."""
+
+    CREPT = 0.05
+    """[ratio] Slip below this share of the limit is what an encoder and a settling hub show.
+    Origin: ca58f5df."""
+    SHORT = 0.95
+    """[ratio] Share of the test torque below which the held torque is shown as less than it.
+    Origin: ca58f5df."""
+
+
+class brake_run:
+    """`brake/run.py`."""
+
+    # LEAD_S, PRELOAD_S, STILL_S, TOP_S, DOWN_S, END_S: Seconds of each part of the sequence beside
+    # its ramp.
+    LEAD_S = 0.2
+    """[s] Origin: ca58f5df."""
+    PRELOAD_S = 0.15
+    """[s] Origin: ca58f5df."""
+    STILL_S = 0.15
+    """[s] Origin: ca58f5df."""
+    TOP_S = 0.25
+    """[s] Origin: ca58f5df."""
+    DOWN_S = 0.25
+    """[s] Origin: ca58f5df."""
+    END_S = 0.05
+    """[s] Origin: ca58f5df."""
+    # ABOVE_SHARE, ABOVE_PERCENT: The envelope watches the actual torque, which swings about what is
+    # sent.
+    ABOVE_SHARE = 1.08
+    """[ratio] Origin: ca58f5df."""
+    ABOVE_PERCENT = 3.0
+    """[%] Origin: ca58f5df."""
+    AFTER_HALT_S = 0.1
+    """[s] After a halt the loop goes on telling what happens; the torque is gone within that.
+    Origin: ca58f5df."""
+
+
+class first_power_evaluate:
+    """`first_power/evaluate.py`."""
+
+    GOAL = 0.85
+    """[ratio] Share of the permitted travel that the shaft is to go each way. Origin: 8b39c64c."""
+    STILL_REV = 5e-4
+    """[rev] Below this [rev] a pulse has moved nothing; an encoder and a twisting coupling show so
+    much. Origin: 8b39c64c."""
+    SOME = 0.02
+    """[ratio] Less than this share of the goal is no way at all. Origin: 8b39c64c."""
+    HAND = 0.05
+    """[ratio] A person meets a mark within 18° of a revolution. Origin: 8b39c64c."""
+    LEAST_V = 10.0
+    """[V] At less DC voltage than this no drive that is served here works. Origin: 8b39c64c."""
+
+
+class first_power_run:
+    """`first_power/run.py`."""
+
+    # PULSE_S, LEAD_S, AFTER_S, RAMP_S: Seconds of a pulse, and of no torque before and after it.
+    PULSE_S = 0.03
+    """[s] Origin: eb4cafeb."""
+    LEAD_S = 0.01
+    """[s] Origin: eb4cafeb."""
+    AFTER_S = 0.06
+    """[s] Origin: eb4cafeb."""
+    RAMP_S = 0.004
+    """[s] Origin: eb4cafeb."""
+    # STRONGER, FIRST_PERCENT: Each pulse that moves less is followed by one that is stronger by
+    # this.
+    STRONGER = 1.35
+    """[ratio] Origin: eb4cafeb."""
+    FIRST_PERCENT = 1.5
+    """[%] Origin: eb4cafeb."""
+    # SMALL_REV, LARGE_REV, WEAKER: A pulse that moves less than the first is made stronger, one
+    # that moves more than the second weaker, by the third.
+    SMALL_REV = 0.003
+    """[rev] Origin: 8b39c64c."""
+    LARGE_REV = 0.01
+    """[rev] Origin: 8b39c64c."""
+    WEAKER = 1.5
+    """[ratio] Origin: 8b39c64c."""
+    CUT_REV = 0.012
+    """[rev] A pulse that has moved the shaft so far is over: what is left is what it coasts.
+    Origin: 8b39c64c."""
+    MOST_PULSES = 60
+    """[count] Most pulses of one check. Origin: 8b39c64c."""
+    # SETTLES_S, SETTLE_LOOK_S: Longest wait for standstill after a pulse, and how often the
+    # position is read meanwhile.
+    SETTLES_S = 1.0
+    """[s] Origin: 8b39c64c."""
+    SETTLE_LOOK_S = 0.05
+    """[s] Origin: 8b39c64c."""
+    # HAND_STILL_S, HAND_POLL_S: A shaft that a person turned counts as at its mark after so long
+    # without motion.
+    HAND_STILL_S = 2.0
+    """[s] Origin: 8b39c64c."""
+    HAND_POLL_S = 0.05
+    """[s] Origin: 8b39c64c."""
+    HAND_LEAST = 0.2
+    """[ratio] Least turn by hand that shows resolution and direction, in rev. Origin: 8b39c64c."""
+
+
+class friction_evaluate:
+    """`friction/evaluate.py`."""
+
+    # BLOCKS, EVEN: Blocks that a mean is taken over; a speed that is not held in one of them is
+    # uneven.
+    BLOCKS = 8
+    """[count] Origin: 16e1fbc9."""
+    EVEN = (0.3, 1.7)
+    """[ratio] Origin: 16e1fbc9."""
+    # ARRIVED, NEARLY: A plateau of which less arrived is not used. What a revolution may lack to be
+    # one.
+    ARRIVED = 0.8
+    """[ratio] Origin: 16e1fbc9."""
+    NEARLY = 0.03
+    """[ratio] Origin: 16e1fbc9."""
+    FOLLOWED_HZ = 25.0
+    """[Hz] The speed loop's torque shows ripple up to this frequency. Origin: 16e1fbc9."""
+    # STANDS_OUT, OF_STEP: An order stands out so many deviations above the others; and this share
+    # of 6077h's step.
+    STANDS_OUT = 4.5
+    """[ratio] Origin: 16e1fbc9."""
+    OF_STEP = 0.25
+    """[ratio] Origin: 16e1fbc9."""
+    BINS = 360
+    """[count] Places of a revolution that torque is averaged over. Origin: 16e1fbc9."""
+    SHARE = 0.005
+    """[ratio] Torque is not known better than this share of it, whatever the scatter. Origin:
+    16e1fbc9."""
+    SHARE_OF_RIPPLE = 0.03
+    """[ratio] Nor an order of the ripple better than this, with the roughly known inertia and
+    friction that are taken out: one run of each of the five families was off by 2 to 4 %. Origin:
+    d16e3511."""
+
+
+class friction_run:
+    """`friction/run.py`."""
+
+    # USED, FAST: Share of the permitted travel to each side that is used, and of the permitted
+    # speed.
+    USED = 0.8
+    """[ratio] Origin: 16e1fbc9."""
+    FAST = 0.9
+    """[ratio] Origin: 16e1fbc9."""
+    # RAMP_S, SETTLE_S, DWELL_S: Time of a ramp at least, and before a plateau counts; standstill
+    # between two strokes.
+    RAMP_S = 0.15
+    """[s] Origin: 16e1fbc9."""
+    SETTLE_S = 0.2
+    """[s] Origin: 16e1fbc9."""
+    DWELL_S = 0.15
+    """[s] Origin: 16e1fbc9."""
+    RAMP_SHARE = 0.35
+    """[ratio] Share of the torque beyond friction that ramps take. Origin: 16e1fbc9."""
+    # LEAST_S, LONGEST_S: A plateau lasts so long at least, and no longer for the sake of a whole
+    # revolution.
+    LEAST_S = 0.3
+    """[s] Origin: 16e1fbc9."""
+    LONGEST_S = 4.0
+    """[s] Origin: 16e1fbc9."""
+    SLOW_S = (3.0, 2.0, 1.2)
+    """[s] Plateaus too slow for a whole revolution, in order of preference. Origin: 16e1fbc9."""
+    SHORT_S = 0.15
+    """[s] Without a whole revolution (short travel) a plateau lasts at least this long. Origin:
+    16e1fbc9."""
+    SLOWEST_RPM = 2.0
+    """[rpm] Slowest plateau, where the settings name none. Origin: 16e1fbc9."""
+    # RIPPLE_REV, RIPPLE_SHARE, RIPPLE_HZ: The ripple's revolution: with some more on both sides, in
+    # this share of the time, at no more than this frequency of its highest order.
+    RIPPLE_REV = 1.25
+    """[rev] Origin: 16e1fbc9."""
+    RIPPLE_SHARE = 0.25
+    """[ratio] Origin: 16e1fbc9."""
+    RIPPLE_HZ = 25.0
+    """[Hz] Origin: 16e1fbc9."""
+    ALIKE = 0.15
+    """[ratio] Plateaus closer than this to the speed of the ripple measurement are left out.
+    Origin: 16e1fbc9."""
+
+
+class health_evaluate:
+    """`health/evaluate.py`."""
+
+    FOLLOWED = 3
+    """[count] So many of a kind are followed, the lowest ones: they are the stiffness of the drive
+    train. Origin: b68b54c1."""
+    SAME_SPEED = 0.03
+    """[ratio] Speeds of both directions belong together within this share. Origin: b68b54c1."""
+
+
+class inertia_evaluation:
+    """`inertia/evaluation.py`."""
+
+    CUTOFF_HZ = 25.0
+    """[Hz] Corner of the smoothing of speed and torque before the regression. Origin: 66bd184e with
+    benchmarks/tune_accuracy."""
+    # EXPLAINED, SWING_HZ: Above this R² nothing is left to explain; below, the load may swing in
+    # this range of Hz.
+    EXPLAINED = 0.9995
+    """[ratio] Origin: ba28e55a."""
+    SWING_HZ = (4.0, 80.0)
+    """[Hz] Origin: ba28e55a."""
+
+
+class inertia_moves:
+    """`inertia/moves.py`."""
+
+    RAMP_S = 0.15
+    """[s] A ramp shorter than this excites the machine's resonances more than its inertia. Origin:
+    f0621549."""
+    SMOOTHING_S = 0.03
+    """[s] Rounding of the corners of a move's speed. Origin: f0621549."""
+    FIRST_REV = 0.12
+    """[rev] Way of the first move. Origin: f0621549."""
+    FOLLOWED = 0.2
+    """[ratio] A first move that gets less than this share of its way is made larger, while it takes
+    little torque: a heavy load on a loop that was never tuned for it hardly follows. Origin:
+    8d69615d."""
+    FOLLOWS_WELL = 0.7
+    """[ratio] Of less than this share of its way the loop is soft: it is helped by torque sent
+    ahead of it. Origin: 8d69615d."""
+    # WEAKER, ATTEMPTS: Moves that take more torque than is permitted become weaker by this factor,
+    # so many times.
+    WEAKER = 0.6
+    """[ratio] Origin: 8d69615d."""
+    ATTEMPTS = 3
+    """[count] Origin: 8d69615d."""
+    # EXPECTED, ROUGHLY: A move is made where its loop is expected to take this share of the
+    # permitted torque at most, by an inertia that is known to so much; else torque is sent ahead,
+    # and the move becomes weaker.
+    EXPECTED = 0.8
+    """[ratio] Origin: acfa9c65."""
+    ROUGHLY = 0.1
+    """[ratio] Origin: acfa9c65."""
+    FRICTION_RAD_S = 0.5
+    """[rad/s] Speed within which friction changes its sign in what a move is expected to take.
+    Origin: 8d69615d."""
+    # STOOD_REV, STOOD_SHARE, BRAKE_WAIT_S: An axis that moved less than this under too much torque
+    # stood: a brake opens within this time.
+    STOOD_REV = 0.005
+    """[rev] Origin: 5528340d."""
+    STOOD_SHARE = 0.02
+    """[ratio] Origin: 5528340d."""
+    BRAKE_WAIT_S = 1.0
+    """[s] Origin: 5528340d."""
+    BEGUN = 0.1
+    """[ratio] Share of the first way at which a free axis has begun to move. A brake that opens
+    later than that spoils the move, and the loop winds up against it at the beginning of every
+    later one. Origin: d16e3511."""
+
+
+class inertia_probe:
+    """`inertia/probe.py`."""
+
+    DURATION_S = 0.28
+    """[s] Length of one torque pulse pair. Origin: 76d84383."""
+    ENOUGH_RAD_S = 6.0
+    """[rad/s] The axis moves well above this speed, and well above what its sensor and filter blur.
+    Origin: 76d84383."""
+    FIRST_SHARE = 0.02
+    """[ratio] Share of rated torque of the first pulse. Origin: 76d84383."""
+    PULLED = 0.01
+    """[ratio] A holding torque above this share of rated torque is a load that pulls. Origin:
+    f0621549."""
+    SETTLE_S = 0.3
+    """[s] Dwell before the holding torque is read. Origin: f0621549."""
+    READINGS = 12
+    """[count] Readings of the holding torque. Origin: f0621549."""
+    RESTLESS_PERCENT = 5.0
+    """[%] Deviation of the holding torque (rated torque) from which an axis oscillates at
+    standstill. Origin: f0621549."""
+    RESTLESS_RPM = 3.0
+    """[rpm] The same of its speed. Origin: f0621549."""
+    FALLING_RPM = 30.0
+    """[rpm] A load that sinks on the softest loop is slower than this long before it is looked at;
+    one that nothing holds is faster within some hundredths of a second. Origin: 63dccfbe."""
+    GAINED = 0.1
+    """[ratio] Share of the energy moved to and fro that noise alone does not make. Origin: 7166e5a3
+    with benchmarks/tune_accuracy."""
+    SMOOTHED_S = 0.02
+    """[s] A motion of some tenths of a second, a mean over so many seconds of which hides nothing.
+    Origin: dc38bcd8."""
+    # STOOD, BRAKE_S: Share of the wanted speed below which an axis stood, and how long a brake may
+    # take to open after Operation enabled.
+    STOOD = 0.05
+    """[ratio] Origin: 5528340d."""
+    BRAKE_S = 0.5
+    """[s] Origin: 5528340d."""
+
+
+class inertia_run:
+    """`inertia/run.py`."""
+
+    END_MARGIN_REV = 0.15
+    """[rev] Margin to a taught or found end. Origin: f0621549."""
+    # GENTLY, AROUND_S: Gentle moves last about so many times as long; seconds beside them, such as
+    # going back.
+    GENTLY = 1.5
+    """[ratio] Origin: 76c87fed with docs/tuning-accuracy.md."""
+    AROUND_S = 2.0
+    """[s] Origin: 76c87fed with docs/tuning-accuracy.md."""
+
+
+class inertia_soft_loop:
+    """`inertia/soft_loop.py`."""
+
+    EXPLAINED = 0.98
+    """[ratio] Gains that explain less of the torque of a move (share of its variance) are not the
+    loop's. Origin: acfa9c65."""
+    LATEST = 6
+    """[count] The loop's torque follows its error by so many cycles at most. Origin: acfa9c65."""
+
+
+class jog_cyclic:
+    """`jog/cyclic.py`."""
+
+    # RENEW_S, LOOK_S
+    RENEW_S = 0.05
+    """[s] Origin: d0b2ef4f."""
+    LOOK_S = 0.02
+    """[s] Origin: d0b2ef4f."""
+    STATE_TIMEOUT_S = 5.0
+    """[s] Longest wait for a change of the power state. Origin: 971882ae."""
+    MAX_S = 120.0
+    """[s] Longest jog. Origin: 971882ae."""
+    PATIENCE = 10
+    """[count] Cycles without a new sample that are tolerated. Origin: 5ae2f284."""
+
+
+class jog_hold:
+    """`jog/hold.py`."""
+
+    GAP_S = 0.2
+    """[s] Longest time between signs of life before the axis brakes. Origin: d0b2ef4f."""
+    RESUME_S = 0.5
+    """[s] From the last sign before a gap to the one that ends it, at most. Origin: d0b2ef4f."""
+    CONFIRM_S = 0.05
+    """[s] Between the arrivals of two signs of life that end a gap, at least. Origin: d0b2ef4f."""
+
+
+class jog_run:
+    """`jog/run.py`."""
+
+    PERIOD_S = 0.04
+    """[s] Period of target renewals to the drive (20 Hz or faster). Origin: a412d0d6."""
+    TRAVEL_MARGIN_REV = 0.05
+    """[rev] The axis may leave the travel limit by this much before the jog ends with an error.
+    Origin: a412d0d6."""
+
+
+class measuring_alignment:
+    """`measuring/alignment.py`."""
+
+    COMPARED = 400
+    """[count] Rows of a run that are compared: enough to tell one place of a sequence from another.
+    Origin: b6929249."""
+    SURE = 15
+    """[count] Moved setpoints that must agree before a place is believed, where a sequence has as
+    many. Origin: b6929249."""
+
+
+class measuring_excite:
+    """`measuring/excite.py`."""
+
+    LOOP_CORNER_HZ = 60.0
+    """[Hz] Below half of its own torque's share a line is lost in friction; above it, speed runs
+    away. Origin: 76d84383."""
+    PERIOD_S = 0.65
+    """[s] Length of one period of the excitation. Origin: f0621549."""
+    BASE_OVER_RMS = 8.0
+    """[ratio] Base motion as a multiple of the excitation's own speed, so that the speed seldom
+    reverses. Origin: f0621549."""
+    BASE_LEAST_RAD_S = 12.0
+    """[rad/s] Least speed of the base motion. Origin: f0621549."""
+    BASE_SHARE = 0.4
+    """[ratio] Share of the envelope's speed for the base motion; its way in overshoots. Origin:
+    ba28e55a."""
+    BASE_GLADLY = 0.25
+    """[ratio] Share of the speed that it takes where torque affords it: a load that swings moves
+    the motor more than a rigid one, by how much nobody knows before. Origin: 2f3875f1 with
+    benchmarks/analysis_comparison."""
+    # RISE_HZ, RISE_MOST: Without a loop, lines rise from this frequency on, up to this factor.
+    RISE_HZ = 120.0
+    """[Hz] Origin: ba28e55a."""
+    RISE_MOST = 2.5
+    """[ratio] Origin: ba28e55a."""
+
+
+class measuring_recording:
+    """`measuring/recording.py`."""
+
+    RENEW_S = 0.03
+    """[s] Period of the setpoints' renewal. Origin: f0621549."""
+    STATE_TIMEOUT_S = 5.0
+    """[s] Longest wait for a change of the power state. Origin: 971882ae."""
+    TAIL_S = 1.0
+    """[s] Samples arrive in bunches; this long after the last setpoint all of them have come.
+    Origin: 76d84383."""
+    RUN_IN = 8
+    """[count] Cycles that are kept from before the motion: its first setpoint goes out in the next
+    one. Origin: f50a8ed5."""
+
+
+class measuring_restore:
+    """`measuring/restore.py`."""
+
+    STANDS_S = 0.5
+    """[s] Time within which the axis must stand before values are restored. Origin: db67293b."""
+
+
+class measuring_waveform:
+    """`measuring/waveform.py`."""
+
+    PERIOD_S = 0.65
+    """[s] Length of one period of a chirp or PRBS. Origin: f0621549."""
+    # MOST_TONES, FEWEST_TONES, STEPPED_S: A stepped sine has at most this many tones, and fewer
+    # where they would take longer than this.
+    MOST_TONES = 40
+    """[count] Origin: 19b8d863."""
+    FEWEST_TONES = 14
+    """[count] Origin: 19b8d863."""
+    STEPPED_S = 9.0
+    """[s] Origin: 19b8d863."""
+    # CYCLES, SETTLE_CYCLES, SETTLE_S, MEASURE_S, TONE_RAMP_S: Stepped sine: cycles of a tone that
+    # are measured, cycles of its settling, least times of both, and its ramp.
+    CYCLES = 4
+    """[cycles] Origin: 19b8d863."""
+    SETTLE_CYCLES = 2
+    """[cycles] Origin: 19b8d863."""
+    SETTLE_S = 0.03
+    """[s] Origin: 19b8d863."""
+    MEASURE_S = 0.08
+    """[s] Origin: 19b8d863."""
+    TONE_RAMP_S = 0.02
+    """[s] Origin: 19b8d863."""
+
+
+class moves_end_search:
+    """`moves/end_search.py`."""
+
+    # STALL_S, START_S: So long at rest is an end; the axis' own start is not judged.
+    STALL_S = 0.12
+    """[s] Origin: 7166e5a3 with benchmarks/tune_accuracy."""
+    START_S = 0.25
+    """[s] Origin: 7166e5a3 with benchmarks/tune_accuracy."""
+
+
+class moves_go_back:
+    """`moves/go_back.py`."""
+
+    # NEAR_REV, NEAR: Nearer than the larger of these (turns, share of the travel) is near enough.
+    NEAR_REV = 0.02
+    """[rev] Origin: 76c87fed with docs/tuning-accuracy.md."""
+    NEAR = 0.0125
+    """[ratio] Origin: 76c87fed with docs/tuning-accuracy.md."""
+    ATTEMPTS = 3
+    """[count] Moves home, until the axis is where it was. Origin: 76d84383."""
+    # MISSED_REV, MISSED: So much more is asked for at most, in turns and as a share of the travel.
+    MISSED_REV = 0.3
+    """[rev] Origin: 76c87fed with docs/tuning-accuracy.md."""
+    MISSED = 0.2
+    """[ratio] Origin: 76c87fed with docs/tuning-accuracy.md."""
+    # SHARES, DISTINGUISHED_REV: What share of a way a loop goes, and moves that are different
+    # enough to tell.
+    SHARES = (0.4, 1.5)
+    """[ratio] Origin: f9af5d30 with benchmarks/chaos/run."""
+    DISTINGUISHED_REV = 0.02
+    """[rev] Origin: f9af5d30 with benchmarks/chaos/run."""
+    SLOWEST = 4.0
+    """[ratio] So many times slower a move becomes at most that takes too much torque: a sixteenth
+    of it goes into acceleration then. Origin: c27c6c74."""
+
+
+class moves_homing:
+    """`moves/homing.py`."""
+
+    POLL_S = 0.02
+    """[s] Period of reading the status word. Origin: a412d0d6."""
+
+
+class moves_identification:
+    """`moves/identification.py`."""
+
+    POLL_S = 0.02
+    """[s] Period of reading the status word. Origin: a412d0d6."""
+    BEGIN_S = 2.0
+    """[s] The drive must show within this time that it has begun. Origin: 71484254."""
+
+
+class moves_move:
+    """`moves/move.py`."""
+
+    POLL_S = 0.02
+    """[s] Period of reading the status word. Origin: a412d0d6."""
+    ACKNOWLEDGE_S = 0.1
+    """[s] Longest wait for the setpoint acknowledge bit. Origin: 08f8d0c6."""
+
+
+class moves_procedures:
+    """`moves/procedures.py`."""
+
+    POLL_S = 0.1
+    """[s] Period of reading the condition of a wait step. Origin: a412d0d6."""
+
+
+class moves_small_move:
+    """`moves/small_move.py`."""
+
+    # FIRST_INCREMENTS, LONGER: Increments of the first move at most, and by how much the next may
+    # be longer.
+    FIRST_INCREMENTS = 1_000
+    """[count] Origin: 084d9723."""
+    LONGER = 10
+    """[count] Origin: 084d9723."""
+    # MOVE_S, REST_S: Length of the move, and of the dwell after it.
+    MOVE_S = 2.0
+    """[s] Origin: 084d9723."""
+    REST_S = 0.25
+    """[s] Origin: 084d9723."""
+    TORQUE_PERCENT = (1.0, 50.0)
+    """[%] Bounds of the torque limit of a small move. Origin: 084d9723."""
+    # MARGIN, MARGIN_INCREMENTS: Envelope beyond the commanded way: share of it, and increments.
+    MARGIN = 0.25
+    """[ratio] Origin: 084d9723."""
+    MARGIN_INCREMENTS = 50
+    """[count] Origin: 084d9723."""
+    ARRIVED = 0.1
+    """[ratio] Share of the way that may be missing. Origin: 084d9723."""
+
+
+class notch_effect:
+    """`notch/effect.py`."""
+
+    # PLACE, LOWEST_HZ, HIGHEST_HZ: Where the notch is tried: share of the sample rate, and limits
+    # in Hz.
+    PLACE = 0.12
+    """[ratio] Origin: 7166e5a3 with benchmarks/tune_accuracy."""
+    LOWEST_HZ = 55.0
+    """[Hz] Origin: 7166e5a3 with benchmarks/tune_accuracy."""
+    HIGHEST_HZ = 400.0
+    """[Hz] Origin: 7166e5a3 with benchmarks/tune_accuracy."""
+    SHARE_OF_TORQUE = 0.35
+    """[ratio] Share of the permitted torque that a trial takes. Origin: 7166e5a3 with
+    benchmarks/tune_accuracy."""
+    SLOWER = 0.7
+    """[ratio] What was too fast for the envelope is played with so much less torque and speed.
+    Origin: ab18ade0."""
+    ATTEMPTS = 3
+    """[count] A trial that lost samples is made again, so many times in all. Origin: b5755842."""
+    NEAR = 0.4
+    """[ratio] Share of the travel within which the next trial may begin. Origin: e3bffcb4 with
+    benchmarks/tune_accuracy."""
+    # STILL_FROM_HZ, STILL_REV, STILL_RPM: An axis that only trembles: its lines begin here, and it
+    # may go so far and so fast. Nothing holds it, so that rounded torques let it drift by some
+    # hundredths of a revolution.
+    STILL_FROM_HZ = 30.0
+    """[Hz] Origin: d2357b61 with docs/tuning-accuracy.md."""
+    STILL_REV = 0.3
+    """[rev] Origin: d2357b61 with docs/tuning-accuracy.md."""
+    STILL_RPM = 150.0
+    """[rpm] Origin: d2357b61 with docs/tuning-accuracy.md."""
+    LEAST_ROOM_REV = 0.1
+    """[rev] Less than this to the nearest end is too little for it. Origin: d2357b61 with
+    docs/tuning-accuracy.md."""
+
+
+class notch_filters:
+    """`notch/filters.py`."""
+
+    UNKNOWN_DEPTH_DB = -40.0
+    """[dB] Depth shown for families whose manual prints none; the effect has to be measured.
+    Origin: e01bb3d6."""
+    ELSEWHERE = 0.1
+    """[ratio] A notch that is read back this far from its centre is another one. Origin:
+    6fdeae6a."""
+
+
+class notch_in_loop:
+    """`notch/in_loop.py`."""
+
+    HIGHEST_MS = 3.0
+    """[ratio] Whatever a notch may be, the loop's sensitivity stays below this while it is tried.
+    Origin: e15b4fe3 with docs/tuning-accuracy.md."""
+    # WIDTHS, DEPTHS: What a notch may be: width as a share of its centre, depth in dB.
+    WIDTHS = (0.05, 0.3, 1.0, 2.5)
+    """[ratio] Origin: e15b4fe3 with docs/tuning-accuracy.md."""
+    DEPTHS = (-6.0, -20.0, -45.0)
+    """[ratio] Origin: e15b4fe3 with docs/tuning-accuracy.md."""
+    NEAR = 0.15
+    """[ratio] Share of the travel within which the next trial may begin: the loop leads the axis
+    back but for what friction and a pull take of it. Origin: 73639f9f with
+    docs/tuning-accuracy.md."""
+    FEWEST_PERIODS = 2
+    """[count] Fewer tell nothing of noise. Origin: b5755842."""
+
+
+class notch_trials:
+    """`notch/trials.py`."""
+
+    WIDTHS = (0.5, 0.2)
+    """[ratio] Widths in shares of the centre (Hz), or level pairs (width, depth). Origin: 7166e5a3
+    with benchmarks/tune_accuracy."""
+    # LEAST_WIDTHS, LEAST_LEVELS, BEFORE, TRIAL_S: Values that are tried at least, of a width alone
+    # and of levels; plays before the first of them; seconds that each takes with all that comes
+    # around it.
+    LEAST_WIDTHS = 1
+    """[count] Origin: 76c87fed with docs/tuning-accuracy.md."""
+    LEAST_LEVELS = 4
+    """[count] Origin: 76c87fed with docs/tuning-accuracy.md."""
+    BEFORE = 2
+    """[count] Origin: 76c87fed with docs/tuning-accuracy.md."""
+    TRIAL_S = 2.9
+    """[s] Origin: 76c87fed with docs/tuning-accuracy.md."""
+
+
+class step_evaluate:
+    """`step/evaluate.py`."""
+
+    NOISES = 10.0
+    """[ratio] A settling window is so many times the noise at least: what leaves a narrower one is
+    noise. Origin: ed1a5f9a with benchmarks/rough_campaign."""
+    LEAD_S = 0.05
+    """[s] Rest before the step. Origin: 66bd184e with benchmarks/tune_accuracy."""
+
+
+class sweep_evaluation:
+    """`sweep/evaluation.py`."""
+
+    # SLOW_HZ, SLOWER: A current loop is not slower than this, nor than this share of what the drive
+    # tells.
+    SLOW_HZ = 450.0
+    """[Hz] Origin: e8f9e730."""
+    SLOWER = 0.7
+    """[ratio] Origin: e8f9e730."""
+    BY_REFERENCE_S = 15e-6
+    """[s] What is charged to all lines where a speed loop's reference was the excitation, one
+    deviation: a setpoint that is held until it is sampled tells next to nothing of current loop and
+    delay, which the loop's own torque has to, and that is small on heavy axes. Origin: 7020a899."""
+    ROUNDS = 3
+    """[count] A speed loop's gain and the mechanics are found in turn, so often at most. Origin:
+    7bd7faec."""
+
+
+class sweep_play:
+    """`sweep/play.py`."""
+
+    AWAY = 0.15
+    """[ratio] Share of the travel from home beyond which nothing more begins. Origin: 347f4a26."""
+    AGAIN = 2
+    """[count] A sequence that lost samples is played again, so many times at most, where no period
+    is whole. Origin: 347f4a26."""
+    # ATTEMPTS, WEAKER, SLOWER: What came to the envelope is played again, this much smaller and
+    # with so much less base motion.
+    ATTEMPTS = 4
+    """[count] Origin: c1f812dc."""
+    WEAKER = 0.4
+    """[ratio] Origin: c1f812dc."""
+    SLOWER = 0.7
+    """[ratio] Origin: c1f812dc."""
+
+
+class sweep_profile_speed:
+    """`sweep/profile_speed.py`."""
+
+    RAMP_MS = 0
+    """[ms] Ramps that are times may be 0 (003:318); others become as steep as this. Origin:
+    c71e9acb."""
+    RAMP_RPM_S = 1e6
+    """[rpm/s] Steepness of ramps that are accelerations. Origin: c71e9acb."""
+    SLOW_RPM_S = 1500.0
+    """[rpm/s] While the sign of a speed is tried: from 0 to the highest speed in this time, at this
+    speed. Origin: c71e9acb."""
+    # TRIED_RPM, TRIED_S: Speed and length of the trial of a speed's sign.
+    TRIED_RPM = 20.0
+    """[rpm] Origin: c71e9acb."""
+    TRIED_S = 0.25
+    """[s] Origin: c71e9acb."""
+    # ALLOWED_RPM, ALLOWED_REV: Envelope of that trial.
+    ALLOWED_RPM = 60.0
+    """[rpm] Origin: c71e9acb."""
+    ALLOWED_REV = 0.25
+    """[rev] Origin: c71e9acb."""
+    ABOVE = 1.2
+    """[ratio] The drive's own torque limit lies above the envelope's, so that the loop sees who
+    exceeds it. Origin: c71e9acb."""
+
+
+class sweep_quiet_velocity:
+    """`sweep/quiet_velocity.py`."""
+
+    NOISE = (0.2, 0.45)
+    """[ratio] Nothing of a slow move is up here, so what is there is noise; shares of the sample
+    rate. Origin: ff03716d."""
+    CLEARLY = 4.0
+    """[ratio] The position must be quieter by this much (power): the drive's own speed knows more
+    otherwise. Origin: ff03716d."""
+    WINDOW = 512
+    """[count] Window of the power density. Origin: ff03716d."""
+
+
+class sweep_speed_injection:
+    """`sweep/speed_injection.py`."""
+
+    FIRST_RAD_S = 0.3
+    """[rad/s] Peak of the first trial in rad/s: even a high gain makes little torque of it. Origin:
+    7166e5a3 with benchmarks/tune_accuracy."""
+    # SPEED_SHARE, REFERENCE_SHARE: Shares of the permitted speed: for what the axis makes of the
+    # excitation, and for the highest setpoint. A drive that nothing watches goes on with that when
+    # the computer falls silent.
+    SPEED_SHARE = 0.3
+    """[ratio] Origin: 5ab331b5."""
+    REFERENCE_SHARE = 0.9
+    """[ratio] Origin: 5ab331b5."""
+    # UNWATCHED_SPEED_SHARE, UNWATCHED_REFERENCE_SHARE: The same of a drive that no watchdog stops
+    # when setpoints end.
+    UNWATCHED_SPEED_SHARE = 0.15
+    """[ratio] Origin: 5ab331b5."""
+    UNWATCHED_REFERENCE_SHARE = 0.5
+    """[ratio] Origin: 5ab331b5."""
+    # TORQUE_SHARE, LEAST_BASE: Share of the permitted torque for excitation and base motion
+    # together, and what is left of the base motion at least.
+    TORQUE_SHARE = 0.7
+    """[ratio] Origin: 3fdbbd99 with docs/tuning-accuracy.md."""
+    LEAST_BASE = 0.4
+    """[ratio] Origin: 3fdbbd99 with docs/tuning-accuracy.md."""
+    # WEIGHTS, BY_DOUBT: Deviations of lines are taken to differ by so much, relative to the median;
+    # and the power of it.
+    WEIGHTS = (0.1, 4.0)
+    """[ratio] Origin: 3fdbbd99 with docs/tuning-accuracy.md."""
+    BY_DOUBT = 0.5
+    """[ratio] Origin: 3fdbbd99 with docs/tuning-accuracy.md."""
+    PEAK_OVER_RMS = 2.5
+    """[ratio] Peak of what the axis makes of it over its deviation: mechanics turn the phases that
+    make it low. Origin: 3fdbbd99 with docs/tuning-accuracy.md."""
+    RMS_OVER_PEAK = 0.7
+    """[ratio] Deviation of the reference over its peak. Origin: 3fdbbd99 with
+    docs/tuning-accuracy.md."""
+    UPPER = 0.75
+    """[ratio] Only above this share of the lines does the reference alone make the torque. Origin:
+    7166e5a3 with benchmarks/tune_accuracy."""
