@@ -198,7 +198,12 @@ class PowerState:
 
     async def _until_there(self, goal: State, timeout_s: float) -> None:
         deadline = time.monotonic() + timeout_s
-        while (state := await self.state()) is not goal:
+        while True:
+            state = await self.state()
+            if self.stopped and goal is State.OPERATION_ENABLED:
+                raise NotAllowed("axis.stop-pressed", drive=self.drive.name)
+            if state is goal:
+                return
             if state is State.FAULT or time.monotonic() > deadline:
                 raise await self._refused(state, goal)
             await asyncio.sleep(_POLL_S)

@@ -329,10 +329,9 @@ class Person:
         channels = [{"drive": self.drives[axis], "key": key} for key in keys]
         await self.send(type="scope_start", subscription=number, channels=channels)
 
-    async def scan(self, _axis: int) -> None:
-        await self.ask(
-            "POST", "/scan", "scan", json={"url": self.station.url, "stations": [1, 2, 3]}
-        )
+    async def scan(self, axis: int) -> None:
+        body = {"url": self.station.url_of(axis), "stations": [1, 2, 3]}
+        await self.ask("POST", "/scan", "scan", json=body)
 
     async def save(self, axis: int) -> None:
         name = f"set {self.random.randint(1, 3)}"
@@ -359,14 +358,13 @@ class Person:
             await asyncio.sleep(0.5)
             await self.ask("POST", f"/recordings/{answer.json()['name']}/stop", "end recording")
 
-    async def cyclic(self, _axis: int) -> None:
+    async def cyclic(self, axis: int) -> None:
+        url = self.station.url_of(axis)
         if self.random.random() < 0.7:
-            await self.ask("POST", "/buses/cyclic", "cyclic",
-                           json={"url": self.station.url, "cycle_us": 2000})  # fmt: skip
+            body = {"url": url, "cycle_us": 2000}
+            await self.ask("POST", "/buses/cyclic", "cyclic", json=body)
         else:
-            await self.ask(
-                "DELETE", "/buses/cyclic", "end cyclic", params={"url": self.station.url}
-            )
+            await self.ask("DELETE", "/buses/cyclic", "end cyclic", params={"url": url})
 
     async def reset(self, axis: int) -> None:
         await self.ask("POST", f"/drives/{self.drives[axis]}/fault-reset", "fault reset", json={})
@@ -452,13 +450,11 @@ class Person:
 
     async def remove_and_add(self, axis: int) -> None:
         """Take an axis off the bench while others work with it, and put it back."""
-        spec = self.station.specs[axis]
         self.judge.troubled = max(self.judge.troubled, time.monotonic())
         answer = await self.ask("DELETE", f"/drives/{self.drives[axis]}", "remove")
         if answer is not None and answer.is_success:
             self.judge.end_claims(axis=axis, before=time.monotonic())
-            body = {"url": self.station.url, "station": axis + 1, "profile": spec.family,
-                    "name": spec.name}  # fmt: skip
+            body = self.station.connecting(axis)
             for _ in range(60):
                 again = await self.ask("POST", "/drives", "add", json=body)
                 if again is None or again.is_success or self.station.down_since:

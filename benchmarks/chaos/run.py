@@ -79,10 +79,8 @@ class Trial:
     async def _set_up(self) -> None:
         anna = self.people[0]
         await anna.arrive()
-        for number, spec in enumerate(self.station.specs, 1):
-            body = {"url": self.station.url, "station": number, "profile": spec.family,
-                    "name": spec.name}  # fmt: skip
-            answer = await anna.ask("POST", "/drives", json=body)
+        for number in range(len(self.station.specs)):
+            answer = await anna.ask("POST", "/drives", json=self.station.connecting(number))
             assert answer is not None
             assert answer.is_success, answer.text
         await anna.arrive()
@@ -221,13 +219,11 @@ class Trial:
             self._judge_jobs(answer.json())
 
     async def _missing(self, anna: Person) -> str:
-        for number, spec in enumerate(self.station.specs, 1):
+        for number, spec in enumerate(self.station.specs):
             listed = await anna.ask("GET", "/drives")
             rows = {} if listed is None else {row["name"]: row["id"] for row in listed.json()}
             if spec.name not in rows:
-                body = {"url": self.station.url, "station": number, "profile": spec.family,
-                        "name": spec.name}  # fmt: skip
-                answer = await anna.ask("POST", "/drives", json=body)
+                answer = await anna.ask("POST", "/drives", json=self.station.connecting(number))
                 return f"{spec.name} is not on the bench: {'' if answer is None else answer.text}"
             answer = await anna.ask("GET", f"/drives/{rows[spec.name]}/state")
             if answer is None or not answer.is_success or not answer.json()["fresh"]:
@@ -286,7 +282,8 @@ class Trial:
     async def _tidied(self) -> None:
         person = Person("Anna", self.station, self.judge, random.Random(0), Tally(), self.say)
         await person.arrive()
-        await person.ask("DELETE", "/buses/cyclic", params={"url": self.station.url})
+        for url in self.station.urls:
+            await person.ask("DELETE", "/buses/cyclic", params={"url": url})
         for drive in person.drives:
             await person.ask("POST", f"/drives/{drive}/fault-reset", json={})
             await person.ask(

@@ -32,7 +32,8 @@ PASSWORD = "eleven blue horses"
 class AxisSpec:
     """A drive of the trial. ``setting`` is a parameter that people change, with legal bounds.
 
-    ``energising`` are objects that move or enable this family, with raw values that do it.
+    ``energising`` are objects that move or enable this family, with raw values that do it. ``on``
+    is the kind of its bus where the trial has several.
     """
 
     name: str
@@ -41,6 +42,7 @@ class AxisSpec:
     low: int
     high: int
     energising: tuple[tuple[str, int], ...] = ()
+    on: str = ""
 
 
 #: 6060h, 60FFh and the control word move every family (CiA 402-2 clause 8.4); DS_C has no 6060h.
@@ -64,6 +66,12 @@ _LINES: dict[str, tuple[AxisSpec, ...]] = {
     "modbus": (
         AxisSpec("A", "ds_c", "2502:00", 1, 50, _DS_C),
         AxisSpec("B", "ds_c", "2502:00", 1, 50, _DS_C),
+    ),
+    # One server, three buses.
+    "mixed": (
+        AxisSpec("A", "mms7", "2005:03", 500, 3000, _MMS7, "mlink"),
+        AxisSpec("B", "ds_c", "2502:00", 1, 50, _DS_C, "canopen"),
+        AxisSpec("C", "ds_c", "2502:00", 1, 50, _DS_C, "modbus"),
     ),
 }
 BUSES = (*_LINES, "ethercat")
@@ -92,15 +100,16 @@ class TrialStation:
     """Server and drives of one bus, and the ways to hurt them."""
 
     def __init__(self, folder: Path, bus: str, specs: tuple[AxisSpec, ...]) -> None:
-        self.bus, self.url, self.specs = bus, f"{bus}://virtual0", specs
+        self.bus, self.specs = bus, specs
+        self.urls = list(dict.fromkeys(self.url_of(axis) for axis in range(len(specs))))
         self.folder = folder
         folder.mkdir(parents=True, exist_ok=True)
         bench = folder / "bench.toml"
         bench.write_text(
             "".join(
-                f'[[axis]]\nname = "{s.name}"\ndrive = "{s.family}"\non = "{self.url}"\n'
-                f"station = {n}\n"
-                for n, s in enumerate(self.specs, 1)
+                f'[[axis]]\nname = "{s.name}"\ndrive = "{s.family}"\non = "{self.url_of(n)}"\n'
+                f"station = {self.place_of(n)}\n"
+                for n, s in enumerate(self.specs)
             )
         )
         self._bench_file = bench
@@ -112,6 +121,20 @@ class TrialStation:
         self._asking, self._telling = threading.Lock(), threading.Lock()
         self.grants = GrantLog()
         self._own_status = {s.name: s.family == "ds_c" for s in self.specs}
+
+    def url_of(self, axis: int) -> str:
+        """The bus of an axis."""
+        return f"{self.specs[axis].on or self.bus}://virtual0"
+
+    def place_of(self, axis: int) -> int:
+        """Its station there, from 1."""
+        return 1 + [self.url_of(n) for n in range(axis)].count(self.url_of(axis))
+
+    def connecting(self, axis: int) -> dict[str, object]:
+        """The request that makes it a drive of the bench."""
+        spec = self.specs[axis]
+        return {"url": self.url_of(axis), "station": self.place_of(axis),
+                "profile": spec.family, "name": spec.name}  # fmt: skip
 
     @property
     def root(self) -> str:
@@ -127,9 +150,14 @@ class TrialStation:
 
     def _wires(self) -> dict[str, Any]:
         if self.bus != "ethercat":
-            return {self.url: {"real": self.drives.addresses[self.url]}}
+            return {url: {"real": self.drives.addresses[url]} for url in self.urls}
         launcher = list(self.drives._namespaces[0].command(()))
-        return {self.url: {"interface": "ec0m", "launcher": launcher}}
+        return {self.urls[0]: {"interface": "ec0m", "launcher": launcher}}
+
+    @property
+    def segment(self) -> VirtualSegment:
+        """The virtual EtherCAT segment."""
+        return self.drives.segments[self.urls[0]]
 
     def start_server(self) -> None:
         """Raises RuntimeError when it does not start."""
@@ -215,10 +243,10 @@ class TrialStation:
 
     def restart_segment(self) -> None:
         """The virtual segment again, after it was killed."""
-        self.drives.segments[self.url].close()
-        options = ["--bench", str(self._bench_file), "--on", self.url, "--steady",
+        self.segment.close()
+        options = ["--bench", str(self._bench_file), "--on", self.urls[0], "--steady",
                    "--nvm", str(self.folder / "nvm" / "ethercat0")]  # fmt: skip
-        self.drives.segments[self.url] = VirtualSegment.start(
+        self.drives.segments[self.urls[0]] = VirtualSegment.start(
             "ec0s", options, self.drives._namespaces[0]
         )
 
@@ -229,7 +257,7 @@ class TrialStation:
 
     def virtual_process(self) -> int:
         if self.bus == "ethercat":
-            return self.drives.segments[self.url].pid
+            return self.segment.pid
         assert self.drives._host is not None
         return self.drives._host.pid
 
@@ -247,7 +275,7 @@ class TrialStation:
         """A command to the virtual drives."""
         with self._asking:
             if self.bus == "ethercat":
-                return self.drives.segments[self.url].command(do, **arguments)
+                return self.segment.command(do, **arguments)
             return self.drives.command(do=do, **arguments)
 
     def object(self, axis: int, index: int, subindex: int = 0) -> bytes:

@@ -73,9 +73,10 @@ class Troubles:
             await asyncio.sleep(seconds)
             await self._tell("heal")
             return
-        await self._tell("pull", wire=self.station.url)
+        wire = self.station.url_of(self._axis())
+        await self._tell("pull", wire=wire)
         await asyncio.sleep(seconds)
-        await self._tell("heal", wire=self.station.url)
+        await self._tell("heal", wire=wire)
 
     async def blip(self, _seconds: float) -> None:
         """A cable that is loose: many short breaks."""
@@ -84,8 +85,9 @@ class Troubles:
             await asyncio.sleep(self.random.uniform(0.02, 0.3))
 
     async def mute(self, seconds: float) -> None:
+        axis = self._axis()
         where: dict[str, object] = (
-            {"slave": self._axis()} if self._ethercat else {"wire": self.station.url}
+            {"slave": axis} if self._ethercat else {"wire": self.station.url_of(axis)}
         )
         await self._tell("mute", on=True, **where)
         await asyncio.sleep(seconds)
@@ -112,7 +114,8 @@ class Troubles:
         for person in self._aimed.people:
             if person.socket is not None and person.drives:
                 await person.ask("POST", "/buses/cyclic", "cyclic",
-                                 json={"url": self.station.url, "cycle_us": 2000})  # fmt: skip
+                                 json={"url": self.station.urls[0],
+                                       "cycle_us": 2000})  # fmt: skip
                 break
         await self.power_cycle(seconds)
 
@@ -183,8 +186,7 @@ class Troubles:
         for axis in range(len(self.station.specs)):
             self.judge.unclear[axis] = "its process was killed"
             self.cycled.add(axis)
-        segment = self.station.drives.segments[self.station.url]
-        await asyncio.to_thread(segment.kill)
+        await asyncio.to_thread(self.station.segment.kill)
         await asyncio.sleep(seconds)
         await asyncio.to_thread(self.station.locked, self.station.restart_segment)
 

@@ -90,18 +90,19 @@ class AimedTroubles:
         await asyncio.sleep(self.random.uniform(0.0, 1.5))
         await person.leave("cut")
         if self.random.random() < 0.5:
-            await self._cable(min(seconds, 1.0))
+            axis = self.random.randrange(len(self.station.specs))
+            await self._cable(self.station.url_of(axis), min(seconds, 1.0))
 
-    async def _cable(self, seconds: float) -> None:
+    async def _cable(self, wire: str, seconds: float) -> None:
         station = self.station
         if station.bus == "ethercat":
             await asyncio.to_thread(station.trouble, "cut", cable=0)
             await asyncio.sleep(seconds)
             await asyncio.to_thread(station.trouble, "heal")
             return
-        await asyncio.to_thread(station.trouble, "pull", wire=station.url)
+        await asyncio.to_thread(station.trouble, "pull", wire=wire)
         await asyncio.sleep(seconds)
-        await asyncio.to_thread(station.trouble, "heal", wire=station.url)
+        await asyncio.to_thread(station.trouble, "heal", wire=wire)
 
     async def load_while_faulted(self, _seconds: float) -> None:
         """Parameters come out of a file into a drive that has a fault."""
@@ -139,7 +140,7 @@ class AimedTroubles:
         where: dict[str, object] = (
             {"slave": number}
             if self.station.bus == "ethercat"
-            else {"wire": self.station.url, "station": number + 1}
+            else {"wire": self.station.url_of(number), "station": self.station.place_of(number)}
         )
         await asyncio.to_thread(self.station.trouble, "mute", on=True, **where)
         await asyncio.sleep(seconds)

@@ -284,14 +284,22 @@ class CanopenCyclic:
         """Head for a power state; the axis brakes before it leaves Operation enabled.
 
         Raises:
-            NotAllowed: the drive has a fault, moves, or its control word is not mapped.
+            NotAllowed: the drive has a fault, moves, or its control word is not mapped; or it was
+                halted while its mode was written.
         """
         loop = self._require_running()
         self._require_axis(station)
+        halts = loop.halts(station)
         if mode is not None and (station, _MODE, 0) not in loop.images.outputs:
             data = self._dialect(station).mode(mode).to_bytes(1, "little", signed=True)
             await self._in_worker(partial(self._write, station, _MODE, 0, data))
-        loop.axis(station, lambda axis: axis.drive_to(goal, mode))
+
+        def head_for(axis: AxisLoop) -> None:
+            if goal is State.OPERATION_ENABLED and loop.halts(station) != halts:
+                raise NotAllowed("cyclic.station-halted-meanwhile", station=station)
+            axis.drive_to(goal, mode)
+
+        loop.axis(station, head_for)
 
     async def reset_fault(self, station: int) -> None:
         """Reset a fault once; the axis stays disabled."""

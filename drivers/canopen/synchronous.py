@@ -103,6 +103,7 @@ class SyncLoop:
         self._arrived: dict[int, bytes] = {}
         self._came: set[int] = set()
         self._silent_s = dict.fromkeys(images.stations, 0.0)
+        self._halts = dict.fromkeys(images.stations, 0)
         self._sampled_s: float | None = None
         self._complete: set[int] = set()
         self._sent: list[int | float] = []
@@ -206,6 +207,7 @@ class SyncLoop:
         with self._lock:
             for axis in self.images.axes.values():
                 if station in (None, axis.station):
+                    self._halts[axis.station] += 1
                     axis.stop(why, State.READY)
 
     def abandon(self, station: int | None, why: Halted) -> None:
@@ -213,7 +215,13 @@ class SyncLoop:
         with self._lock:
             for node in self.images.stations:
                 if station in (None, node):
+                    self._halts[node] += 1
                     self.images.neutralise(node, why)
+
+    def halts(self, station: int) -> int:
+        """How often this station was halted or abandoned."""
+        with self._lock:
+            return self._halts[station]
 
     def halt_and_wait(self) -> None:
         """Stop everything and wait until nothing is enabled, at most 1.5 s. Blocks."""

@@ -122,6 +122,11 @@ def test_no_unit_limit_or_command_is_safe_in_motion(drive: str) -> None:
         ("1800:02", "at_enable"),
         ("1A00:01", "at_enable"),
         ("1011:01", "at_enable"),
+        ("1201:02", "energises"),  # its answers could be another drive's commands
+        ("1F51:01", "energises"),  # starts a program (CiA 302-3)
+        ("1F80:00", "energises"),  # the device starts itself or others (CiA 302-2)
+        ("1F82:02", "energises"),
+        ("1F89:00", "at_enable"),
         ("60B8:00", "none"),
         # Scales of speed and acceleration, also those that CiA 402 has given up since version 2
         ("6089:00", "at_enable"),

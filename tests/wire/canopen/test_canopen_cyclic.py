@@ -112,6 +112,27 @@ async def test_the_loop_owns_the_power_state(bench: Bench, link: CanopenLink) ->
     await until(lambda: bench.device.value(0x6041) == 0x0250)
 
 
+async def test_a_halt_while_the_mode_is_written_ends_the_enabling(
+    bench: Bench, link: CanopenLink, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The mode goes by SDO first: STOP in that time comes before the words that enable."""
+    await _run(link, [CONTROL, TARGET])
+    cyclic = _cyclic(link)
+    write, loop = cyclic._write, cyclic._loop
+    assert loop is not None
+
+    def halted_meanwhile(station: int, index: int, subindex: int, data: bytes) -> None:
+        write(station, index, subindex, data)
+        loop.halt(5, Halted(HaltCause.COMMANDED))
+
+    monkeypatch.setattr(cyclic, "_write", halted_meanwhile)
+    with pytest.raises(NotAllowed, match="was halted"):
+        await cyclic.drive_to(5, State.OPERATION_ENABLED, CSP)
+    assert loop.images.axes[5].goal is None
+    monkeypatch.undo()
+    await _enable(link, CSP)
+
+
 async def test_a_position_trajectory_is_played_value_for_value(link: CanopenLink) -> None:
     blocks = await _run(link, [CONTROL, TARGET, MODE])
     await _enable(link, CSP)
