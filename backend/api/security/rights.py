@@ -191,6 +191,7 @@ _API: dict[str, Need] = {
     "POST /measurements/import/preview": _FILES_UPLOAD,
     "GET /measurements/{name}": _LOOK,
     "GET /measurements/{name}/file": _LOOK,
+    "POST /measurements/{name}/signature": _FILES,
     "DELETE /measurements/{name}": _FILES,
     # files
     "GET /sets": _LOOK,

@@ -43,7 +43,9 @@ _AT_REST = 0.1
 SPEED_MARGIN, _FOLLOWED = 0.05, 0.95
 _POINTS, _SHOWN_BEFORE_S = 400, 0.2
 #: What a checksum of the signature is over.
-_SIGNED = ("settings", "measured_at", "sample_rate_hz", "asked_until")
+_SIGNED = (
+    "settings", "measured_at", "sample_rate_hz", "asked_until", "profile", "drive_id", "identity",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -112,6 +114,20 @@ def digest(arrays: Arrays, meta: Meta, person: str, signed: str, notes: str) -> 
         found.update(name.encode())
         found.update(np.ascontiguousarray(arrays[name]).tobytes())
     return found.hexdigest()
+
+
+def signed(arrays: Arrays, meta: Meta, person: str, when: str, notes: str) -> dict[str, object]:
+    """What is kept beside the raw data when a person signs them.
+
+    Raises:
+        ValueError: they are none of a safety check, or are signed already.
+    """
+    if meta.get("tool") != "safety-check" or "signature" in meta:
+        raise ValueError("not the raw data of a safety check that nobody has signed")
+    return {
+        "person": person, "signed": when, "notes": notes,
+        "sha256": digest(arrays, meta, person, when, notes),
+    }  # fmt: skip
 
 
 def evaluate(trace: Trace, settings: SafetySettings) -> SafetyResult:

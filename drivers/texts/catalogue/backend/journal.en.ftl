@@ -77,6 +77,7 @@ journal_password-changed = { $person } changed their password
 journal_password-set = { $person } set a password for { $name }
 journal_power-state = { $drive }: { $state }
 journal_reached-over-too = { $drive } is reached over { $url } too
+journal_record-signed = { $drive }: safety record { $name } signed by { $person }, SHA-256 { $sha256 }
 journal_recording-deleted = recording { $name } was deleted
 journal_recording-ended = recording { $name } ended: { $reason }, { $samples } samples
 journal_recording-ended-lost = recording { $name } ended: { $reason }, { $samples } samples; { $lost } samples were lost before they came to it

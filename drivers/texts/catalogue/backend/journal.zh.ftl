@@ -74,6 +74,7 @@ journal_password-changed = { $person } 更改了自己的密码
 journal_password-set = { $person } 为 { $name } 设置了密码
 journal_power-state = { $drive }：电源状态 { $state }
 journal_reached-over-too = { $drive } 也可通过 { $url } 访问
+journal_record-signed = { $drive }：安全记录 { $name } 由 { $person } 签署，SHA-256 { $sha256 }
 journal_recording-deleted = 录制 { $name } 已删除
 journal_recording-ended = 录制 { $name } 已结束：{ $reason }，{ $samples } 个采样
 journal_recording-ended-lost = 录制 { $name } 已结束：{ $reason }，{ $samples } 个采样；{ $lost } 个采样在到达前丢失

@@ -36,6 +36,7 @@ export const health = {
   'health.inertia': ['Inertia', '惯量'],
   'health.step_rise': ['Rise time of the step', '阶跃上升时间'],
   'health.step_overshoot': ['Overshoot of the step', '阶跃超调'],
+  'safety.notShown': ['not shown', '未能显示'],
   'health.unattended': ['Without a person: schedule and controller', '无人值守：计划与控制器'],
   'health.unattendedHelp': [
     'The measurements of the baseline begin by themselves where somebody who may move the axis permits it. They begin only while the axis is free, has no power and stands; otherwise nothing moves, and the reason is kept here.',
