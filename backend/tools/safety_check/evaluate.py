@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -44,37 +44,47 @@ SPEED_MARGIN, _FOLLOWED = 0.05, 0.95
 _POINTS, _SHOWN_BEFORE_S = 400, 0.2
 #: What a checksum of the signature is over.
 _SIGNED = (
-    "settings", "measured_at", "sample_rate_hz", "asked_until", "profile", "drive_id", "identity",
+    "settings", "measured_at", "sample_rate_hz", "asked_until", "reports", "profile", "drive_id",
+    "identity",
+)  # fmt: skip
+_ARRAYS = (
+    "position_rev", "speed_rpm", "torque_percent", "commanded_rpm",
+    "enabled", "quick_stop", "valid",
 )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Trace:
-    """[n], one sample per cycle. ``commanded_rpm`` as it was planned; ``enabled`` as the drive
-    says. ``asked_until``: from that sample on the tool itself ended the motion."""
+    """[n], one sample per cycle. ``commanded_rpm`` as it was planned; ``enabled`` and
+    ``quick_stop`` as the drive says. ``asked_until``: from that sample on the tool itself ended
+    the motion."""
 
     position_rev: FloatArray
     speed_rpm: FloatArray
     torque_percent: FloatArray
     commanded_rpm: FloatArray
     enabled: BoolArray
+    quick_stop: BoolArray
     valid: BoolArray
     sample_rate_hz: float
     asked_until: int
     measured_at: str
+    reports: tuple[str, ...] = ()
+    """Codes and names of the faults that the drive had at the end."""
+
+    def until(self, end: int) -> Trace:
+        """The part before this sample."""
+        return replace(self, **{name: getattr(self, name)[:end] for name in _ARRAYS})
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
         """For storage."""
-        names = (
-            "position_rev", "speed_rpm", "torque_percent", "commanded_rpm", "enabled", "valid",
-        )  # fmt: skip
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in _ARRAYS}
 
     def facts(self) -> dict[str, object]:
         """For storage, beside the arrays."""
         return {
             "sample_rate_hz": self.sample_rate_hz, "asked_until": self.asked_until,
-            "measured_at": self.measured_at,
+            "measured_at": self.measured_at, "reports": list(self.reports),
         }  # fmt: skip
 
 
@@ -87,13 +97,13 @@ def reevaluate(arrays: Arrays, meta: Meta) -> SafetyResult:
     given = meta.get("settings")
     if meta.get("tool") != "safety-check" or not isinstance(given, dict):
         raise ValueError("not the raw data of a safety check")
+    numbers = [np.asarray(arrays[name], np.float64) for name in _ARRAYS[:4]]
+    flags = [np.asarray(arrays[name], np.bool_) for name in _ARRAYS[4:]]
+    reports = meta.get("reports")
     trace = Trace(
-        *(np.asarray(arrays[n], np.float64) for n in (
-            "position_rev", "speed_rpm", "torque_percent", "commanded_rpm",
-        )),
-        np.asarray(arrays["enabled"], np.bool_), np.asarray(arrays["valid"], np.bool_),
-        float(str(meta["sample_rate_hz"])), int(str(meta["asked_until"])),
+        *numbers, *flags, float(str(meta["sample_rate_hz"])), int(str(meta["asked_until"])),
         str(meta["measured_at"]),
+        tuple(map(str, reports)) if isinstance(reports, (list, tuple)) else (),
     )  # fmt: skip
     found = evaluate(trace, SafetySettings.model_validate(given))
     signature = meta.get("signature")
@@ -131,8 +141,8 @@ def signed(arrays: Arrays, meta: Meta, person: str, when: str, notes: str) -> di
 
 
 def evaluate(trace: Trace, settings: SafetySettings) -> SafetyResult:
-    """The verdict."""
-    return _Check(trace, settings).result()
+    """The verdict, of what was seen before the tool itself ended the motion."""
+    return _Check(trace.until(trace.asked_until), settings).result()
 
 
 class _Check:
@@ -216,7 +226,7 @@ class _Check:
             "function": settings.function, "device": settings.device, "person": settings.person,
             "measured_at": trace.measured_at, "torque_noise_percent": self._noise,
             "highest_rpm": float(np.max(np.abs(self._speed), initial=0.0)),
-            "limited_rpm": settings.limited_rpm,
+            "limited_rpm": settings.limited_rpm, "reports": trace.reports,
         }  # fmt: skip
         if self._at is None:
             verdict: Verdict = "not_triggered"
@@ -260,6 +270,8 @@ class _Check:
                     "speed_at_torque_free_rpm": float(self._speed[free]),
                 }
         obstacle = self._obstacle(at, speed, distinct=distinct)
+        if settings.function == "ss1" and free is not None and self._cut(at, free, speed):
+            obstacle = "quick_stop_cut"
         exceeded = self._exceeded(found)
         found |= {"obstacle": obstacle, "exceeded": exceeded}
         found["verdict"] = self._verdict(at, rest, free, speed, obstacle, exceeded, distinct)
@@ -275,6 +287,11 @@ class _Check:
         if settings.function in ("sto", "ss1") and not distinct:
             return "torque_in_noise"
         return None
+
+    def _cut(self, at: int, free: int, speed: float) -> bool:
+        """It braked by a quick stop at whose beginning our own exchange took the power away."""
+        fast = abs(float(self._speed[free])) > _AT_REST * abs(speed)
+        return fast and bool(np.any(self._trace.quick_stop[at : free + 1]))
 
     def _exceeded(self, found: Mapping[str, object]) -> tuple[Exceeded, ...]:
         settings = self._settings
@@ -310,6 +327,7 @@ class _Check:
             return "torque_remains" if distinct and free is None else "not_shown"
         if (
             settings.function == "ss1" and free is not None and distinct
+            and obstacle != "quick_stop_cut"
             and abs(float(self._speed[free])) > _AT_REST * abs(speed)
         ):  # fmt: skip
             return "power_off_at_speed"

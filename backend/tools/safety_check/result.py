@@ -22,7 +22,7 @@ Verdict = Literal[
     "recorded",
 ]
 """The worst first. ``recorded``: all of it was seen, and no limit was given."""
-Obstacle = Literal["torque_in_noise", "too_slow", "samples_lost"]
+Obstacle = Literal["torque_in_noise", "too_slow", "samples_lost", "quick_stop_cut"]
 """Why something cannot be shown."""
 Sign = Literal["state", "speed"]
 """What showed first: the drive left Operation enabled, or the speed left the commanded one."""
@@ -58,6 +58,10 @@ class SafetyResult(ToolResult):
     device: str
     person: str
     measured_at: str
+    reports: tuple[str, ...] = Field(
+        default=(), description="faults of the drive at the end; one that is no sign of the "
+        "function stopped the axis instead of it"
+    )  # fmt: skip
     speed_rpm: float | None = Field(default=None, description="when it was triggered")
     torque_before_percent: float | None = None
     torque_noise_percent: float = Field(description="below it no torque can be distinguished")

@@ -7,7 +7,7 @@ nothing enables the axis again, and each further check is started by a person (I
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -127,10 +127,17 @@ async def run(run: Run, settings: SafetySettings) -> SafetyResult:
     finally:
         unsubscribe()
     trace = _trace(catch, plan, units, axis, rate, asked_until, measured_at)
+    trace = replace(trace, reports=await _reports(axis))
     if run.keep is not None:
         meta = {"tool": "safety-check", "settings": settings.model_dump(mode="json")}
         run.keep("safety-check", trace.arrays(), {**meta, **trace.facts()})
     return await asyncio.to_thread(evaluate, trace, settings)
+
+
+async def _reports(axis: Axis) -> tuple[str, ...]:
+    if await axis.state() not in (State.FAULT, State.FAULT_REACTION):
+        return ()
+    return tuple(f"{fault.code} {fault.name}" for fault in await axis.active_faults())
 
 
 def _require_status(run: Run) -> None:
@@ -267,11 +274,13 @@ def _trace(
     known = plan[lead : lead + len(table) - begun]
     commanded[begun : begun + known.size] = known
     words = {int(word): axis.drive.decode_state(int(word)) for word in np.unique(table[:, 4])}
-    enabled_at = np.array([words[int(word)] is State.OPERATION_ENABLED for word in table[:, 4]])
+    position = np.unwrap(table[:, 0], period=2.0**32)
+    states = np.array([words[int(word)].value for word in table[:, 4]])
     return Trace(
-        position_rev=table[:, 0] * units.position(1.0), speed_rpm=table[:, 1] * units.velocity(1.0),
+        position_rev=position * units.position(1.0), speed_rpm=table[:, 1] * units.velocity(1.0),
         torque_percent=table[:, 2] * units.torque(1.0), commanded_rpm=commanded,
-        enabled=enabled_at, valid=valid, sample_rate_hz=rate,
+        enabled=states == State.OPERATION_ENABLED.value,
+        quick_stop=states == State.QUICK_STOP_ACTIVE.value, valid=valid, sample_rate_hz=rate,
         asked_until=len(table) if asked_until is None else min(asked_until - first, len(table)),
         measured_at=measured_at,
     )  # fmt: skip

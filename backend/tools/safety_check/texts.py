@@ -129,6 +129,13 @@ TEXTS: dict[str, tuple[str, str]] = {
         "Samples were lost on the bus while it acted. Repeat it.",
         "起作用时总线丢失了采样。请重复。",
     ),
+    "obstacle.quick_stop_cut": (
+        "The drive braked in its state Quick stop active, and the exchange of this program then "
+        "took its power away, as it does with every axis that leaves Operation enabled. SS1 of "
+        "this drive is not shown here: record it under the machine's controller.",
+        "驱动器在“快速停止激活”状态下制动，随后本程序的数据交换切断了其动力（对每个离开“操作使能”的轴都如此）。"
+        "此处无法证实该驱动器的 SS1：请在机器控制器下记录。",
+    ),
     "sign.state": (
         "Times count from when the drive was first seen to leave Operation enabled. What passed "
         "from the hand to that is not on the bus and not in them.",
@@ -138,6 +145,11 @@ TEXTS: dict[str, tuple[str, str]] = {
         "Times count from when the speed first left the commanded one: the drive stayed enabled. "
         "What passed from the hand to that is not in them.",
         "时间从速度首次偏离给定速度起算：驱动器保持使能。从手动触发到此刻的时间未计入。",
+    ),
+    "reports": (
+        "The drive reports: {faults}. Where that is no sign of this function, something else "
+        "stopped the axis: repeat the check.",
+        "驱动器报告：{faults}。若其并非此功能的征兆，则是其他原因使轴停止：请重复检查。",
     ),
     "made": (
         "Triggered with {device} by {person}, {at} (UTC).",
@@ -209,6 +221,8 @@ def notes(result: SafetyResult) -> list[Note]:
     found.append(Note("no_certificate", "warn"))
     if result.sign is not None:
         found.append(Note(f"sign.{result.sign}"))
+    if result.reports:
+        found.append(Note("reports", "plain", {"faults": ", ".join(result.reports)}))
     at = result.measured_at[:19].replace("T", " ")
     made = {"device": result.device or "–", "person": result.person or "–", "at": at}
     found.append(Note("made", "plain", made))

@@ -33,8 +33,8 @@ ASKED = SafetySettings(
 )  # fmt: skip
 
 
-def stiff(viscous: float = 0.0) -> Any:
-    return mechanics((1e-4, 3000.0, 0.02), coulomb=COULOMB_NM, viscous=viscous)
+def stiff(gravity: float = 0.0) -> Any:
+    return mechanics((1e-4, 3000.0, 0.02), coulomb=COULOMB_NM, viscous=0.0, gravity=gravity)
 
 
 def off(bench: DirectBench) -> None:
@@ -46,8 +46,11 @@ def off(bench: DirectBench) -> None:
 
 
 def told_only(bench: DirectBench) -> None:
-    """The drive says that it has no power, and holds its speed: a channel that is bridged."""
-    bench.link.device.control.state = Firmware.SWITCH_ON_DISABLED
+    """The drive says that it has no power, and holds the axis: a channel that is bridged."""
+    control = bench.link.device.control
+    control.modes.end()
+    bench.link.device.core.axis.hold()
+    control.state = Firmware.SWITCH_ON_DISABLED
 
 
 def braked(bench: DirectBench) -> None:
@@ -97,12 +100,21 @@ async def test_safe_torque_off_coasts_by_friction_alone() -> None:
 
 
 async def test_torque_that_remains_is_told_as_danger() -> None:
-    async with direct(stiff(), drive="r6l") as bench:
+    """A load of 0.2 N·m hangs: what holds it is torque."""
+    async with direct(stiff(gravity=0.2), drive="r6l") as bench:
         found = await recorded(bench, told_only)
-    assert found.verdict in ("torque_remains", "still_turning")
+    assert found.verdict == "torque_remains"
     assert found.torque_free_ms is None
-    words = TOOL.text(TOOL.report(found).notes[0].name)
-    assert "Put the axis out of use" in words or "still turns" in words
+    assert "Put the axis out of use" in TOOL.text(TOOL.report(found).notes[0].name)
+
+
+async def test_what_else_stopped_the_axis_is_named() -> None:
+    """An entry of the fault table by itself: the person decides whether it is of the function."""
+    async with direct(stiff(), drive="r6l") as bench:
+        found = await recorded(bench, lambda b: b.link.device.control.faults.raise_code("AL.301"))
+    assert found.reports
+    assert "AL.301" in found.reports[0]
+    assert any(note.name == "reports" for note in TOOL.report(found).notes)
 
 
 async def test_a_stop_by_ramp_is_ss1_and_a_coasting_one_is_not() -> None:

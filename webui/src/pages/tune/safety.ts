@@ -29,6 +29,8 @@ export function notesOf(result: SafetyResult, text: Text): ShownNote[] {
   }
   found.push({ words: text('no_certificate'), tone: 'warn' })
   if (sign) found.push({ words: text(`sign.${sign}`), tone: 'info' })
+  const faults = (result.reports ?? []).join(', ')
+  if (faults) found.push({ words: text('reports', { faults }), tone: 'info' })
   const { device, person } = result
   const at = moment(result.measured_at)
   found.push({
