@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from datetime import UTC, datetime, time, timedelta
-from typing import Annotated, get_args
+from typing import Annotated
 
 import typer
 
@@ -22,6 +22,18 @@ from drivers.texts.message import Text, language, text
 
 app = typer.Typer()
 _DAYS = ("mon", "tue", "wed", "thu", "fri", "sat", "sun")
+_OUTCOMES: dict[Outcome, Text] = {
+    "running": text("health.outcome-running"),
+    "done": text("health.outcome-done"),
+    "not_made": text("health.outcome-not-made"),
+    "missed": text("health.outcome-missed"),
+    "cancelled": text("health.outcome-cancelled"),
+    "failed": text("health.outcome-failed"),
+}
+_CAUSES: dict[Cause, Text] = {
+    "schedule": text("health.cause-schedule"),
+    "trigger": text("health.cause-trigger"),
+}
 Axis = Annotated[str, typer.Option("--axis", help="name of the axis")]
 
 
@@ -51,7 +63,7 @@ def permit(
     server: Server = None,
     as_json: Json = False,
 ) -> None:
-    """Permit the baseline's measurements without a person, until taken back. Moves later."""
+    """Permit the baseline's measurements without a person. The axis moves later."""
     body = {
         "until": (datetime.now(UTC) + timedelta(days=for_days)).isoformat(), "days": _days(days),
         "at": _time(at).isoformat(), "trigger": trigger, "pause_min": pause_min, "person": person,
@@ -80,7 +92,7 @@ def permission(axis: Axis, server: Server = None, as_json: Json = False) -> None
 
 @app.command("withdraw")
 def withdraw(axis: Axis, server: Server = None) -> None:
-    """Take the permission back, and end a run that goes on by it."""
+    """Withdraw the permission, and end a run that goes on by it."""
 
     async def work() -> None:
         async with remote(server or DEFAULT_SERVER) as at:
@@ -152,12 +164,7 @@ def lines_of(axis: str, found: HealthPermissionInfo | None) -> list[str]:
 
 def _attempt(each: HealthAttempt) -> str:
     why = "" if each.why is None else f": {Text.from_wire(each.why.model_dump()).words(language())}"
-    outcome = text(f"health.outcome-{each.outcome.replace('_', '-')}").words(language())
-    cause = text(f"health.cause-{each.cause}").words(language())
+    outcome, cause = (
+        found.words(language()) for found in (_OUTCOMES[each.outcome], _CAUSES[each.cause])
+    )
     return f"  {each.at.astimezone(UTC):%Y-%m-%d %H:%M}  {cause}, {outcome}{why}"
-
-
-#: Every code that is made above, so that a missing text is found by a test.
-CODES = [f"health.outcome-{each.replace('_', '-')}" for each in get_args(Outcome)] + [
-    f"health.cause-{each}" for each in get_args(Cause)
-]

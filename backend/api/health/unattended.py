@@ -151,8 +151,8 @@ class Unattended:
                 self._end(permission)
             return
         at = due(permission, now)
-        if at is None or at > permission.until:
-            return
+        if at is None or at > permission.until or (self._running and now - at <= WINDOW):
+            return  # one run after another: they may share a bus
         # Before it begins: a server that this run would bring down does not begin it again.
         if not await self._change(permission, lambda known: _handled(known, at)):
             self.permissions.skip(_handled(permission, at))
@@ -160,11 +160,9 @@ class Unattended:
         if now - at > WINDOW:
             await self._note(permission, Attempt(at=at, cause="schedule", outcome="missed"))
             return
-        job = await self._scheduled(permission)
-        if job is not None:
-            await job.wait()
+        await self._scheduled(permission)
 
-    async def _scheduled(self, permission: Permission) -> Job | None:
+    async def _scheduled(self, permission: Permission) -> None:
         """Announce the run, wait, and begin it."""
         try:
             connected, _ = await self._require(permission)
@@ -173,15 +171,14 @@ class Unattended:
             await asyncio.sleep(self._notice_s)
             known = self.permissions.of(permission.drive)
             if known is None or known.id != permission.id:
-                return None  # it was taken back meanwhile
+                return  # it was withdrawn meanwhile
             role = self._role(known) or Role.VIEWER
             rights = RIGHTS[role] & MOVING
             who = Identity(f"{known.person} (schedule)", role, "token", known.session, rights)
             acting.set(Actor(who))
-            return await self.begin(known, "schedule")
+            await self.begin(known, "schedule")
         except DriveError as error:
             await self._not_made(permission, "schedule", error)
-            return None
         finally:
             acting.set(None)
 
@@ -330,15 +327,13 @@ class Unattended:
     # --- notes ------------------------------------------------------------------------
 
     async def _not_made(self, permission: Permission, cause: Cause, error: DriveError) -> None:
-        now, why = self._now(), why_of(error)
+        made = Attempt(at=self._now(), cause=cause, outcome="not_made", why=why_of(error))
         known = self.permissions.of(permission.drive)
-        last = known.attempts[-1] if known is not None and known.attempts else None
-        if (
-            last is not None and last.outcome == "not_made" and last.cause == cause == "trigger"
-            and last.why == why and now - last.at < _NOTED_AGAIN
-        ):  # fmt: skip
-            return
-        made = Attempt(at=now, cause=cause, outcome="not_made", why=why)
+        last = known.attempts[-1] if known is not None and known.attempts else made
+        if cause == "trigger" and last is not made and made.at - last.at < _NOTED_AGAIN:
+            again = last.model_copy(update={"at": made.at})
+            if again == made:
+                return
         await self._note(permission, made)
         name = self._bench.name_of(permission.drive)
         line = text("journal.health-not-made", drive=name, cause=error.text)
