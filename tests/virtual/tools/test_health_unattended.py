@@ -346,3 +346,16 @@ async def test_nothing_is_repeated_where_it_cannot_be_stored(
     assert station.asked == []
     errors = [e for e in station.bench.journal.entries("x") if e.level == "error"]
     assert len(errors) == 1
+
+
+async def test_a_run_ends_with_the_right_of_who_permitted_it(station: Station) -> None:
+    await station.permit()
+    station.hold.clear()
+    await station.ok("POST", "/drives/x/health/trigger")
+    await until(lambda: bool(station.asked))
+    await nobody(station)
+    await station.schedule._look_after(station.known())
+    station.people.accounts_needed = False
+    await station.ends()
+    assert station.bench.jobs.all()[-1].state == "cancelled"
+    assert station.known().attempts[-1].outcome == "cancelled"
