@@ -84,8 +84,10 @@ def permission(axis: Axis, server: Server = None, as_json: Json = False) -> None
 
     async def work() -> None:
         async with remote(server or DEFAULT_SERVER) as at:
-            path = f"{await _place(at, axis)}/permission"
-            _show(axis, await at.ask("GET", path, HealthPermissionInfo | None), as_json)  # type: ignore[arg-type]
+            answer = await at.raw("GET", f"{await _place(at, axis)}/permission")
+            given = answer.content != b"null"
+            found = HealthPermissionInfo.model_validate_json(answer.content) if given else None
+            _show(axis, found, as_json)
 
     run(work)
 

@@ -97,13 +97,22 @@ def reevaluate(arrays: Arrays, meta: Meta) -> SafetyResult:
     given = meta.get("settings")
     if meta.get("tool") != "safety-check" or not isinstance(given, dict):
         raise ValueError("not the raw data of a safety check")
-    numbers = [np.asarray(arrays[name], np.float64) for name in _ARRAYS[:4]]
-    flags = [np.asarray(arrays[name], np.bool_) for name in _ARRAYS[4:]]
     reports = meta.get("reports")
+
+    def number(name: str) -> FloatArray:
+        return np.asarray(arrays[name], np.float64)
+
+    def flag(name: str) -> BoolArray:
+        return np.asarray(arrays[name], np.bool_)
+
     trace = Trace(
-        *numbers, *flags, float(str(meta["sample_rate_hz"])), int(str(meta["asked_until"])),
-        str(meta["measured_at"]),
-        tuple(map(str, reports)) if isinstance(reports, (list, tuple)) else (),
+        position_rev=number("position_rev"), speed_rpm=number("speed_rpm"),
+        torque_percent=number("torque_percent"), commanded_rpm=number("commanded_rpm"),
+        enabled=flag("enabled"), quick_stop=flag("quick_stop"), valid=flag("valid"),
+        sample_rate_hz=float(str(meta["sample_rate_hz"])),
+        asked_until=int(str(meta["asked_until"])),
+        measured_at=str(meta["measured_at"]),
+        reports=tuple(map(str, reports)) if isinstance(reports, (list, tuple)) else (),
     )  # fmt: skip
     found = evaluate(trace, SafetySettings.model_validate(given))
     signature = meta.get("signature")
