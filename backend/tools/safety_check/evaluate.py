@@ -293,7 +293,10 @@ class _Check:
             return "samples_lost"
         if settings.function != "speed_limit" and abs(speed) < 0.8 * settings.speed_rpm:
             return "too_slow"
-        if settings.function in ("sto", "ss1") and not distinct:
+        torque_off = settings.function in ("sto", "ss1")
+        if torque_off and bool(np.all(self._trace.enabled[at:])):
+            return "stayed_enabled"
+        if torque_off and not distinct:
             return "torque_in_noise"
         return None
 
@@ -324,7 +327,6 @@ class _Check:
         settings = self._settings
         stops = settings.function != "speed_limit"
         torque_off = settings.function in ("sto", "ss1")
-        end = min(self._trace.asked_until, self._trace.enabled.size)
         left = np.flatnonzero(~self._trace.enabled[at:])
         if torque_off and free is None:
             return "torque_remains"
@@ -332,8 +334,6 @@ class _Check:
             return "still_turning"
         if torque_off and left.size and bool(np.any(self._trace.enabled[at + int(left[0]) :])):
             return "restarted"
-        if torque_off and not left.size and end > at:
-            return "torque_remains" if distinct and free is None else "not_shown"
         if (
             settings.function == "ss1" and free is not None and distinct
             and obstacle != "quick_stop_cut"
@@ -362,5 +362,5 @@ class _Check:
 
 
 def _above(value: object, limit: float) -> bool:
-    """Not known is no proof of being within."""
-    return not isinstance(value, float) or value > limit
+    """What is not known is no proof of anything: another verdict says so."""
+    return isinstance(value, float) and value > limit

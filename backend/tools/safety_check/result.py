@@ -22,7 +22,9 @@ Verdict = Literal[
     "recorded",
 ]
 """The worst first. ``recorded``: all of it was seen, and no limit was given."""
-Obstacle = Literal["torque_in_noise", "too_slow", "samples_lost", "quick_stop_cut"]
+Obstacle = Literal[
+    "torque_in_noise", "too_slow", "samples_lost", "stayed_enabled", "quick_stop_cut"
+]
 """Why something cannot be shown."""
 Sign = Literal["state", "speed"]
 """What showed first: the drive left Operation enabled, or the speed left the commanded one."""

@@ -129,6 +129,11 @@ TEXTS: dict[str, tuple[str, str]] = {
         "Samples were lost on the bus while it acted. Repeat it.",
         "起作用时总线丢失了采样。请重复。",
     ),
+    "obstacle.stayed_enabled": (
+        "The drive stayed in Operation enabled all the time: it does not say that its torque is "
+        "off. Look at how this function is wired and set.",
+        "驱动器始终处于“操作使能”：未表明其转矩已关断。请检查该功能的接线和设置。",
+    ),
     "obstacle.quick_stop_cut": (
         "The drive braked in its state Quick stop active, and the exchange of this program then "
         "took its power away, as it does with every axis that leaves Operation enabled. SS1 of "

@@ -70,7 +70,7 @@ def test_times_and_ways_of_a_torque_that_goes() -> None:
         (trace(stops_in=9000), "still_turning", None),
         (trace(again_at=3000), "restarted", None),
         (trace(torque=0.4), "not_shown", "torque_in_noise"),
-        (trace(state_at=None), "not_shown", None),
+        (trace(state_at=None), "not_shown", "stayed_enabled"),
     ],
 )  # fmt: skip
 def test_what_is_no_torque_off(made: Trace, verdict: str, obstacle: str | None) -> None:
