@@ -102,6 +102,11 @@ COMMANDS = {
         "Torque against the closed holding brake, both directions, until the test torque or slip. "
         "The axis is energised.",
     ),
+    "safety-check": (
+        "tools:safety_check",
+        "Watch what the axis does when you trigger a safety function by hand: torque, stop and "
+        "speed. It records and does not certify. The axis moves.",
+    ),
     "autotune": (
         "tune:autotune",
         "Measure, design and, with --apply or --keep, verify an axis's loop gains. The axis moves.",

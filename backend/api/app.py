@@ -26,6 +26,7 @@ from backend.api.drive import terminals as routes_io
 from backend.api.errors import NotFound
 from backend.api.handover import routes as routes_handover
 from backend.api.health import routes as routes_health
+from backend.api.health.unattended import Unattended
 from backend.api.library import routes as routes_library
 from backend.api.live.live import LiveHub
 from backend.api.people import accounts as routes_accounts
@@ -130,6 +131,7 @@ def make_app(
     known = people or People(bench.state_folder)
     sockets = OpenSockets()
     live = LiveHub(bench, known, sockets)
+    unattended = Unattended(bench, known)
     axis_store = bench.axis_records
     scene = SceneFeed(bench, lambda drive: axis_store.get(drive).mechanics)
 
@@ -147,11 +149,13 @@ def make_app(
             await bench.restore()
             watch = asyncio.create_task(live.people.run(), name="people")
             then.callback(watch.cancel)
+            await unattended.open()
             then.push_async_callback(recordings.close)
             then.push_async_callback(scene.close)
             then.push_async_callback(feed.close)
             # What moves is stopped before a slow disk may keep the server waiting.
             then.push_async_callback(bench.jobs.close)
+            then.push_async_callback(unattended.close)
             yield
 
     app = DescribedApp(
@@ -166,6 +170,7 @@ def make_app(
     )
     app.state.bench = bench
     app.state.recordings = recordings
+    app.state.unattended = unattended
     app.state.axis_store = axis_store
     app.state.forcing = ForcingSessions(bench.jobs, bench.leases.taken_by)
     errors.install(app)

@@ -16,6 +16,7 @@ import typer
 from backend.api.health.models import AxisHealth, HealthFinding
 from backend.api.health.routes import info_of
 from backend.api.station.models import DriveSummary
+from backend.commands import health_permission
 from backend.commands.keep import Config, Database, station_records
 from backend.commands.options import DEFAULT_SERVER, Json, Server
 from backend.commands.remote import Remote, remote
@@ -38,6 +39,7 @@ app = typer.Typer(
 Axis = Annotated[str, typer.Option("--axis", help="name of the axis")]
 _TOOL = BY_KIND["health"]
 
+app.add_typer(health_permission.app)
 app.command("measure", help=_TOOL.text("help"))(command_of(_TOOL))
 
 

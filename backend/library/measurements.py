@@ -223,10 +223,20 @@ class MeasurementStore:
         Raises:
             NotAllowed: no such file. StorageFailed: the disk; the file is as it was.
         """
-        found = self.load(name)
-        head = {**found.meta, "result": result}
-        path = self.path(name)
-        write_atomically(path, _zipped(head, found.arrays))
+        self._add(self.load(name), name, {"result": result})
+
+    def sign(
+        self, name: str, signature: Mapping[str, object], result: Mapping[str, object]
+    ) -> None:
+        """Add who signed a file, and the conclusion that was signed.
+
+        Raises:
+            NotAllowed: no such file. StorageFailed: the disk; the file is as it was.
+        """
+        self._add(self.load(name), name, {"signature": signature, "result": result})
+
+    def _add(self, found: Measurement, name: str, facts: Mapping[str, object]) -> None:
+        write_atomically(self.path(name), _zipped({**found.meta, **facts}, found.arrays))
 
     def names(self) -> list[str]:
         """File names, newest first."""

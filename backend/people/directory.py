@@ -66,6 +66,11 @@ class Directory:
             raise NoSuchPerson("people.no-session", value=session_id)
         return self.account(session.account)
 
+    def account_of(self, session_id: str) -> Account | None:
+        """The account of a session or token; None where there is none."""
+        known = self._sessions.get(session_id) or self._tokens.get(session_id)
+        return None if known is None else self._accounts.get(known.account)
+
     def expires(self, session_id: str) -> datetime | None:
         """When a session or token ends; None where there is none."""
         known = self._sessions.get(session_id) or self._tokens.get(session_id)

@@ -61,14 +61,24 @@ def choose(heads: Mapping[str, Head], changed_first: datetime | None) -> list[tu
     """The newest file of each kind, with the newest from before the first change ("" if none)."""
     chosen = []
     for kind in _ORDER:
-        files = sorted((h.saved, f) for f, h in heads.items() if kind_of(h) == kind)
-        if not files:
-            continue
-        newest = files[-1][1]
-        before = [f for saved, f in files if changed_first and saved < changed_first]
-        earlier = before[-1] if before and before[-1] != newest else ""
-        chosen.append((newest, earlier))
+        for files in _alike(kind, heads):
+            newest = files[-1][1]
+            before = [f for saved, f in files if changed_first and saved < changed_first]
+            # Records of a safety function are no measurements before and after tuning.
+            compares = kind != "safety-check" and before and before[-1] != newest
+            chosen.append((newest, before[-1] if compares else ""))
     return chosen
+
+
+def _alike(kind: str, heads: Mapping[str, Head]) -> list[list[tuple[datetime, str]]]:
+    """Files of a kind by time; each safety function by itself, as each has a record."""
+    groups: dict[str, list[tuple[datetime, str]]] = {}
+    for file, head in heads.items():
+        if kind_of(head) == kind:
+            settings = head.meta.get("settings")
+            function = settings.get("function", "") if isinstance(settings, dict) else ""
+            groups.setdefault(str(function), []).append((head.saved, file))
+    return [sorted(groups[name]) for name in sorted(groups)]
 
 
 def measured_from(

@@ -7,8 +7,17 @@ from backend.tools.first_power.run import TOOL as FIRST_POWER
 from backend.tools.friction.run import TOOL as FRICTION
 from backend.tools.health.run import TOOL as HEALTH
 from backend.tools.inertia.run import TOOL as INERTIA
+from backend.tools.safety_check.run import TOOL as SAFETY_CHECK
 from backend.tools.step.run import TOOL as STEP
 from backend.tools.tool import AnyTool
 
-TOOLS: tuple[AnyTool, ...] = (FIRST_POWER, INERTIA, STEP, FRICTION, BRAKE_TEST, HEALTH)
+TOOLS: tuple[AnyTool, ...] = (
+    FIRST_POWER,
+    INERTIA,
+    STEP,
+    FRICTION,
+    BRAKE_TEST,
+    HEALTH,
+    SAFETY_CHECK,
+)
 BY_KIND: dict[str, AnyTool] = {tool.kind: tool for tool in TOOLS}

@@ -15,6 +15,7 @@ from backend.tools.first_power.result import FirstPowerResult
 from backend.tools.friction.result import FrictionResult
 from backend.tools.health.result import HealthResult
 from backend.tools.inertia.result import InertiaAnswer
+from backend.tools.safety_check.result import SafetyResult
 from backend.tools.step.result import StepAnswer
 from backend.tools.sweep.result import SweepAnswer
 
@@ -25,6 +26,7 @@ ToolOutcome: TypeAlias = Annotated[
     | BrakeResult
     | HealthResult
     | FirstPowerResult
+    | SafetyResult
     | SweepAnswer
     | AutotuneAnswer,
     Field(discriminator="tool"),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from datetime import datetime
+from datetime import datetime, time
 
 from pydantic import BaseModel, Field
 
 from backend.api.models import Message
 from backend.health.compare import Code, Direction
+from backend.health.permission import Cause, Outcome, Weekday
 from backend.tools.health.result import HealthValue, Quantity
 from backend.tools.wire_message import MessageInfo
 
@@ -84,3 +85,48 @@ class BaselineRequest(Message):
     runs: list[int] = Field(min_length=1, max_length=100)
     person: str = Field(default="", max_length=200)
     notes: str = Field(default="", max_length=4000)
+
+
+class HealthAttempt(BaseModel):
+    """One run that was due or asked for, newest first in its list."""
+
+    at: datetime
+    cause: Cause
+    outcome: Outcome = Field(
+        description="not_made: something was in the way, nothing moved; missed: servodeck did not "
+        "run, or was busy, at the time"
+    )
+    why: MessageInfo | None
+    remedy: MessageInfo | None
+
+
+class HealthPermissionInfo(BaseModel):
+    """The standing permission of an axis' health check. ``ended`` says why it permits nothing."""
+
+    person: str
+    given: datetime
+    until: datetime
+    ended: MessageInfo | None
+    baseline: int
+    days: list[Weekday] = Field(description="0 is Monday; empty: no schedule")
+    at: time = Field(description="by the station's clock")
+    next_due: datetime | None
+    trigger: bool = Field(description="a controller may ask for a run")
+    pause_min: float = Field(description="least time between two runs, in minutes")
+    attempts: list[HealthAttempt]
+
+
+class HealthPermissionRequest(Message):
+    """What is permitted. ``person`` counts where the page is used without accounts."""
+
+    until: datetime = Field(description="its end, within 366 days")
+    days: list[Weekday] = Field(default_factory=list, max_length=7)
+    at: time = Field(default=time(2, 0), description="by the station's clock, to the minute")
+    trigger: bool = False
+    pause_min: float = Field(default=60.0, ge=5.0, le=10080.0)
+    person: str = Field(default="", max_length=200)
+    secured: bool = Field(
+        default=False,
+        description="the person states that nobody can be in the danger zone at these times, and "
+        "that the axis may move within the limits of the baseline",
+    )

@@ -5,26 +5,46 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 from pydantic import TypeAdapter
 
-from backend.api.context import Me, TheBench, TheDrive
+from backend.api import convert
+from backend.api.context import Controlled, Me, TheBench, TheDrive, ThePeople
 from backend.api.errors import message_of as as_info
+from backend.api.errors import message_or_none
 from backend.api.health.kept import records_of
 from backend.api.health.models import (
     AxisHealth,
     BaselineRequest,
+    HealthAttempt,
     HealthBaselineInfo,
     HealthFinding,
+    HealthPermissionInfo,
+    HealthPermissionRequest,
     HealthRunInfo,
 )
+from backend.api.health.unattended import Unattended
+from backend.api.models import JobInfo
 from backend.health.compare import Finding
+from backend.health.permission import Attempt, Permission, next_due
 from backend.health.records import Baseline, Condition, HealthRow, axis_of
 from backend.health.words import message_of
 from backend.tools.health.result import UNITS
-from drivers.texts.message import text
+from drivers.errors import NotAllowed
+from drivers.texts.message import Text, text
 
 router = APIRouter()
+
+
+async def unattended_of(request: Request) -> Unattended:
+    """What begins health checks without a person on this server."""
+    found = request.app.state.unattended
+    if not isinstance(found, Unattended):
+        raise TypeError("the application was made without a schedule")
+    return found
+
+
+TheSchedule = Annotated[Unattended, Depends(unattended_of)]
 _TREND = TypeAdapter(list[AxisHealth])
 
 
@@ -78,6 +98,86 @@ async def sign_baseline(
         drive=connected.drive.id,
     )
     return info_of(await bench.records.store.call(records.condition, axis))
+
+
+@router.get("/drives/{drive_id}/health/permission")
+async def read_health_permission(
+    connected: TheDrive, schedule: TheSchedule
+) -> HealthPermissionInfo | None:
+    """Who permits runs without a person, when, and what became of them; null without any."""
+    return _permission(schedule, connected.drive.id)
+
+
+@router.put("/drives/{drive_id}/health/permission")
+async def permit_health(
+    bench: TheBench, connected: Controlled, me: Me, people: ThePeople, schedule: TheSchedule,
+    request: HealthPermissionRequest,
+) -> HealthPermissionInfo:  # fmt: skip
+    """Permit runs of the baseline's measurements without a person. It replaces an older one."""
+    if not request.secured:
+        raise NotAllowed("health.permission-secured", drive=connected.drive.name)
+    baseline = await schedule.baseline(connected)
+    given = datetime.now(UTC)
+    account = people.accounts.directory.account_of(me.session)
+    person = request.person if me.kind == "local" else me.person
+    until = request.until if request.until.tzinfo else request.until.replace(tzinfo=UTC)
+    made = Permission(
+        drive=connected.drive.id, axis_key=baseline.axis.key, person=person.strip(),
+        account=None if account is None else account.id, given=given, until=until,
+        baseline=baseline.id, days=tuple(sorted(set(request.days))),
+        at=request.at.replace(second=0, microsecond=0, tzinfo=None),
+        trigger=request.trigger, pause_s=request.pause_min * 60.0, handled=given,
+    )  # fmt: skip
+    await schedule.permit(connected, me, made)
+    line = text("journal.health-permitted", drive=connected.drive.name, person=made.person,
+                until=until.isoformat(sep=" ", timespec="minutes"))  # fmt: skip
+    bench.journal.add(line, drive=connected.drive.id)
+    found = _permission(schedule, connected.drive.id)
+    assert found is not None, "it was given just now"
+    return found
+
+
+@router.delete("/drives/{drive_id}/health/permission", status_code=204)
+async def withdraw_health_permission(
+    bench: TheBench, connected: TheDrive, schedule: TheSchedule
+) -> None:
+    """End the permission, and a run that goes on by it."""
+    gone = await schedule.withdraw(connected.drive.id)
+    if gone is not None:
+        line = text("journal.health-withdrawn", drive=connected.drive.name, person=gone.person)
+        bench.journal.add(line, drive=connected.drive.id)
+
+
+@router.post("/drives/{drive_id}/health/trigger", status_code=202)
+async def trigger_health(connected: Controlled, schedule: TheSchedule) -> JobInfo:
+    """A controller asks for a run. Without a standing permission for it nothing moves.
+
+    ``GET /jobs/{id}`` tells how far it is, ``GET /drives/{id}/health`` what has changed.
+    """
+    return convert.job(await schedule.triggered(connected))
+
+
+def _permission(schedule: Unattended, drive: str) -> HealthPermissionInfo | None:
+    known = schedule.permissions.of(drive)
+    if known is None:
+        return None
+    now = datetime.now(UTC)
+    ended = schedule.ended(known)
+    return HealthPermissionInfo(
+        person=known.person, given=known.given, until=known.until, ended=message_or_none(ended),
+        baseline=known.baseline, days=list(known.days), at=known.at,
+        next_due=None if ended is not None else next_due(known, now), trigger=known.trigger,
+        pause_min=known.pause_s / 60.0,
+        attempts=[_attempt(each) for each in reversed(known.attempts)],
+    )  # fmt: skip
+
+
+def _attempt(each: Attempt) -> HealthAttempt:
+    why = None if each.why is None else Text.from_wire(each.why)
+    return HealthAttempt(
+        at=each.at, cause=each.cause, outcome=each.outcome, why=message_or_none(why),
+        remedy=None if why is None else message_or_none(why.remedy()),
+    )  # fmt: skip
 
 
 def info_of(found: Condition) -> AxisHealth:

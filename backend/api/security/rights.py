@@ -191,6 +191,7 @@ _API: dict[str, Need] = {
     "POST /measurements/import/preview": _FILES_UPLOAD,
     "GET /measurements/{name}": _LOOK,
     "GET /measurements/{name}/file": _LOOK,
+    "POST /measurements/{name}/signature": _FILES,
     "DELETE /measurements/{name}": _FILES,
     # files
     "GET /sets": _LOOK,
@@ -212,6 +213,11 @@ _API: dict[str, Need] = {
     "GET /health/trend": _LOOK,
     "GET /drives/{drive_id}/health": _LOOK,
     "POST /drives/{drive_id}/health/baseline": _FILES,
+    # Who may move permits runs without them; a controller's token asks for one; ending is easier.
+    "GET /drives/{drive_id}/health/permission": _LOOK,
+    "PUT /drives/{drive_id}/health/permission": _MOTION,
+    "DELETE /drives/{drive_id}/health/permission": _FILES,
+    "POST /drives/{drive_id}/health/trigger": _MEASURE,
     "GET /library": _LOOK,
     "GET /library/tags": _LOOK,
     "GET /library/{entry_id}": _LOOK,

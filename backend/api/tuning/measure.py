@@ -221,18 +221,29 @@ async def list_tools() -> list[ToolInfo]:
     ]  # fmt: skip
 
 
+async def start_tool(
+    bench: Bench, connected: ConnectedDrive, tool: AnyTool, request: ToolSettings
+) -> JobInfo:
+    """Start a tool that has a descriptor, as its route does for whoever acts now.
+
+    Raises:
+        DriveError: it cannot begin; nothing has moved.
+    """
+
+    async def measure(session: CyclicSession, progress: Progress, keep: Keep) -> JobResult:
+        found = await tool.run(Run(connected.axis, session, progress, keep), request)
+        return dict(found.model_dump(mode="json"))
+
+    return await _start(
+        bench, connected, request, tool.kind, tool.title, measure, closes_loops=tool.closes_loops
+    )
+
+
 def _add(tool: AnyTool) -> None:
     """The route that starts this tool."""
 
     async def start(bench: TheBench, connected: Controlled, request: ToolSettings) -> JobInfo:
-        async def measure(session: CyclicSession, progress: Progress, keep: Keep) -> JobResult:
-            found = await tool.run(Run(connected.axis, session, progress, keep), request)
-            return dict(found.model_dump(mode="json"))
-
-        return await _start(
-            bench, connected, request, tool.kind, tool.title, measure,
-            closes_loops=tool.closes_loops,
-        )  # fmt: skip
+        return await start_tool(bench, connected, tool, request)
 
     # The body is the tool's own settings, which the interface's description shows.
     start.__annotations__["request"] = tool.settings

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import asyncio
-from datetime import UTC
+from datetime import UTC, datetime
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
-from backend.api.context import TheBench
+from backend.api.context import Me, TheBench
 from backend.api.disposition import disposition
 from backend.api.errors import NotFound
-from backend.api.tuning.models import MeasurementContent, MeasurementInfo
+from backend.api.tuning.models import MeasurementContent, MeasurementInfo, SignatureRequest
 from backend.library.measurements import SUFFIX, BadMeasurement, Head, Measurement
 from backend.report.changes import ChangeLog
 from backend.station.bench import Bench
 from backend.station.evaluation import evaluate
+from backend.tools.safety_check.evaluate import reevaluate, signed
+from backend.tools.safety_check.result import SafetyResult
 from backend.tools.spoken import result_in_language
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts import limits
-from drivers.texts.message import language
+from drivers.texts.message import language, text
 
 router = APIRouter()
 _MAX_BYTES = 64 * 1024 * 1024
@@ -133,6 +135,34 @@ async def upload_measurement(
     whole = name.removesuffix(SUFFIX) + SUFFIX
     stored = await asyncio.to_thread(bench.measurements.store, whole, data)
     return info_of(stored, bench.measurements.head(stored))
+
+
+@router.post("/measurements/{name}/signature")
+async def sign_measurement(
+    bench: TheBench, me: Me, name: str, request: SignatureRequest
+) -> SafetyResult:
+    """Sign the record of a safety function, once. It certifies nothing.
+
+    Who is logged in signs by that name; ``person`` counts where the page is used without accounts.
+    """
+    person = (request.person if me.kind == "local" else me.person).strip()
+    if not person:
+        raise NotAllowed("safety-check.signer-needs-name", parameter="person")
+    when = datetime.now(UTC).isoformat(timespec="seconds")
+    found = await asyncio.to_thread(load_measurement, bench, name)
+    try:
+        signature = signed(found.arrays, found.meta, person, when, request.notes)
+    except ValueError as error:
+        raise NotAllowed("safety-check.nothing-to-sign", value=name, name=name) from error
+    result = reevaluate(found.arrays, {**found.meta, "signature": signature})
+    result = result.model_copy(update={"measurements": (name,)})
+    await asyncio.to_thread(
+        bench.measurements.sign, name, signature, result.model_dump(mode="json")
+    )
+    line = text("journal.record-signed", drive=found.head.drive, name=name, person=person,
+                sha256=str(signature["sha256"]))  # fmt: skip
+    bench.journal.add(line)
+    return result
 
 
 @router.delete("/measurements/{name}", status_code=204)

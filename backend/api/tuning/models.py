@@ -230,3 +230,10 @@ class PredictionInfo(Message):
     step_time_s: list[float]
     step: list[float]
     margins: dict[str, float | bool | None]
+
+
+class SignatureRequest(Message):
+    """Who signs a record where nobody is logged in by name, and what is to be known of it."""
+
+    person: str = Field(default="", max_length=200)
+    notes: str = Field(default="", max_length=4000)

@@ -26,6 +26,7 @@ TITLES = {
     "friction": ("Friction map", "摩擦图谱"),
     "brake-test": ("Brake test", "抱闸测试"),
     "health": ("Health check", "健康检查"),
+    "safety-check": ("Safety acceptance record", "安全验收记录"),
 }
 
 

@@ -5,12 +5,19 @@ import type {
   HealthResult,
   InertiaAnswer,
   JobInfo,
+  SafetyResult,
   StepAnswer,
 } from './schema'
 
 /** What a tool concluded: distinguished by its field `tool`. */
 type ToolOutcome =
-  BrakeResult | FirstPowerResult | FrictionResult | HealthResult | InertiaAnswer | StepAnswer
+  | BrakeResult
+  | FirstPowerResult
+  | FrictionResult
+  | HealthResult
+  | InertiaAnswer
+  | SafetyResult
+  | StepAnswer
 
 /** The result of a tool, or null where it is something else. */
 export const outcome = (result: unknown): ToolOutcome | null =>
@@ -31,6 +38,12 @@ export function asFriction(result: unknown): FrictionResult | null {
 export function asBrakeTest(result: unknown): BrakeResult | null {
   const found = outcome(result)
   return found?.tool === 'brake-test' ? found : null
+}
+
+/** The record of a safety function, or null where it is something else. */
+export function asSafetyCheck(result: unknown): SafetyResult | null {
+  const found = outcome(result)
+  return found?.tool === 'safety-check' ? found : null
 }
 
 /** The checklist of a first power, or null where it is something else. */

@@ -12,6 +12,8 @@ import { useAction } from '../../widgets/useAction'
 import type { Limits } from '../response/limits'
 import { useToolJob } from '../response/useToolJob'
 import { CHECK_ROUNDS, LEAST_ROUNDS } from './health'
+import { HealthPermission } from './HealthPermission'
+import { HealthStations } from './HealthStations'
 import { HealthTrend } from './HealthTrend'
 import { Findings, SignBaseline } from './HealthVerdict'
 import { complete, fieldsOf, initialValues, ToolForm, useTool, type Values } from './ToolForm'
@@ -74,6 +76,8 @@ export function HealthPanel({
       {health && <Findings health={health} />}
       {health && <SignBaseline drive={drive} health={health} onSigned={setHealth} />}
       {health && health.runs.length > 0 && <HealthTrend runs={health.runs} />}
+      {health?.baseline && <HealthPermission drive={drive} job={job} />}
+      <HealthStations />
     </Panel>
   )
 }

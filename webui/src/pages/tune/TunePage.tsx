@@ -25,6 +25,7 @@ import { InertiaPanel } from './InertiaPanel'
 import { type Known, later, nextStep, type StepName, STEPS, stepsDone, tunedAt } from './path'
 import { PathNav } from './PathNav'
 import { PreChecks } from './PreChecks'
+import { SafetyPanel } from './SafetyPanel'
 import { ReportPanel, useReports } from './ReportPanel'
 import { present, type Section, useSections } from './sections'
 import { StepPanel } from './StepPanel'
@@ -58,6 +59,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
   const brakeJob = useToolJob(drive, 'brake-test').job
   const firstJob = useToolJob(drive, 'first-power').job
   const healthJob = useToolJob(drive, 'health').job
+  const safetyJob = useToolJob(drive, 'safety-check').job
   useJobEnd(inertiaJob?.id ?? null, () => void measured.refresh())
   useJobEnd(frictionJob?.id ?? null, () => void measured.refresh())
   useJobEnd(brakeJob?.id ?? null, () => void measured.refresh())
@@ -112,6 +114,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
     [frictionJob, 'more'],
     [brakeJob, 'more'],
     [healthJob, 'more'],
+    [safetyJob, 'more'],
   ]
   const now: Section[] = possible
     ? present(done, {
@@ -236,6 +239,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
             <FrictionPanel {...measure} />
             <BrakePanel {...measure} />
             <HealthPanel {...measure} />
+            <SafetyPanel {...measure} />
           </Fold>
         )}
       </div>

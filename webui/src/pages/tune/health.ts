@@ -57,3 +57,13 @@ export function toneOf(finding: HealthFinding): 'warn' | 'good' | 'info' {
   if (finding.code === 'changed' || finding.code === 'not_seen') return 'warn'
   return finding.code === 'same' ? 'good' : 'info'
 }
+
+/** What is known of an axis against its baseline, in one word. */
+export function stateOf(health: AxisHealth): 'none' | 'wrong' | 'changed' | 'suspected' | 'same' | 'open' {
+  if (!health.baseline) return 'none'
+  if (!health.baseline.intact) return 'wrong'
+  if (health.changed > 0) return 'changed'
+  if (health.suspected > 0) return 'suspected'
+  const judged = health.findings.filter((each) => each.looked_for !== null)
+  return judged.length > 0 && judged.every((each) => each.code === 'same') ? 'same' : 'open'
+}

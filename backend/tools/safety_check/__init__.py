@@ -1,0 +1,1 @@
+"""Safety acceptance record: what an axis does when a person triggers a safety function."""

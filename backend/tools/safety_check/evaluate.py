@@ -1,0 +1,366 @@
+"""From the trace of a safety function to times, ways and a verdict. Pure: also from files."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+import scipy.ndimage
+
+from backend.tools.safety_check.result import (
+    Exceeded,
+    Obstacle,
+    SafetyResult,
+    Sign,
+    Signature,
+    Verdict,
+)
+from backend.tools.safety_check.settings import SafetySettings
+from backend.tools.tool import Arrays, Meta
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+#: A speed below this share of the commanded one is a sign, once it has lasted this long.
+_LEFT, _LASTS_S = 0.9, 0.01
+#: The commanded speed must have been constant for this long, so that no run-up is taken for a sign.
+STEADY_S = 0.15
+#: The speed by position is taken over this time; slower than the greater of these is standing.
+_WINDOW_S, _STANDS_SHARE, _STANDS_RPM = 0.02, 0.02, 3.0
+#: Rest is where no more of the way is left than this share of it, or this many revolutions.
+_SETTLED, _RESOLVED_REV = 0.002, 2e-4
+#: The noise of the torque is known without power; deviations, and the least that is told apart [%].
+_DEVIATIONS, _LEAST_PERCENT, _FILTER = 5.0, 0.3, 5
+#: Torque before the trigger must be so many times that, or its end cannot be told.
+_DISTINCT = 3.0
+_BEFORE_S = 0.1
+#: With SS1 the power goes at standstill: below this share of the speed.
+_AT_REST = 0.1
+#: Above a speed limit by this share is beyond it; by so much of the test speed it did not react.
+SPEED_MARGIN, _FOLLOWED = 0.05, 0.95
+_POINTS, _SHOWN_BEFORE_S = 400, 0.2
+#: What a checksum of the signature is over.
+_SIGNED = (
+    "settings", "measured_at", "sample_rate_hz", "asked_until", "reports", "profile", "drive_id",
+    "identity",
+)  # fmt: skip
+_ARRAYS = (
+    "position_rev", "speed_rpm", "torque_percent", "commanded_rpm",
+    "enabled", "quick_stop", "valid",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Trace:
+    """[n], one sample per cycle. ``commanded_rpm`` as it was planned; ``enabled`` and
+    ``quick_stop`` as the drive says. ``asked_until``: from that sample on the tool itself ended
+    the motion."""
+
+    position_rev: FloatArray
+    speed_rpm: FloatArray
+    torque_percent: FloatArray
+    commanded_rpm: FloatArray
+    enabled: BoolArray
+    quick_stop: BoolArray
+    valid: BoolArray
+    sample_rate_hz: float
+    asked_until: int
+    measured_at: str
+    reports: tuple[str, ...] = ()
+    """Codes and names of the faults that the drive had at the end."""
+
+    def until(self, end: int) -> Trace:
+        """The part before this sample."""
+        return replace(self, **{name: getattr(self, name)[:end] for name in _ARRAYS})
+
+    def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
+        """For storage."""
+        return {name: getattr(self, name) for name in _ARRAYS}
+
+    def facts(self) -> dict[str, object]:
+        """For storage, beside the arrays."""
+        return {
+            "sample_rate_hz": self.sample_rate_hz, "asked_until": self.asked_until,
+            "measured_at": self.measured_at, "reports": list(self.reports),
+        }  # fmt: skip
+
+
+def reevaluate(arrays: Arrays, meta: Meta) -> SafetyResult:
+    """The result again, from kept raw data, with its signature where it has one.
+
+    Raises:
+        ValueError: not the raw data of a safety check.
+    """
+    given = meta.get("settings")
+    if meta.get("tool") != "safety-check" or not isinstance(given, dict):
+        raise ValueError("not the raw data of a safety check")
+    reports = meta.get("reports")
+
+    def number(name: str) -> FloatArray:
+        return np.asarray(arrays[name], np.float64)
+
+    def flag(name: str) -> BoolArray:
+        return np.asarray(arrays[name], np.bool_)
+
+    trace = Trace(
+        position_rev=number("position_rev"), speed_rpm=number("speed_rpm"),
+        torque_percent=number("torque_percent"), commanded_rpm=number("commanded_rpm"),
+        enabled=flag("enabled"), quick_stop=flag("quick_stop"), valid=flag("valid"),
+        sample_rate_hz=float(str(meta["sample_rate_hz"])),
+        asked_until=int(str(meta["asked_until"])),
+        measured_at=str(meta["measured_at"]),
+        reports=tuple(map(str, reports)) if isinstance(reports, (list, tuple)) else (),
+    )  # fmt: skip
+    found = evaluate(trace, SafetySettings.model_validate(given))
+    signature = meta.get("signature")
+    if not isinstance(signature, Mapping):
+        return found
+    known = Signature.model_validate({**signature, "intact": True})
+    now = digest(arrays, meta, known.person, known.signed, known.notes)
+    kept = known.model_copy(update={"intact": now == known.sha256})
+    return found.model_copy(update={"signature": kept})
+
+
+def digest(arrays: Arrays, meta: Meta, person: str, signed: str, notes: str) -> str:
+    """SHA-256 over the trace, the settings, and who signs when."""
+    content = {name: meta.get(name) for name in _SIGNED}
+    content |= {"person": person, "signed": signed, "notes": notes}
+    found = hashlib.sha256(json.dumps(content, sort_keys=True, ensure_ascii=False).encode())
+    for name in sorted(arrays):
+        found.update(name.encode())
+        found.update(np.ascontiguousarray(arrays[name]).tobytes())
+    return found.hexdigest()
+
+
+def signed(arrays: Arrays, meta: Meta, person: str, when: str, notes: str) -> dict[str, object]:
+    """What is kept beside the raw data when a person signs them.
+
+    Raises:
+        ValueError: they are none of a safety check, or are signed already.
+    """
+    if meta.get("tool") != "safety-check" or "signature" in meta:
+        raise ValueError("not the raw data of a safety check that nobody has signed")
+    return {
+        "person": person, "signed": when, "notes": notes,
+        "sha256": digest(arrays, meta, person, when, notes),
+    }  # fmt: skip
+
+
+def evaluate(trace: Trace, settings: SafetySettings) -> SafetyResult:
+    """The verdict, of what was seen before the tool itself ended the motion."""
+    return _Check(trace.until(trace.asked_until), settings).result()
+
+
+class _Check:
+    """One trace."""
+
+    def __init__(self, trace: Trace, settings: SafetySettings) -> None:
+        self._trace, self._settings, self._rate = trace, settings, trace.sample_rate_hz
+        window = max(1, round(_WINDOW_S * self._rate))
+        place = trace.position_rev
+        speed = np.zeros_like(place)
+        if place.size > window:
+            speed[window:] = (place[window:] - place[:-window]) * self._rate / window * 60.0
+        self._speed = speed
+        self._torque = np.abs(scipy.ndimage.median_filter(trace.torque_percent, _FILTER))
+        self._noise = self._torque_noise()
+        found = self._first_sign()
+        self._at: int | None = None if found is None else found[0]
+        self._sign: Sign | None = None if found is None else found[1]
+
+    def _torque_noise(self) -> float:
+        """Below it no torque can be told: of the time before the axis was enabled."""
+        enabled = np.flatnonzero(self._trace.enabled)
+        quiet = self._trace.torque_percent[: enabled[0]] if enabled.size else np.empty(0)
+        scatter = float(np.std(quiet)) if quiet.size > _FILTER else 0.0
+        offset = abs(float(np.mean(quiet))) if quiet.size > _FILTER else 0.0
+        return max(offset + _DEVIATIONS * scatter / np.sqrt(_FILTER / 1.5), _LEAST_PERCENT)
+
+    def _steady(self) -> BoolArray:
+        """Where the commanded speed has been constant, and not zero, for some time."""
+        commanded = self._trace.commanded_rpm
+        changed = np.flatnonzero(np.diff(commanded, prepend=commanded[:1]) != 0.0)
+        since = np.zeros(commanded.size, np.int64)
+        since[changed] = changed
+        age = np.arange(commanded.size) - np.maximum.accumulate(since)
+        steady: BoolArray = (age >= STEADY_S * self._rate) & (commanded != 0.0)
+        return steady
+
+    def _first_sign(self) -> tuple[int, Sign] | None:
+        """The first sample that shows it, and by what."""
+        trace, n = self._trace, self._trace.enabled.size
+        asked = np.arange(n) < trace.asked_until
+        began = np.flatnonzero(trace.enabled & (trace.commanded_rpm != 0.0))
+        if not began.size:
+            return None
+        after = np.arange(n) > began[0]
+        signs: list[tuple[int, Sign]] = []
+        left = np.flatnonzero(after & asked & ~trace.enabled & trace.valid)
+        if left.size:
+            signs.append((int(left[0]), "state"))
+        commanded = trace.commanded_rpm
+        slow = self._steady() & asked & trace.valid & trace.enabled
+        slow &= trace.speed_rpm * np.sign(commanded) < _LEFT * np.abs(commanded)
+        lasts = max(1, round(_LASTS_S * self._rate))
+        run = np.convolve(slow, np.ones(lasts), "valid") >= lasts
+        reached = np.flatnonzero(
+            self._steady() & (trace.speed_rpm * np.sign(commanded) >= _LEFT * np.abs(commanded))
+        )
+        if reached.size:
+            found = np.flatnonzero(run & (np.arange(run.size) > reached[0]))
+            if found.size:
+                signs.append((int(found[0]), "speed"))
+        return min(signs, default=None)
+
+    def _last_above(self, values: FloatArray, limit: float, begin: int) -> int | None:
+        """First sample from ``begin`` on after which none is above; None where the last one is."""
+        above = np.flatnonzero(values[begin:] > limit)
+        found = begin if not above.size else begin + int(above[-1]) + 1
+        return found if found < values.size else None
+
+    def _rest(self, at: int, stands_rpm: float) -> int | None:
+        """First sample from which on it stays where it ends; None where it still turns then."""
+        last = np.abs(self._speed[-max(1, round(_BEFORE_S * self._rate)) :])
+        if float(np.median(last)) > stands_rpm:
+            return None
+        away = np.abs(self._trace.position_rev - self._trace.position_rev[-1])
+        return self._last_above(away, max(_SETTLED * float(away[at]), _RESOLVED_REV), at)
+
+    def result(self) -> SafetyResult:
+        settings, trace = self._settings, self._trace
+        known = {
+            "function": settings.function, "device": settings.device, "person": settings.person,
+            "measured_at": trace.measured_at, "torque_noise_percent": self._noise,
+            "highest_rpm": float(np.max(np.abs(self._speed), initial=0.0)),
+            "limited_rpm": settings.limited_rpm, "reports": trace.reports,
+        }  # fmt: skip
+        if self._at is None:
+            verdict: Verdict = "not_triggered"
+            if settings.function == "speed_limit" and self._followed():
+                verdict = "no_reaction"
+            return SafetyResult.model_validate(
+                {**known, "verdict": verdict, **self._shown(max(trace.asked_until - 1, 0))}
+            )
+        return SafetyResult.model_validate({**known, **self._of_sign(self._at)})
+
+    def _followed(self) -> bool:
+        highest = float(np.max(np.abs(self._speed), initial=0.0))
+        return highest >= _FOLLOWED * self._settings.speed_rpm
+
+    def _of_sign(self, at: int) -> dict[str, object]:
+        rate, settings = self._rate, self._settings
+        before = slice(max(0, at - round(_BEFORE_S * rate)), at)
+        speed = float(np.median(self._speed[before])) if at else 0.0
+        rest = self._rest(at, max(_STANDS_SHARE * abs(speed), _STANDS_RPM))
+        torque = float(np.median(self._torque[before])) if at else 0.0
+        if settings.function == "ss1":
+            end = self._torque.size if rest is None else rest
+            torque = max(torque, float(np.max(self._torque[at:end], initial=0.0)))
+        free = self._last_above(self._torque, self._noise, max(0, at - round(0.05 * rate)))
+        distinct = torque >= _DISTINCT * self._noise
+        found: dict[str, object] = {
+            "sign": self._sign, "speed_rpm": speed, "torque_before_percent": torque,
+            "watched_ms": 1e3 * (self._speed.size - at) / rate, **self._shown(at),
+        }  # fmt: skip
+        if rest is not None:
+            way = abs(float(self._trace.position_rev[rest] - self._trace.position_rev[at]))
+            found |= {"stop_ms": 1e3 * (rest - at) / rate, "stop_rev": way}
+        if free is not None:
+            found["torque_after_percent"] = float(np.max(self._torque[free:], initial=0.0))
+            if distinct:
+                took = max(0.0, 1e3 * (free - at) / rate)
+                cycle = 1e3 / rate
+                found |= {
+                    "torque_free_ms": took,
+                    "torque_free_ci95_ms": (max(0.0, took - cycle), took + 2 * cycle),
+                    "speed_at_torque_free_rpm": float(self._speed[free]),
+                }
+        obstacle = self._obstacle(at, speed, distinct=distinct)
+        if settings.function == "ss1" and free is not None and self._cut(at, free, speed):
+            obstacle = "quick_stop_cut"
+        exceeded = self._exceeded(found)
+        found |= {"obstacle": obstacle, "exceeded": exceeded}
+        found["verdict"] = self._verdict(at, rest, free, speed, obstacle, exceeded, distinct)
+        return found
+
+    def _obstacle(self, at: int, speed: float, *, distinct: bool) -> Obstacle | None:
+        settings = self._settings
+        end = min(self._trace.valid.size, at + round(settings.watch_s * self._rate))
+        if not np.all(self._trace.valid[max(0, at - round(0.02 * self._rate)) : end]):
+            return "samples_lost"
+        if settings.function != "speed_limit" and abs(speed) < 0.8 * settings.speed_rpm:
+            return "too_slow"
+        torque_off = settings.function in ("sto", "ss1")
+        if torque_off and bool(np.all(self._trace.enabled[at:])):
+            return "stayed_enabled"
+        if torque_off and not distinct:
+            return "torque_in_noise"
+        return None
+
+    def _cut(self, at: int, free: int, speed: float) -> bool:
+        """It braked by a quick stop at whose beginning our own exchange took the power away."""
+        fast = abs(float(self._speed[free])) > _AT_REST * abs(speed)
+        return fast and bool(np.any(self._trace.quick_stop[at : free + 1]))
+
+    def _exceeded(self, found: Mapping[str, object]) -> tuple[Exceeded, ...]:
+        settings = self._settings
+        pairs: tuple[tuple[Exceeded, object, float | None], ...] = (
+            ("torque_free", found.get("torque_free_ms"), settings.torque_free_limit_ms),
+            ("stop_time", found.get("stop_ms"), settings.stop_limit_ms),
+            ("stop_distance", found.get("stop_rev"), settings.stop_limit_rev),
+        )
+        over = [n for n, value, limit in pairs if limit is not None and _above(value, limit)]
+        limited = settings.limited_rpm
+        if settings.function == "speed_limit" and limited is not None:
+            highest = float(np.max(np.abs(self._speed), initial=0.0))
+            if highest > (1.0 + SPEED_MARGIN) * limited:
+                over.append("speed")
+        return tuple(over)
+
+    def _verdict(
+        self, at: int, rest: int | None, free: int | None, speed: float,
+        obstacle: Obstacle | None, exceeded: tuple[Exceeded, ...], distinct: bool,
+    ) -> Verdict:  # fmt: skip
+        settings = self._settings
+        stops = settings.function != "speed_limit"
+        torque_off = settings.function in ("sto", "ss1")
+        left = np.flatnonzero(~self._trace.enabled[at:])
+        if torque_off and free is None:
+            return "torque_remains"
+        if stops and rest is None:
+            return "still_turning"
+        if torque_off and left.size and bool(np.any(self._trace.enabled[at + int(left[0]) :])):
+            return "restarted"
+        if (
+            settings.function == "ss1" and free is not None and distinct
+            and obstacle != "quick_stop_cut"
+            and abs(float(self._speed[free])) > _AT_REST * abs(speed)
+        ):  # fmt: skip
+            return "power_off_at_speed"
+        if exceeded:
+            return "beyond_limits"
+        if obstacle is not None:
+            return "not_shown"
+        limits = (settings.torque_free_limit_ms, settings.stop_limit_ms, settings.stop_limit_rev)
+        judged = any(each is not None for each in limits) or settings.function == "speed_limit"
+        return "within_limits" if judged else "recorded"
+
+    def _shown(self, at: int) -> dict[str, object]:
+        """The trace around the first sign, thinned for a plot."""
+        begin = max(0, at - round(_SHOWN_BEFORE_S * self._rate))
+        step = max(1, -(-(self._speed.size - begin) // _POINTS))
+        rows = np.arange(begin, self._speed.size, step)
+        return {
+            "trace_ms": tuple((1e3 * (rows - at) / self._rate).tolist()),
+            "trace_rpm": tuple(self._speed[rows].tolist()),
+            "trace_commanded_rpm": tuple(self._trace.commanded_rpm[rows].tolist()),
+            "trace_torque_percent": tuple(self._trace.torque_percent[rows].tolist()),
+        }
+
+
+def _above(value: object, limit: float) -> bool:
+    """What is not known is no proof of anything: another verdict says so."""
+    return isinstance(value, float) and value > limit

@@ -1,0 +1,172 @@
+"""A safety function that a person triggers on a virtual axis, and the same one failing.
+
+What the axis does after the torque has gone follows from its inertia and friction alone; how a
+power stage switches off, and in what it fails, is planted here and known to no tool.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pytest
+
+from backend.axis.cyclic_mode import keeping_mode
+from backend.tools.safety_check.result import SafetyResult
+from backend.tools.safety_check.run import TOOL, plan_of
+from backend.tools.safety_check.settings import SafetySettings
+from backend.tools.tool import Run
+from drivers.cia402 import State
+from drivers.errors import NotAllowed, OutOfRange
+from drivers.virtual.firmware.states import State as Firmware
+from tests.virtual.tools.direct import DirectBench, direct
+from tests.virtual.tools.rig import At, mechanics, silent
+
+RATED_NM, COULOMB_NM = 1.27, 0.1
+#: Motor and load on a stiff shaft.
+INERTIA = 5e-5 + 1e-4
+RPM = 600.0
+ASKED = SafetySettings(
+    travel_limit=60.0, speed_limit=900.0, torque_limit=100.0, rated_torque_nm=RATED_NM,
+    speed_rpm=RPM, wait_s=3.0, watch_s=1.0, nothing_hangs=True, device="S1", person="Ann",
+)  # fmt: skip
+
+
+def stiff(gravity: float = 0.0) -> Any:
+    return mechanics((1e-4, 3000.0, 0.02), coulomb=COULOMB_NM, viscous=0.0, gravity=gravity)
+
+
+def off(bench: DirectBench) -> None:
+    """The power stage opens and the drive says so: what STO is to do."""
+    core, control = bench.link.device.core, bench.link.device.control
+    control.modes.end()
+    core.axis.power_off()
+    control.state = Firmware.SWITCH_ON_DISABLED
+
+
+def told_only(bench: DirectBench) -> None:
+    """The drive says that it has no power, and holds the axis: a channel that is bridged."""
+    control = bench.link.device.control
+    control.modes.end()
+    bench.link.device.core.axis.hold()
+    control.state = Firmware.SWITCH_ON_DISABLED
+
+
+def braked(bench: DirectBench) -> None:
+    """A controlled stop by a ramp; the power goes at standstill: SS1."""
+    control = bench.link.device.control
+    control.modes.end()
+    bench.link.device.core.axis.stop_ramp(2 * math.pi * RPM / 60.0 / 0.2)
+    control.state = Firmware.FAULT_REACTION
+    control._after_stop = lambda: off(bench)
+
+
+async def recorded(
+    bench: DirectBench, act: Callable[[DirectBench], None] | None, asked: SafetySettings = ASKED
+) -> SafetyResult:
+    """As a job does it; what is read from files is the same."""
+    kept: dict[str, Any] = {}
+
+    def keep(name: str, arrays: Mapping[str, object], meta: dict[str, object]) -> None:
+        kept.update(arrays=arrays, meta=meta)
+
+    steps = silent()
+    if act is not None:
+        steps = At("trigger the safety function", lambda: act(bench), 0.35).progress
+    async with keeping_mode(bench.axis, bench.session):
+        found = await TOOL.run(Run(bench.axis, bench.session, steps, keep), asked)
+    assert TOOL.reevaluate(kept["arrays"], kept["meta"]) == found
+    assert await bench.axis.state() is not State.OPERATION_ENABLED
+    return SafetyResult.model_validate(found.model_dump(mode="json"))
+
+
+async def test_safe_torque_off_coasts_by_friction_alone() -> None:
+    """Coulomb friction brakes: t = Jω/T, and the way is half of what that speed would make."""
+    async with direct(stiff(), drive="r6l") as bench:
+        found = await recorded(bench, off)
+    omega = 2 * math.pi * RPM / 60.0
+    coast_s = INERTIA * omega / COULOMB_NM
+    assert found.verdict == "recorded"
+    assert found.sign == "state"
+    assert found.speed_rpm == pytest.approx(RPM, rel=0.02)
+    assert found.torque_before_percent == pytest.approx(100 * COULOMB_NM / RATED_NM, rel=0.15)
+    assert found.torque_free_ms is not None
+    assert found.torque_free_ms <= 4.0
+    assert found.stop_ms == pytest.approx(1e3 * coast_s, rel=0.06)
+    assert found.stop_rev == pytest.approx(0.5 * RPM / 60.0 * coast_s, rel=0.05)
+    assert found.torque_after_percent is not None
+    assert found.torque_after_percent <= found.torque_noise_percent
+
+
+async def test_torque_that_remains_is_told_as_danger() -> None:
+    """A load of 0.2 N·m hangs: what holds it is torque."""
+    async with direct(stiff(gravity=0.2), drive="r6l") as bench:
+        found = await recorded(bench, told_only)
+    assert found.verdict == "torque_remains"
+    assert found.torque_free_ms is None
+    assert "Put the axis out of use" in TOOL.text(TOOL.report(found).notes[0].name)
+
+
+async def test_what_else_stopped_the_axis_is_named() -> None:
+    """An entry of the fault table by itself: the person decides whether it is of the function."""
+    async with direct(stiff(), drive="r6l") as bench:
+        found = await recorded(bench, lambda b: b.link.device.control.faults.raise_code("AL.301"))
+    assert found.reports
+    assert "AL.301" in found.reports[0]
+    assert any(note.name == "reports" for note in TOOL.report(found).notes)
+
+
+async def test_a_stop_by_ramp_is_ss1_and_a_coasting_one_is_not() -> None:
+    asked = ASKED.model_copy(
+        update={"function": "ss1", "stop_limit_ms": 300.0, "stop_limit_rev": 1.5}
+    )
+    async with direct(stiff(), drive="r6l") as bench:
+        found = await recorded(bench, braked, asked)
+    assert found.verdict == "within_limits"
+    assert found.stop_ms == pytest.approx(200.0, abs=20.0)
+    assert found.stop_rev == pytest.approx(0.5 * RPM / 60.0 * 0.2, rel=0.06)
+    async with direct(stiff(), drive="r6l") as bench:
+        found = await recorded(bench, off, asked)
+    assert found.verdict == "power_off_at_speed"
+
+
+async def test_nothing_triggered_is_no_pass_and_limits_are_judged() -> None:
+    async with direct(stiff(), drive="r6l") as bench:
+        found = await recorded(bench, None)
+        assert found.verdict == "not_triggered"
+        assert found.torque_free_ms is None
+        asked = ASKED.model_copy(update={"stop_limit_ms": 50.0, "stop_limit_rev": 0.1})
+        found = await recorded(bench, off, asked)
+    assert found.verdict == "beyond_limits"
+    assert set(found.exceeded) == {"stop_time", "stop_distance"}
+
+
+async def test_a_speed_limit_that_does_not_act_is_found() -> None:
+    asked = ASKED.model_copy(
+        update={"function": "speed_limit", "limited_rpm": 400.0, "wait_s": 2.0}
+    )
+    async with direct(stiff(), drive="r6l") as bench:
+        found = await recorded(bench, None, asked)
+    assert found.verdict == "no_reaction"
+    assert found.highest_rpm == pytest.approx(RPM, rel=0.03)
+
+
+async def test_nothing_moves_without_a_statement_or_without_room() -> None:
+    async with direct(stiff(), drive="r6l") as bench:
+        for changed, error in (
+            ({"nothing_hangs": False}, NotAllowed), ({"speed_rpm": 950.0}, OutOfRange),
+            ({"function": "limit_positive", "travel_limit": 5.0}, OutOfRange),
+            ({"function": "speed_limit"}, OutOfRange),
+        ):  # fmt: skip
+            with pytest.raises(error):
+                await recorded(bench, off, ASKED.model_copy(update=changed))
+        assert bench.link.highest["speed"] == 0.0
+
+
+def test_a_short_axis_moves_to_and_fro_within_its_travel() -> None:
+    plan = plan_of(ASKED.model_copy(update={"travel_limit": 8.0}), 1000.0, 0.0)
+    way = plan.cumsum() / 60.0 / 1000.0
+    assert -0.01 <= way.min() <= way.max() <= 0.86 * 8.0
+    assert plan.max() == pytest.approx(RPM)
+    assert plan.min() == pytest.approx(-RPM)
