@@ -245,15 +245,6 @@ class Judge:
                     f"envelope {id(claim)}",
                 )
 
-    @staticmethod
-    def starved_s() -> float:
-        """For how long, since the machine began, something waited for a processor [s]."""
-        try:
-            with Path("/proc/pressure/cpu").open() as file:
-                return float(file.readline().rpartition("total=")[2]) / 1e6
-        except (OSError, ValueError):
-            return 0.0
-
     def _lateness(self) -> float:
         """More time for a machine that has none to give: PSI of the last seconds."""
         if time.monotonic() < self._lagging:
