@@ -40,9 +40,10 @@ BENCH = {
     ],
 }  # fmt: skip
 PENDING = {
-    "serial": 7, "in_motion": False,
+    "serial": 7,
+    "in_motion": False,
     "debts": [{"key": "2005:03", "raw": 400, "left": [900], "unapplied": False}],
-}  # fmt: skip
+}
 DRIVE = DriveIdentity(0x1, 0x2, 7, (("ethercat:eth1", 1),))
 
 
@@ -140,9 +141,11 @@ def test_a_step_that_was_interrupted_is_done_again(
 def newer(folder: Path, **changed: object) -> None:
     """Let the folder be that of a servodeck 9.0."""
     content = {
-        "format": "servodeck state", "version": VERSION, "program": "9.0",
+        "format": "servodeck state",
+        "version": VERSION,
+        "program": "9.0",
         "revisions": sorted(migrate.known_revisions()),
-    }  # fmt: skip
+    }
     (folder / FILE).write_text(json.dumps(content | changed))
 
 

@@ -77,11 +77,13 @@ class FakeComputer:
     def _stat(self, ticks: int) -> None:
         lines = [
             _IDLE.format(
-                core=core, busy=round(ticks * share), steal=round(ticks * self.steal),
+                core=core,
+                busy=round(ticks * share),
+                steal=round(ticks * self.steal),
                 idle=round(ticks * (1 - share - self.steal)),
             )
             for core, share in enumerate(self.busy)
-        ]  # fmt: skip
+        ]
         self.write("proc/stat", "cpu  0 0 0 0 0 0 0 0 0 0\n" + "".join(lines))
 
     @property

@@ -95,9 +95,11 @@ class Life:
         name = f"{self.dice.choice('abc')}.bin"
         entry = self.records.library.add("report", name, data, Addition(axis))
         self.tell(
-            act="save", entry=entry.id, number=entry.latest.number,
+            act="save",
+            entry=entry.id,
+            number=entry.latest.number,
             sha256=hashlib.sha256(data).hexdigest(),
-        )  # fmt: skip
+        )
 
     def save_large(self) -> None:
         self.save(INLINE + 1 + self.dice.randrange(1000))

@@ -40,9 +40,11 @@ class Caller:
         headers = {"Authorization": f"Bearer {token}"} if token else {}
         self.server = server
         self.http = httpx.Client(
-            base_url=f"{server.url}/api/v1", timeout=HANG_S, headers=headers,
+            base_url=f"{server.url}/api/v1",
+            timeout=HANG_S,
+            headers=headers,
             cookies={"servodeck": cookie} if cookie else None,
-        )  # fmt: skip
+        )
         server.callers.append(self)
         self.cookie, self.token = cookie, token
         if cookie:
@@ -188,8 +190,9 @@ class GuardedServer:
 
     def guest(self, host: Caller, allowed: list[str], minutes: float = 60) -> tuple[Caller, str]:
         """A joined guest, and the id of the invitation."""
-        made = host.ok("POST", "/invitations",
-                       {"guest": "Gert", "allowed": allowed, "minutes": minutes})  # fmt: skip
+        made = host.ok(
+            "POST", "/invitations", {"guest": "Gert", "allowed": allowed, "minutes": minutes}
+        )
         link = made["link"].removeprefix("/guest/")
         asked = {"link": link, "code": made["invitation"]["code"]}
         joined = httpx.post(f"{self.url}/api/v1/guests", json=asked, timeout=HANG_S)

@@ -78,6 +78,8 @@ def import_both(folder: Path, patch: pytest.MonkeyPatch) -> None:
     """Import both files into a profile folder of this test's own."""
     patch.setenv("SERVODECK_PROFILES", str(folder))
     patch.setenv("SERVODECK_CACHE", str(folder / "cache"))
-    for data, file, name in ((makers_eds(), "maker.eds", EDS_DRIVE),
-                             (makers_esi(), "maker.xml", ESI_DRIVE)):  # fmt: skip
+    for data, file, name in (
+        (makers_eds(), "maker.eds", EDS_DRIVE),
+        (makers_esi(), "maker.xml", ESI_DRIVE),
+    ):
         write_profile(import_file(data, file, drive=name).profile, folder)

@@ -117,9 +117,11 @@ def inertia() -> tuple[str, Arrays, dict[str, object]]:
 
 
 def file_of(
-    drive: Drive, made: tuple[str, Arrays, dict[str, object]], saved: datetime,
+    drive: Drive,
+    made: tuple[str, Arrays, dict[str, object]],
+    saved: datetime,
     result: dict[str, object] | None = None,
-) -> bytes:  # fmt: skip
+) -> bytes:
     """The contents of a ``.sdmeas`` file."""
     kind, arrays, meta = made
     return pack(kind, drive, arrays, meta, saved, result)

@@ -129,8 +129,9 @@ class Station:
         assert answer.is_success, answer.text
         return answer.json() if answer.content else None
 
-    def add(self, station: int = 1, url: str = "mlink://virtual0", profile: str = "mms7",
-            name: str = "") -> str:  # fmt: skip
+    def add(
+        self, station: int = 1, url: str = "mlink://virtual0", profile: str = "mms7", name: str = ""
+    ) -> str:
         body = {"url": url, "station": station, "profile": profile, "name": name}
         drive = self.ok(self.http.post("/drives", json=body))
         return str(drive["id"])

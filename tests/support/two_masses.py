@@ -96,8 +96,9 @@ def _integrated(torque, rate, steps, j1, j2, k, c, b, tc, ts, gap, ripple, corne
     return out
 
 
-def multisine(rate_hz: float, lines: npt.NDArray[np.int64], size: float, periods: int,
-              seed: int) -> Array:  # fmt: skip
+def multisine(
+    rate_hz: float, lines: npt.NDArray[np.int64], size: float, periods: int, seed: int
+) -> Array:
     """Random phases on these lines, 1 Hz apart; ``size`` is the effective value."""
     n = round(rate_hz)
     spectrum = np.zeros(n // 2 + 1, dtype=np.complex128)

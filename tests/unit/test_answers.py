@@ -20,16 +20,18 @@ def test_sentences_stand_beside_their_messages_and_survive_a_file() -> None:
     assert messages_in(answer, "warnings", "warning") == [LOW, LEFT_OUT]
     chinese = in_language(answer, "zh")
     assert chinese["warnings"] == [
-        "相干性偏低：请增大激励，或检查间隙和摩擦", "3 个周期因丢失采样而被舍弃",
-    ]  # fmt: skip
+        "相干性偏低：请增大激励，或检查间隙和摩擦",
+        "3 个周期因丢失采样而被舍弃",
+    ]
     assert in_language(chinese, "en") == answer
 
 
 def test_a_message_within_a_list_of_answers_and_one_alone() -> None:
     answer = {"slots": [sentence("note", text("notch.no-depth")), sentence("note", None)]}
     assert in_language(answer, "zh")["slots"] == [
-        {**answer["slots"][0], "note": "手册未给出深度"}, answer["slots"][1],
-    ]  # fmt: skip
+        {**answer["slots"][0], "note": "手册未给出深度"},
+        answer["slots"][1],
+    ]
 
 
 def test_a_file_of_an_older_version_is_shown_as_it_stands() -> None:
@@ -56,8 +58,9 @@ def test_reasons_of_an_inertia_are_said_in_both_languages() -> None:
     found = inertia(reasons=("at-limit", "backlash"), load_ratio_reference="given")
     lines = found.in_language("zh").verdict.splitlines()
     assert lines == [
-        "转矩达到限值：请提高限值或降低加速度", "每次转矩换向后出现冲击：传动链存在间隙",
-    ]  # fmt: skip
+        "转矩达到限值：请提高限值或降低加速度",
+        "每次转矩换向后出现冲击：传动链存在间隙",
+    ]
     shown = result_in_language({"inertia": found.model_dump(mode="json")}, "zh")
     assert isinstance(shown["inertia"], dict)
     assert shown["inertia"]["load_ratio_against"] == "输入的电机惯量"

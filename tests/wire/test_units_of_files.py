@@ -131,9 +131,7 @@ async def test_canopen_commands_60_for_60_rpm() -> None:
         b.bus.send = noted
         await generate(b.axis, b.session, SPIN, silent())
     found = {
-        struct.unpack_from("<i", data, at)[0]
-        for data in frames
-        for at in range(len(data) - 3)
-    }  # fmt: skip
+        struct.unpack_from("<i", data, at)[0] for data in frames for at in range(len(data) - 3)
+    }
     assert 60 in found
     assert 10_000 not in found, "60 rpm in increments per second"

@@ -130,8 +130,10 @@ def _holds(now: dict[str, Raw], family: str, axis: AxisHandover, cyclic: set[str
 def _same(taken: Consumed, axis: AxisHandover) -> None:
     read = [(index, subindex, data) for index, subindex, data, _ in taken.writes]
     wanted = [(w.index, w.subindex, w.data) for w in axis.writes]
-    need((read if taken.ordered else sorted(read)) == (wanted if taken.ordered else sorted(wanted)),
-         "other writes than those that were handed over")  # fmt: skip
+    need(
+        (read if taken.ordered else sorted(read)) == (wanted if taken.ordered else sorted(wanted)),
+        "other writes than those that were handed over",
+    )
     need({each for *_, each in taken.writes} <= {"PS", ""}, "another transition")
     if taken.pdos:
         need(
@@ -186,8 +188,10 @@ class _Server:
 def table(found: list[Outcome]) -> str:
     """Families down, formats across: values taken and how they were replayed."""
     cells = {(each.family, each.format): each for each in found}
-    lines = ["| | " + " | ".join(f"`{form}`" for form in FORMATS) + " |",
-             "|---" * (len(FORMATS) + 1) + "|"]  # fmt: skip
+    lines = [
+        "| | " + " | ".join(f"`{form}`" for form in FORMATS) + " |",
+        "|---" * (len(FORMATS) + 1) + "|",
+    ]
     for family in EVERY:
         row = [cells[family, form] for form in FORMATS]
         words = [f"{c.writes} {c.replayed}" if c.writes else c.replayed for c in row]

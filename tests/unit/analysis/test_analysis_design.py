@@ -98,9 +98,10 @@ def test_predicted_step_is_the_simulated_one():
     table = designed(mechanics)
     c = next(c for c in table if "balanced" in c.marks)
     drive = Drive(
-        kp_nms=c.gains.speed_nms, ki_nm=c.gains.speed_nms * TURN * c.gains.integral_hz,
+        kp_nms=c.gains.speed_nms,
+        ki_nm=c.gains.speed_nms * TURN * c.gains.integral_hz,
         noise_counts=0.0,
-    )  # fmt: skip
+    )
     rate = 20_000.0
     target = np.concatenate([np.zeros(10), np.ones(4000)])
     run = simulate(mechanics, drive, rate, velocity=target)

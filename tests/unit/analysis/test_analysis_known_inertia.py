@@ -81,9 +81,11 @@ def plant_beside(std_deg: float, *, fitted: bool = True) -> np.ndarray:
     same = np.ones(LINES.size)
     size_db = 20.0 / np.log(10.0) * np.radians(std_deg)
     frf = replace(
-        measured(0), response=2.0 * model.response(LINES), std_db=size_db * same,
+        measured(0),
+        response=2.0 * model.response(LINES),
+        std_db=size_db * same,
         std_deg=std_deg * same,
-    )  # fmt: skip
+    )
     plant = measured_plant(frf, model, fitted=fitted)
     inside = (plant.frequency_hz > 10.0) & (plant.frequency_hz < 500.0)
     return np.log(np.abs(plant.correction[inside])) / np.log(2.0)

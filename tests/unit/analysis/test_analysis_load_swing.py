@@ -58,10 +58,12 @@ def soft_axis(seed):
     loop = float(np.exp(rng.uniform(np.log(3.0), np.log(15.0))))
     kp = TURN * loop * min(mechanics.total_kgm2, 4 * motor)
     drive = Drive(
-        kp_nms=kp, ki_nm=kp * TURN * loop / 5, seed=seed,
+        kp_nms=kp,
+        ki_nm=kp * TURN * loop / 5,
+        seed=seed,
         speed_filter_hz=float(rng.choice([400.0, 1000.0, 2000.0])),
         noise_counts=float(rng.choice([1.0, 5.0, 30.0])),
-    )  # fmt: skip
+    )
     return mechanics, drive
 
 

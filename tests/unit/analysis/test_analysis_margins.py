@@ -23,7 +23,7 @@ LOOPS = {
     "resonant": control.tf([200.0], [1, 0])
     * control.tf([1, 20, 4e5], [1, 30, 6e5])
     * control.tf([3000.0], [1, 3000.0]),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", LOOPS)

@@ -87,8 +87,9 @@ FREQUENCY_HZ = LINES * RATE / PERIOD
 PLAIN = played(None)
 
 
-@pytest.mark.parametrize("truth", [Notch(240.0, 120.0, -30.0), Notch(240.0, 36.0, -14.0),
-                                   Notch(150.0, 240.0, -8.0)])  # fmt: skip
+@pytest.mark.parametrize(
+    "truth", [Notch(240.0, 120.0, -30.0), Notch(240.0, 36.0, -14.0), Notch(150.0, 240.0, -8.0)]
+)
 def test_a_notch_is_read_beside_a_closed_loop(truth: Notch) -> None:
     found = fit_effect_in_loop(FREQUENCY_HZ, PLAIN, played(truth), LOOP, PATH)
     assert found.notch.center_hz == pytest.approx(truth.center_hz, rel=0.01)

@@ -58,8 +58,9 @@ def audit(store: SickStore) -> Iterator[AuditLog]:
 
 
 def write(number: int) -> Fact:
-    return Fact("write", "written", axis="X", target="2005:03", old=number, new=number + 1,
-                person="Anna")  # fmt: skip
+    return Fact(
+        "write", "written", axis="X", target="2005:03", old=number, new=number + 1, person="Anna"
+    )
 
 
 def flush(audit: AuditLog) -> None:
@@ -69,8 +70,10 @@ def flush(audit: AuditLog) -> None:
 def test_a_body_is_canonical_json() -> None:
     body = body_of(
         Fact("write", "written", axis="轴 X", target="2005:03", old=35.0, new=float("nan")),
-        moment=datetime(2026, 11, 21, 10, 0, 0, 5, UTC), station="bench-1", person="Änne",
-    )  # fmt: skip
+        moment=datetime(2026, 11, 21, 10, 0, 0, 5, UTC),
+        station="bench-1",
+        person="Änne",
+    )
     assert body == (
         '{"action":"written","axis":"轴 X","detail":{},"kind":"write","new":"nan","old":35.0,'
         '"outcome":"","person":"Änne","station":"bench-1","target":"2005:03",'
@@ -234,9 +237,11 @@ def test_where_memory_is_full_the_gap_is_recorded(store: SickStore, tmp_path: Pa
     audit.add(write(10))
     audit.close()
     events = Trail(store).search(Filter())
-    assert sum(int(e.new or 0) for e in events if e.kind == "audit") + sum(
-        e.kind == "write" for e in events
-    ) == 11  # fmt: skip
+    assert (
+        sum(int(e.new or 0) for e in events if e.kind == "audit")
+        + sum(e.kind == "write" for e in events)
+        == 11
+    )
 
 
 def test_four_threads_make_one_chain(store: SickStore, audit: AuditLog) -> None:
@@ -275,8 +280,10 @@ def test_search_and_export(store: SickStore, audit: AuditLog) -> None:
     assert numbers(since=datetime(2099, 1, 1, tzinfo=UTC)) == []
     assert [e.number for e in trail.search(Filter(), before=3, limit=1)] == [2]
     assert trail.names() == {
-        "person": ["Anna", "Bert", 'a"b'], "axis": ["X", "Y"], "station": ["bench-1"],
-    }  # fmt: skip
+        "person": ["Anna", "Bert", 'a"b'],
+        "axis": ["X", "Y"],
+        "station": ["bench-1"],
+    }
     table = list(trail.export(Filter(), "csv"))
     assert table[0].startswith("number,time,station,person,kind,action,axis,target,old,new")
     assert ",X,2005:03,35.0,40.0,," in table[2]

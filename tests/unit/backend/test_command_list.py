@@ -19,8 +19,10 @@ def imported_by(code: str) -> set[str]:
     """Modules that are there after `code` in a fresh interpreter."""
     reported = subprocess.run(
         [sys.executable, "-c", f"{code}\nimport json, sys\nprint(json.dumps(list(sys.modules)))"],
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     return set(json.loads(reported.stdout.splitlines()[-1]))
 
 

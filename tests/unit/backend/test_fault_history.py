@@ -107,8 +107,9 @@ async def test_a_selector_brings_every_record_and_is_put_back(
     axis = _axis(profile, recorder, _selected())
     found = await read_history(axis)
     assert [(past.name, past.code_text) for past in found] == [
-        ("record 0", "Er.002"), ("record 1", "Er.007"),
-    ]  # fmt: skip
+        ("record 0", "Er.002"),
+        ("record 1", "Er.007"),
+    ]
     assert [past.values[0].raw for past in found] == [310, 305]
     assert recorder.objects[0x200D, 0x24] == b"\1\0"
     assert axis.drive.unsaved == frozenset()
@@ -140,8 +141,10 @@ async def test_a_support_bundle_takes_what_reading_alone_brings(
     found = await past_faults(ConnectedDrive(axis.drive, axis, NO_MONITOR), timeout_s=5)
     (record,) = found["records"]
     assert (record["code"], record["title"], record["values"][0]["value"]) == (
-        "Er.002", "Overvoltage", 0x137,
-    )  # fmt: skip
+        "Er.002",
+        "Overvoltage",
+        0x137,
+    )
     axis = _axis(profile, link, _selected())
     found = await past_faults(ConnectedDrive(axis.drive, axis, NO_MONITOR), timeout_s=5)
     assert found["records"] == []

@@ -49,9 +49,11 @@ def test_an_r6l_tells_its_fault_by_its_newest_record(
     profile = load_profile("r6l")
     drive = Drive("x", "X axis", profile, [Port(MemoryLink({}), 1, profile.links[0])])
     raw = {
-        "603F:00": 0x7121 if status & 8 else 0, "6041:00": status, "200D:24": chosen,
+        "603F:00": 0x7121 if status & 8 else 0,
+        "6041:00": status,
+        "200D:24": chosen,
         "200D:25": number,
-    }  # fmt: skip
+    }
     assert set(raw) <= set(fault_keys(drive))
     readings = {key: Reading(key, raw=value, value=value, time=0.0) for key, value in raw.items()}
     assert [fault.code for fault in active_faults(drive, readings)] == expected

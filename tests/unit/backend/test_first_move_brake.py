@@ -21,9 +21,7 @@ def hump() -> np.ndarray:
 def recorded(speed_rpm: np.ndarray) -> Recording:
     zeros = np.zeros(speed_rpm.size)
     position = np.cumsum(speed_rpm) / 60.0 / RATE * 2 * np.pi
-    return Recording(
-        RATE, position, speed_rpm * np.pi / 30.0, zeros, zeros, zeros, zeros == 0.0
-    )  # fmt: skip
+    return Recording(RATE, position, speed_rpm * np.pi / 30.0, zeros, zeros, zeros, zeros == 0.0)
 
 
 @pytest.mark.parametrize("opens_s", [0.12, 0.143, 0.2, 0.3])

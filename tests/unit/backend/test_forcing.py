@@ -84,10 +84,12 @@ def io_profile(profile: Profile) -> Profile:
             forcing=(outputs, simulation),
         ),
         probe=TouchProbe(
-            function_key="60B8:00", status_key="60B9:00", source="t",
+            function_key="60B8:00",
+            status_key="60B9:00",
+            source="t",
             probes=(Probe(sources={0: "DI1", 1: "index"}), Probe(sources={0: "DI2"})),
         ),
-    )  # fmt: skip
+    )
     settings = Quirk(kind="write_settings", key="200D:01", raw=0xAAB555AA, help="", source="t")
     return changed(
         profile,

@@ -145,9 +145,7 @@ async def test_tuning_goes_on_without_notches_only_where_the_axis_kept_them_back
     resonant: Any = SimpleNamespace(
         resonances=[SimpleNamespace(kind="resonance")], model=object(), loop="none"
     )
-    found: Any = SimpleNamespace(
-        result=SimpleNamespace(gravity_nm=SimpleNamespace(value=0.0))
-    )  # fmt: skip
+    found: Any = SimpleNamespace(result=SimpleNamespace(gravity_nm=SimpleNamespace(value=0.0)))
     how: Any = SimpleNamespace(loop="auto", envelope=None, scheme="free")
     facts: Any = SimpleNamespace(rated_torque_nm=1.27)
     nothing: Any = None

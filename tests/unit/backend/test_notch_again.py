@@ -21,10 +21,12 @@ def beside(monkeypatch: pytest.MonkeyPatch, whole: list[int]) -> tuple[Any, list
     """A trial whose recordings have so many whole periods each; the second list is what is left."""
     sent = SimpleNamespace(
         excitation=SimpleNamespace(
-            samples=np.random.default_rng(1).normal(size=64), first_sample=0, period_samples=32,
+            samples=np.random.default_rng(1).normal(size=64),
+            first_sample=0,
+            period_samples=32,
             lines=LINES,
         )
-    )  # fmt: skip
+    )
 
     async def played(*_: object) -> list[tuple[object, None]]:
         return [(sent, None)]

@@ -129,7 +129,7 @@ async def test_without_an_acceleration_the_way_to_rest_is_not_known(
     with pytest.raises(NotAllowed, match="6083:00 Profile acceleration"):
         await jog(
             connected.axis, JogSettings(1, 60.0, 600.0, 1.0, 50.0), Hold(), Progress(lambda: None)
-        )  # fmt: skip
+        )
     assert plain.words() == []
 
 
@@ -137,9 +137,7 @@ async def test_two_ramps_are_not_given_to_a_drive_that_has_one(
     plain: Plain, connected: ConnectedDrive
 ) -> None:
     plain.without(DECELERATION)
-    settings = MoveSettings(
-        "PP", 0.1, HALF, acceleration_rpm_s=600.0, deceleration_rpm_s=300.0
-    )  # fmt: skip
+    settings = MoveSettings("PP", 0.1, HALF, acceleration_rpm_s=600.0, deceleration_rpm_s=300.0)
     with pytest.raises(OutOfRange, match="no deceleration of its own"):
         await move(connected.axis, settings, Progress(lambda: None))
     assert plain.written == []

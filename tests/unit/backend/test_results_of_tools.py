@@ -22,8 +22,9 @@ from tests.support import measurements as known
 
 OUTCOME: TypeAdapter[Any] = TypeAdapter(ToolOutcome)
 MADE: dict[str, Callable[[], Any]] = {
-    "step": known.step, "inertia": known.inertia,
-}  # fmt: skip
+    "step": known.step,
+    "inertia": known.inertia,
+}
 
 
 def stored(drive: Drive, kind: str) -> dict[str, object]:

@@ -93,5 +93,6 @@ def test_traces_are_shown_in_the_units_of_the_axis(
     drive = Drive("x", "X", profile, [Port(MemoryLink({}), 1, profile.links[0])])
     units = AxisUnits(profile.units, 65536.0)
     assert axis_scale(units, drive, drive.parameter(key)) == (
-        unit, None if factor is None else pytest.approx(factor, rel=1e-12)
-    )  # fmt: skip
+        unit,
+        None if factor is None else pytest.approx(factor, rel=1e-12),
+    )

@@ -22,9 +22,7 @@ SHARED = [
 
 
 def drive_with(value: int, kind: Literal["canopen", "modbus"]) -> tuple[Port, MemoryLink]:
-    memory = MemoryLink({
-        (p.index or 0, p.subindex or 0): encode(p.type, value) for p in SHARED
-    })  # fmt: skip
+    memory = MemoryLink({(p.index or 0, p.subindex or 0): encode(p.type, value) for p in SHARED})
     memory.kind = kind
     return Port(memory, 1, PROFILE.link(kind)), memory
 

@@ -66,9 +66,11 @@ def toy(monkeypatch: pytest.MonkeyPatch) -> None:
     """What the folder drivers/toy and the line in `LinkKind` would do."""
     module = ModuleType("drivers.toy.bus")
     module.BUS = BusKind(  # type: ignore[attr-defined]
-        example="toy://shelf0", traits=LinkTraits(batch=10, silent=prose("the batteries")),
-        require_place=require_place, link=ToyLink,
-    )  # fmt: skip
+        example="toy://shelf0",
+        traits=LinkTraits(batch=10, silent=prose("the batteries")),
+        require_place=require_place,
+        link=ToyLink,
+    )
     monkeypatch.setitem(sys.modules, "drivers.toy", ModuleType("drivers.toy"))
     monkeypatch.setitem(sys.modules, "drivers.toy.bus", module)
     monkeypatch.setattr(urls, "SCHEMES", (*urls.SCHEMES, TOY))

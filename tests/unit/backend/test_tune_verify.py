@@ -80,9 +80,7 @@ def loop_swept(std_deg: float, hz: float = 60.0, damping: float = 0.7) -> SweepR
     frf = Frf(
         f, closed, 0.1 * same, std_deg * same, 0.95 * same, same, same, 2000.0, (5.0, 400.0), 4, 0
     )
-    return SweepResult(
-        "speed_loop", "speed", frf, frf, None, True, "1", (), {}, 0.0, 1.0, 0.0
-    )  # fmt: skip
+    return SweepResult("speed_loop", "speed", frf, frf, None, True, "1", (), {}, 0.0, 1.0, 0.0)
 
 
 def test_margins_are_read_from_lines_that_noise_hardly_moves() -> None:

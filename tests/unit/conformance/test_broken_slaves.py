@@ -215,9 +215,9 @@ async def test_a_powered_drive_is_only_read(status: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "refusal", [Busy("ethercat.cyclic-exchange-owns-states"),
-                NotAllowed("ethercat.op-needs-cyclic-data")],
-)  # fmt: skip
+    "refusal",
+    [Busy("ethercat.cyclic-exchange-owns-states"), NotAllowed("ethercat.op-needs-cyclic-data")],
+)
 async def test_what_we_do_not_send_is_no_failure_of_the_slave(refusal: Exception) -> None:
     slave = Slave()
 
@@ -244,8 +244,10 @@ async def test_what_cannot_be_known_is_not_called_passed() -> None:
     found = await verdicts(slave)
     assert found["error-control"] is Verdict.PASSED
     assert of(Verdict.NOT_TESTABLE, found) == {
-        "drive-mode-objects", "sdo-too-long", "sdo-too-short",
-    }  # fmt: skip
+        "drive-mode-objects",
+        "sdo-too-long",
+        "sdo-too-short",
+    }
 
 
 def test_titles_and_verdicts_have_words_in_both_languages() -> None:

@@ -80,8 +80,9 @@ def test_banned_words_in_messages_and_on_the_page(
     (pages / "x.ts").write_text("  'bit.set-point': ['setpoint', '共振'],\n", "utf-8")
     (pages / "said.ts").write_text("  'said.x': ['set-point', '共振'],\n", "utf-8")
     assert [(one.file.name, one.line) for one in prose.words_in_messages(terms.load())] == [
-        ("x.en.ftl", 2), ("x.zh.ftl", 1),
-    ]  # fmt: skip
+        ("x.en.ftl", 2),
+        ("x.zh.ftl", 1),
+    ]
     assert [(one.file.name, one.line) for one in prose.words_on_page(terms.load())] == [("x.ts", 1)]
 
 

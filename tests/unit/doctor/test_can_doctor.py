@@ -39,8 +39,10 @@ QUIET = replace(WELL, answers=0, heard=False, state=None, started=False, period_
         (replace(WELL, state=127, started=False, pdos_wanted=0), "can_not_started"),
         (replace(WELL, refused="x", refused_key="1A00:00"), "can_mapping_refused"),
         (replace(WELL, refused="x", refused_key="1800:01"), "can_pdo_id_refused"),
-        (replace(WELL, refused="x", refused_key="1800:01", refused_code=0x08000021),
-         "can_local_control"),
+        (
+            replace(WELL, refused="x", refused_key="1800:01", refused_code=0x08000021),
+            "can_local_control",
+        ),
         (replace(WELL, refused="x", timed_out=True), "can_sdo_slow"),
         (replace(WELL, collisions=((0x185, 6),)), "can_cob_id_collision"),
         (replace(WELL, sync_cob=0x90), "can_sync_wrong"),
@@ -50,7 +52,7 @@ QUIET = replace(WELL, answers=0, heard=False, state=None, started=False, period_
         (replace(WELL, emergency=0x3210, emergency_open=True), "can_drive_fault"),
         (replace(WELL, refused="x"), "can_unknown"),
     ],
-)  # fmt: skip
+)
 def test_first_cause(evidence: CanEvidence, cause: str) -> None:
     found = diagnose(evidence)
     assert found[0].code == cause

@@ -46,8 +46,10 @@ def packets(tmp_path: Path) -> Decoder:
         path.write_bytes(data)
         done = subprocess.run(
             ["tshark", "-r", str(path), "-T", "json", "-x"],
-            capture_output=True, check=True, env={"PATH": "/usr/bin:/bin", "HOME": str(tmp_path)},
-        )  # fmt: skip
+            capture_output=True,
+            check=True,
+            env={"PATH": "/usr/bin:/bin", "HOME": str(tmp_path)},
+        )
         found = json.loads(done.stdout, object_pairs_hook=_merged)
         return [_packet(each["_source"]["layers"]) for each in found]
 

@@ -138,8 +138,9 @@ def test_sizes_and_byte_order_are_those_of_the_type() -> None:
     # CiA 301 clause 7.1.4.3: UNSIGNED32 1_000_000 = 000F4240h travels as 40 42 0F 00.
     profile = profile_of("mms7")
     content = replace(set_of(profile))
-    rows = tuple(replace(row, raw=1_000_000) if row.key == "6092:01" else row
-                 for row in content.rows)  # fmt: skip
+    rows = tuple(
+        replace(row, raw=1_000_000) if row.key == "6092:01" else row for row in content.rows
+    )
     axis = hand_over(replace(content, rows=rows), profile, only=["6092:01"])
     assert axis.writes[0].data == bytes([0x40, 0x42, 0x0F, 0x00])
     xml = files_of(axis, "twincat", "list", None)["list"]
@@ -170,9 +171,11 @@ def test_canopen_imports_the_dcf(family: str) -> None:
     dictionary = canopen.import_od(file)
     for write in axis.writes:
         entry = dictionary[write.index]
-        variable = entry if isinstance(entry, canopen.objectdictionary.ODVariable) else (
-            entry[write.subindex]
-        )  # fmt: skip
+        variable = (
+            entry
+            if isinstance(entry, canopen.objectdictionary.ODVariable)
+            else (entry[write.subindex])
+        )
         assert variable.value == write.raw, write.key
         assert len(variable.encode_raw(variable.value)) == len(write.data), write.key
 
@@ -347,8 +350,9 @@ def test_a_segment_is_one_file_or_one_for_each_drive() -> None:
     files = files_of(axes, "ros2", "list", None)
     control = fromstring(files["list"])
     assert [e.text for e in control.iterfind(".//param[@name='slave_config']")] == [
-        "list.1.yaml", "list.2.yaml",
-    ]  # fmt: skip
+        "list.1.yaml",
+        "list.2.yaml",
+    ]
     assert yaml.safe_load(files["list.2.yaml"])["sdo"]
     with pytest.raises(NotAllowed, match="one drive"):
         files_of(axes, "twincat", "list", None)

@@ -124,14 +124,15 @@ def one(quantity: Quantity, *values: float, deviation: float = 0.0) -> list[Heal
         HealthRound(
             values=(
                 HealthValue(
-                    quantity=quantity, value=value,
+                    quantity=quantity,
+                    value=value,
                     low=value * (1 - 1.96 * deviation) if deviation else None,
                     high=value * (1 + 1.96 * deviation) if deviation else None,
                 ),
             )
         )
         for value in values
-    ]  # fmt: skip
+    ]
 
 
 def test_the_change_and_its_interval_are_those_of_two_means() -> None:

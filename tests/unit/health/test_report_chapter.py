@@ -20,8 +20,9 @@ AXIS = AxisOf("2e1-30-7", "X", "mms7", 0x2E1, 0x30, None, 7)
 SETTINGS = HealthSettings(travel_limit=2, speed_limit=900, torque_limit=80)
 FACTS = Facts(
     Identity("X", "MMS7", "", "", 0x2E1, 0x30, None, 7, "", ()),
-    datetime(2026, 3, 1, tzinfo=UTC), "0.1",
-)  # fmt: skip
+    datetime(2026, 3, 1, tzinfo=UTC),
+    "0.1",
+)
 
 
 @pytest.fixture
@@ -50,9 +51,11 @@ def texts(condition: Condition | None, language: Language) -> tuple[str, str]:
 
 @pytest.mark.parametrize(
     ("language", "said", "step"),
-    [("en", "friction has changed by +20.", "Next: with the power off"),
-     ("zh", "摩擦相对基线变化 +20.", "下一步: 断电后检查")],
-)  # fmt: skip
+    [
+        ("en", "friction has changed by +20.", "Next: with the power off"),
+        ("zh", "摩擦相对基线变化 +20.", "下一步: 断电后检查"),
+    ],
+)
 def test_a_change_and_its_next_step(
     condition: Condition, language: Language, said: str, step: str
 ) -> None:

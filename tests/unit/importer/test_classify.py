@@ -59,8 +59,9 @@ def test_an_object_gets_a_class_and_loses_it(folder: Path) -> None:
     classify("my_drive", "2006:00", "at_enable", reason="tried")
     loaded = load_profile("my_drive")
     assert (loaded.by_key["2005:00"].motion, loaded.by_key["2006:00"].motion) == (
-        "none", "at_enable",
-    )  # fmt: skip
+        "none",
+        "at_enable",
+    )
     assert forget("my_drive", "2005:00").motion == "energises"
     assert load_profile("my_drive").by_key["2006:00"].motion == "at_enable"
     forget("my_drive", "2006:00")

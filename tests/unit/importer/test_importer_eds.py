@@ -35,8 +35,9 @@ def test_a_good_file_gives_a_profile_merged_over_the_generic_one() -> None:
     assert profile.supported_modes == (1, 8)
     assert profile.pdo is not None
     assert [(s.index, s.entries) for s in profile.pdo.sets] == [
-        (0x1600, ("6040:00",)), (0x1A00, ("6041:00",)),
-    ]  # fmt: skip
+        (0x1600, ("6040:00",)),
+        (0x1A00, ("6041:00",)),
+    ]
     watchdog = profile.links[0].watchdog
     assert not watchdog.present  # no 1016h in this file
 

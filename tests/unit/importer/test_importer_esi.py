@@ -25,15 +25,18 @@ def test_a_good_file() -> None:
     assert [k for k in profile.by_key if k.startswith("2020")] == ["2020:01", "2020:02", "2020:03"]
     speed = profile.by_key["6099:01"]
     assert (speed.name, speed.default_raw, speed.pdo) == (
-        "Homing speeds: Speed for switch", 1000, "rx",
-    )  # fmt: skip
+        "Homing speeds: Speed for switch",
+        1000,
+        "rx",
+    )
     assert profile.by_key["6099:02"].default_raw is None
     assert profile.links[0].complete_access
     assert profile.links[0].foe
     assert profile.pdo is not None
     assert [(s.entries, s.fixed) for s in profile.pdo.sets] == [
-        (("6040:00", "607A:00"), False), (("6041:00",), True),
-    ]  # fmt: skip
+        (("6040:00", "607A:00"), False),
+        (("6041:00",), True),
+    ]
     # Only the PDO names 607Ah, as unsigned: the standard's sign counts, and it is said.
     assert profile.by_key["607A:00"].type == "INT32"
     assert [f.outcome for f in imported.report.findings] == ["repaired"]
@@ -42,8 +45,9 @@ def test_a_good_file() -> None:
 def test_the_devices_of_a_series_can_be_chosen() -> None:
     devices = esi_devices(open_esi(GOOD_ESI.encode(), "good.xml", ImportReport()))
     assert [(d.name, d.product_code, d.revision) for d in devices] == [
-        ("Drive ES4", 0x190, 2), ("Drive ES5", 0x191, 1),
-    ]  # fmt: skip
+        ("Drive ES4", 0x190, 2),
+        ("Drive ES5", 0x191, 1),
+    ]
     second = import_file(GOOD_ESI.encode(), "good.xml", product_code=0x191)
     assert second.profile.identity.model == "Drive ES5"
     assert any("no object dictionary" in str(f) for f in second.report.findings)

@@ -66,8 +66,10 @@ def test_time_and_memory_of_a_large_file(tmp_path: Path, objects: int) -> None:
     assert file.stat().st_size >= BYTES
     done = subprocess.run(
         [sys.executable, "-c", _MEASURE, str(file), str(tmp_path / "profiles")],
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     measured = json.loads(done.stdout)
     print(measured)
     assert measured["parameters"] >= objects

@@ -192,10 +192,11 @@ def test_padding_and_bits_keep_their_places() -> None:
 
 def test_a_free_pdo_without_contents_is_one_to_be_filled() -> None:
     pdos = (
-        FIXED_OUT + FIXED_IN
+        FIXED_OUT
+        + FIXED_IN
         + "<RxPdo><Index>#x1605</Index><Name>Free</Name></RxPdo>"
         + "<TxPdo><Index>#x1A05</Index><Name>Free</Name></TxPdo>"
-    )  # fmt: skip
+    )
     profile = imported(CONTROL + STATUS + MODE + SPEEDS + POSITIONS, pdos)
     assert profile.pdo is not None
     assert profile.pdo.remappable
@@ -225,8 +226,10 @@ def test_the_newest_revision_of_a_drive_is_taken_and_the_others_are_offered() ->
     identity = taken.profile.identity
     assert (identity.product_code, identity.revision) == (0x200, 0x20000)
     assert [(d.name, d.product_code, d.has_control_word) for d in taken.others] == [
-        ("Boot", 1, False), ("Servo", 0x200, True), ("Other", 0x300, True),
-    ]  # fmt: skip
+        ("Boot", 1, False),
+        ("Servo", 0x200, True),
+        ("Other", 0x300, True),
+    ]
     assert any("0x300 revision 0x50000" in str(f) for f in taken.report.findings)
 
 
@@ -299,8 +302,9 @@ def test_array_members_have_the_names_of_the_object(first: str) -> None:
     )
     profile = imported(CONTROL + STATUS + gains, types=ARRAY)
     assert [(p.name, p.default_raw) for k, p in profile.by_key.items() if k[:4] == "2010"] == [
-        ("Torque Controller: Controller Kp", 10), ("Torque Controller: Controller Ki", 20),
-    ]  # fmt: skip
+        ("Torque Controller: Controller Kp", 10),
+        ("Torque Controller: Controller Ki", 20),
+    ]
 
 
 def test_an_array_beyond_the_subindices_is_said() -> None:
@@ -320,18 +324,22 @@ def test_an_array_beyond_the_subindices_is_said() -> None:
 def test_the_standards_values_stay_inside_the_files_limits() -> None:
     info = "<MinValue>0</MinValue><MaxValue>2</MaxValue>"
     profile = imported(
-        CONTROL + STATUS + scalar(0x605A, "Quick stop option code", "INT", 16, info=info)
+        CONTROL
+        + STATUS
+        + scalar(0x605A, "Quick stop option code", "INT", 16, info=info)
         + scalar(0x6086, "Motion profile type", "INT", 16, info="<MaxValue>0</MaxValue>")
-    )  # fmt: skip
+    )
     assert sorted(profile.by_key["605A:00"].enum) == [0, 1, 2]
     assert sorted(profile.by_key["6086:00"].enum) == [0]
 
 
 def test_what_the_standard_only_lets_read_stays_so() -> None:
     profile = imported(
-        CONTROL + STATUS + scalar(0x603F, "Error code", "UINT", 16, access="ro", mapping="R")
+        CONTROL
+        + STATUS
+        + scalar(0x603F, "Error code", "UINT", 16, access="ro", mapping="R")
         + scalar(0x60FF, "Target velocity", "DINT", 32, access="ro", mapping="R")
-    )  # fmt: skip
+    )
     error = profile.by_key["603F:00"]
     assert (error.access, error.pdo, error.motion) == ("ro", "tx", None)
     target = profile.by_key["60FF:00"]

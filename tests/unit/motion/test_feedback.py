@@ -69,7 +69,7 @@ MOTIONS = {
     "swing 20 Hz": swing(300.0, 20.0),
     "swing 100 Hz": swing(200.0, 100.0),
     "standstill": lambda _t: 0.25,
-}  # fmt: skip
+}
 HONEST: dict[str, Callable[[Turns], Callable[[float], float]]] = {
     "exact": lambda turns: lambda t: speed(turns, t),
     "1 ms late": lambda turns: lambda t: speed(turns, t - 1e-3),
@@ -79,7 +79,7 @@ HONEST: dict[str, Callable[[Turns], Callable[[float], float]]] = {
     "whole rpm": lambda turns: lambda t: RPM * round(speed(turns, t) / RPM),
     "10 rpm, cut off": lambda turns: lambda t: 10 * RPM * int(speed(turns, t) / RPM / 10),
     "noisy": lambda turns: lambda t: speed(turns, t) + 20 * RPM * math.sin(9e3 * t),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
@@ -138,8 +138,9 @@ def test_a_speed_ten_times_too_large_is_no_speed() -> None:
 def test_a_real_overspeed_stays_one(in_s: float) -> None:
     """Also where a blow makes it within two cycles."""
     turns = ramp_to(903.0, in_s)
-    halt, _ = watched(lambda t: turns(max(t - 0.2, 0.0)), lambda t: speed(turns, t - 0.2),
-                      limit_rpm=300.0)  # fmt: skip
+    halt, _ = watched(
+        lambda t: turns(max(t - 0.2, 0.0)), lambda t: speed(turns, t - 0.2), limit_rpm=300.0
+    )
     assert halt is not None
     assert halt.cause is HaltCause.SPEED
 

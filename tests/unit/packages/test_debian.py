@@ -29,9 +29,11 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = Path(tmp_path_factory.mktemp("site"))
     subprocess.run(
         [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)],
-        cwd=ROOT, check=True, capture_output=True,
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
         env={"SERVODECK_NO_PAGE": "1", "PATH": "/usr/bin:/bin"},
-    )  # fmt: skip
+    )
     (wheel,) = folder.glob("servodeck-*.whl")
     with zipfile.ZipFile(wheel) as packed:
         packed.extractall(folder / "site")

@@ -53,8 +53,10 @@ def test_the_lock_is_read_for_the_other_system_not_for_this_one(foreign: ModuleT
     systems = foreign.SYSTEMS
     assert foreign.locked(systems["aarch64"], "3.11", _LOCK) == {"one": "1.2", "three": "4"}
     assert foreign.locked(systems["windows"], "3.11", _LOCK) == {
-        "one": "1.2", "two": "3", "three": "4"
-    }  # fmt: skip
+        "one": "1.2",
+        "two": "3",
+        "three": "4",
+    }
 
 
 def test_a_package_that_is_missing_older_or_of_another_system_is_found(
@@ -157,8 +159,10 @@ def test_a_folder_for_windows_from_its_parts(
         names = set(opened.namelist())
         (top,) = {name.split("/")[0] for name in names}
         assert top == "servodeck-0.2.0-windows-x86_64"
-        texts = {name: opened.read(f"{top}/{name}").decode("ascii") for name in (
-            "servodeck.cmd", "open-page.cmd", "python/python311._pth", "CONTENTS.txt")}  # fmt: skip
+        texts = {
+            name: opened.read(f"{top}/{name}").decode("ascii")
+            for name in ("servodeck.cmd", "open-page.cmd", "python/python311._pth", "CONTENTS.txt")
+        }
     # cmd.exe reads scripts with CR LF alone reliably.
     assert all(text.count("\n") == text.count("\r\n") > 0 for text in texts.values())
     assert '"%~dp0python\\python.exe" -m backend %*\r\n' in texts["servodeck.cmd"]

@@ -57,8 +57,10 @@ def test_a_table_that_says_more_than_ran_is_found(tmp_path: Path) -> None:
     said = {(row("a"), HERE): TESTED, (row("b"), HERE): TESTED, (row("never"), HERE): TESTED,
             (row("c"), HERE): TESTED, (Row("all", "none"), HERE): TESTED}  # fmt: skip
     assert [each.rpartition(": ")[2] for each in matrix.overstated(said, ran)] == [
-        "tests/unit/test_b.py", "tests/unit/test_never.py", "no test",
-    ]  # fmt: skip
+        "tests/unit/test_b.py",
+        "tests/unit/test_never.py",
+        "no test",
+    ]
 
 
 def test_the_documentation_has_this_table() -> None:

@@ -61,8 +61,9 @@ def test_the_restore_list_is_on_the_disk_before_anything_changes(tmp_path: Path)
     def stopped(_interface: str, _name: str, _value: int) -> None:
         kept = json.loads((tmp_path / "state" / RESTORE_LIST).read_text())
         assert [(one["place"], one["before"]) for one in kept] == [
-            ("rx-usecs", "50"), ("tx-usecs", "12")
-        ]  # fmt: skip
+            ("rx-usecs", "50"),
+            ("tx-usecs", "12"),
+        ]
         raise KeyboardInterrupt  # the process ends here
 
     with pytest.raises(KeyboardInterrupt):

@@ -245,8 +245,9 @@ def test_slow_disk_fails_it_rather_than_dropping(
 ) -> None:
     failures: list[StorageFailed] = []
     free, stuck = threading.Event(), threading.Event()
-    writer = RecordingWriter(tmp_path / "a.sdrec", header(), failures.append,
-                             max_queued_bytes=10 * (10 * 2 * 8 + 64))  # fmt: skip
+    writer = RecordingWriter(
+        tmp_path / "a.sdrec", header(), failures.append, max_queued_bytes=10 * (10 * 2 * 8 + 64)
+    )
 
     def hang(_fd: int) -> None:
         stuck.set()

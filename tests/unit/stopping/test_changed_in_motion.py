@@ -68,9 +68,11 @@ async def stored(bench: Rig, values: dict[str, int]) -> str:
 async def loaded(bench: Rig, file: str) -> dict[str, object] | None:
     """The result of loading these values; None where the server does not begin."""
     body = {
-        "file": file, "keys": list(DANGEROUS), "accept_other_identity": True,
+        "file": file,
+        "keys": list(DANGEROUS),
+        "accept_other_identity": True,
         "accept_motor_individual": True,
-    }  # fmt: skip
+    }
     answer = await bench.http.post(f"{path_of(bench)}/jobs/load_set", json=body)
     if answer.status_code == 409:
         return None
@@ -90,9 +92,10 @@ async def by_set(bench: Rig) -> None:
 async def by_csv(bench: Rig) -> None:
     rows = [f"{key},{raw}" for key, raw in DANGEROUS.items()]
     answer = await bench.http.post(
-        "/sets/list", params={"profile": DRIVE, "file": "list"},
+        "/sets/list",
+        params={"profile": DRIVE, "file": "list"},
         content="\n".join(["key,raw", *rows]),
-    )  # fmt: skip
+    )
     assert answer.is_success, answer.text
     await require_refused(bench, answer.json()["file"])
 

@@ -95,9 +95,11 @@ def resets(d: OnWire, fault: Fault) -> None:
 
 def explained(fault: Fault) -> bool:
     """Cause and remedy are there, or it is said that the manual prints none."""
-    return bool(fault.causes and fault.remedies) or "no" in fault.notes.lower().split() or (
-        "neither cause nor remedy" in fault.notes
-    )  # fmt: skip
+    return (
+        bool(fault.causes and fault.remedies)
+        or "no" in fault.notes.lower().split()
+        or ("neither cause nor remedy" in fault.notes)
+    )
 
 
 OVER_SPEED = [("mms7", "0x8400"), ("m6l", "Er.027"), ("r6l", "AL.225"), ("ep3e", "Err1")]
@@ -131,9 +133,11 @@ def test_over_voltage_by_regeneration(name: str, code: str) -> None:
     heavy = MotorSpec(inertia_kgm2=1e-2, rated_torque_nm=RATED, rated_speed_rpm=3000)
     volts = 48.0 if name in ("mms7", "ds_c") else 310.0
     supply = SupplySpec(
-        voltage_v=volts, sinks=False, capacitance_f=1e-4,
+        voltage_v=volts,
+        sinks=False,
+        capacitance_f=1e-4,
         braking_resistor=name not in ("ep3e", "ds_c"),  # none at its terminals
-    )  # fmt: skip
+    )
     d = drive(name, motor=heavy, supply=supply)
     if name == "mms7":
         d.set("200B:01", 0x03)  # neither resistor nor lock protection
@@ -325,9 +329,10 @@ def test_over_current_of_the_mms7() -> None:
 def test_position_limit_of_the_mms7() -> None:
     """A limit switch in motion (004:4800)."""
     d = drive(
-        "mms7", travel=TravelSpec(min_rev=-4, max_rev=4),
+        "mms7",
+        travel=TravelSpec(min_rev=-4, max_rev=4),
         switches=SwitchSpec(negative_limit_rev=-3, positive_limit_rev=3),
-    )  # fmt: skip
+    )
     d.set("2030:02", 2)
     write_settings(d)
     d.turn(5.0, seconds=0.4)
@@ -404,9 +409,10 @@ HOLDING = [("m6l", 0xFF27), ("r6l", None), ("ep3e", None), ("ds_c", None)]
 def test_a_limit_switch_stops_and_lets_back(name: str, warning: int | None) -> None:
     """It brakes and holds; only the other direction is open, and a warning shows (M6-L, R6L)."""
     d = drive(
-        name, travel=TravelSpec(min_rev=-4, max_rev=4),
+        name,
+        travel=TravelSpec(min_rev=-4, max_rev=4),
         switches=SwitchSpec(negative_limit_rev=-2, positive_limit_rev=2),
-    )  # fmt: skip
+    )
     d.turn(3.0, seconds=0.3)
     d.until(lambda: abs(d.speed_rev_s) < 0.05, 2.0)
     d.run(0.2)
@@ -436,9 +442,10 @@ def test_the_negative_limit_switch_of_the_m6l_has_a_warning_of_its_own() -> None
     P10.04 is at its default, whose meaning is not printed and which is taken as 1.
     """
     d = drive(
-        "m6l", travel=TravelSpec(min_rev=-4, max_rev=4),
+        "m6l",
+        travel=TravelSpec(min_rev=-4, max_rev=4),
         switches=SwitchSpec(negative_limit_rev=-2, positive_limit_rev=2),
-    )  # fmt: skip
+    )
     d.turn(-3.0, seconds=0.3)
     d.until(lambda: abs(d.speed_rev_s) < 0.05, 2.0)
     d.run(0.2)
@@ -456,9 +463,10 @@ def test_m6l_over_travel_as_a_fault() -> None:
     """P10.04 = 0: Er.039 forward, Er.040 backward (000:3474, 000:3922)."""
     for sign, code in ((1, "Er.039"), (-1, "Er.040")):
         d = drive(
-            "m6l", travel=TravelSpec(min_rev=-4, max_rev=4),
+            "m6l",
+            travel=TravelSpec(min_rev=-4, max_rev=4),
             switches=SwitchSpec(negative_limit_rev=-2, positive_limit_rev=2),
-        )  # fmt: skip
+        )
         d.set("200A:05", 0)
         d.turn(sign * 3.0, seconds=0.3)
         fault = shows(d, code, 2.0)

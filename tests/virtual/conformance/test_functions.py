@@ -240,14 +240,15 @@ def test_the_adaptive_notch_finds_the_resonance_and_calms_it(
     d = OnWire(
         name,
         MechanicsSpec(
-            motor=MOTOR, friction=FrictionSpec(coulomb_nm=0.01),
+            motor=MOTOR,
+            friction=FrictionSpec(coulomb_nm=0.01),
             load=(
                 LoadSpec(
                     inertia_kgm2=inertia, stiffness_nm_per_rad=stiffness, damping_nms_per_rad=0.004
                 ),
             ),
         ),
-    )  # fmt: skip
+    )
     if name == "m6l":
         d.set_all({"2009:27": 100, "2008:01": 1600, "2008:04": 3})
     else:
@@ -356,8 +357,10 @@ def test_brake_of_the_r6l_by_p01_12_and_p01_13() -> None:
 
 PROBES = [
     ("mms7", {"2030:01": 4, "200D:00": 0xAAB555AA}, "di1"),
-    ("m6l", {"2003:03": 49}, "di3"), ("r6l", {}, "di7"), ("ep3e", {}, "di6"),
-]  # fmt: skip
+    ("m6l", {"2003:03": 49}, "di3"),
+    ("r6l", {}, "di7"),
+    ("ep3e", {}, "di6"),
+]
 
 
 @pytest.mark.parametrize(("name", "settings", "terminal"), PROBES)
@@ -517,7 +520,7 @@ SAVING = [
     ("r6l", "2006:01", 333, None),
     ("ep3e", "2005:00", 77, ("1010:01", 0x45534554, 10.1)),
     ("ds_c", "6083:00", 321, ("2201:00", 1, 0.0)),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("name", "key", "raw", "how"), SAVING)
@@ -545,10 +548,12 @@ def test_what_is_not_saved_is_lost(
 
 
 RESTORING = [
-    ("mms7", "2005:03", "200D:00", 0x64616F6C, 0.0), ("m6l", "2008:01", "2011:1B", 1, 0.0),
-    ("r6l", "2006:01", "200C:01", 1, 0.0), ("ep3e", "2005:00", "1010:01", 0x45444546, 10.1),
+    ("mms7", "2005:03", "200D:00", 0x64616F6C, 0.0),
+    ("m6l", "2008:01", "2011:1B", 1, 0.0),
+    ("r6l", "2006:01", "200C:01", 1, 0.0),
+    ("ep3e", "2005:00", "1010:01", 0x45444546, 10.1),
     ("ds_c", "6083:00", "2202:00", 1, 0.0),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("name", "key", "command", "raw", "seconds"), RESTORING)

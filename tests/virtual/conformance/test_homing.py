@@ -92,10 +92,12 @@ def machine(case: Case) -> MechanicsSpec:
         friction=FrictionSpec(coulomb_nm=0.02),
         travel=TravelSpec(min_rev=-STOP, max_rev=STOP),
         switches=SwitchSpec(
-            negative_limit_rev=-LIMIT, positive_limit_rev=LIMIT,
-            home_from_rev=case.switch[0], home_to_rev=case.switch[1],
+            negative_limit_rev=-LIMIT,
+            positive_limit_rev=LIMIT,
+            home_from_rev=case.switch[0],
+            home_to_rev=case.switch[1],
         ),
-    )  # fmt: skip
+    )
 
 
 def wired(name: str, case: Case) -> OnWire:

@@ -204,11 +204,13 @@ def small_profile() -> Profile:
         ),
         stiffness=(
             StiffnessTable(
-                level_key="2005:0F", columns=("2005:01", "2005:03", "2005:04"),
-                rows={13: (77, 270, 76), 20: (329, 1150, 227)}, source="004:3001",
+                level_key="2005:0F",
+                columns=("2005:01", "2005:03", "2005:04"),
+                rows={13: (77, 270, 76), 20: (329, 1150, 227)},
+                source="004:3001",
             ),
         ),
-    )  # fmt: skip
+    )
 
 
 class Bench:

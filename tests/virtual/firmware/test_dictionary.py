@@ -340,9 +340,11 @@ def test_register_table_with_the_high_word_first() -> None:
     extra = tuple(
         Parameter(key=key, name=key, group="t", type=kind, modbus_register=register, source="003:1")
         for key, kind, register in (
-            ("PA_1", "INT16", 1), ("PA_2", "UINT32", 2), ("PA_4", "UINT8", 4),
+            ("PA_1", "INT16", 1),
+            ("PA_2", "UINT32", 2),
+            ("PA_4", "UINT8", 4),
         )
-    )  # fmt: skip
+    )
     profile = base.model_copy(update={"links": (link,), "parameters": base.parameters + extra})
     od = ObjectDictionary(profile, 1)
     table = RegisterTable(profile, od)

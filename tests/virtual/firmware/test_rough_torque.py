@@ -21,9 +21,11 @@ MOTOR = MotorSpec(inertia_kgm2=1e-4, rated_torque_nm=1.27, rated_speed_rpm=3000)
 
 def axis_of(coulomb: float = 0.0, **rough: object) -> VirtualAxis:
     spec = MechanicsSpec(
-        motor=MOTOR, friction=FrictionSpec(coulomb_nm=coulomb), encoder=EncoderSpec(),
+        motor=MOTOR,
+        friction=FrictionSpec(coulomb_nm=coulomb),
+        encoder=EncoderSpec(),
         rough_torque=RoughTorqueSpec.model_validate(rough),
-    )  # fmt: skip
+    )
     axis = VirtualAxis(spec)
     gains = GainSet(10.0, 0.02, 0.2)
     loops = LoopSettings(

@@ -175,8 +175,9 @@ def test_mailboxes_come_from_the_esi_file_and_process_data_lie_in_the_frame() ->
     profile = profile_of("maker_a.xml")
     found = controller_of(data, "maker_a.xml", 0x0B95, 0xA001, None)
     assert (found.assign_activate, found.shift_ns) == (0x0300, 250_000)
-    axis = replace(hand_over(set_of_device(profile, tuned_device(profile)), profile),
-                   controller=found)  # fmt: skip
+    axis = replace(
+        hand_over(set_of_device(profile, tuned_device(profile)), profile), controller=found
+    )
     root = fromstring(eni([axis]))
     assert root.findtext(".//Mailbox/Send/Start") == str(0x1000)
     assert root.findtext(".//DC/ShiftTime") == "250000"

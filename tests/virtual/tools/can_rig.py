@@ -79,9 +79,11 @@ class LockstepBus(can.BusABC):
             return None
         self._handled = False
         return can.Message(
-            arbitration_id=frame.cob_id, is_extended_id=False, is_remote_frame=frame.remote,
+            arbitration_id=frame.cob_id,
+            is_extended_id=False,
+            is_remote_frame=frame.remote,
             data=frame.data,
-        )  # fmt: skip
+        )
 
     def shutdown(self) -> None:
         self._is_shutdown = True
@@ -139,8 +141,9 @@ async def can_bench(
     bus.pass_s(0.01)
     link = CanopenLink(
         f"canopen://virtual/lockstep-{next(_numbers)}?bitrate={bitrate}",
-        opener=lambda _url: bus, clock=bus,
-    )  # fmt: skip
+        opener=lambda _url: bus,
+        clock=bus,
+    )
     await link.open()
     try:
         link.attach(STATION, profile)

@@ -200,9 +200,11 @@ class DirectLink:
         time.monotonic = self._ordinary_time
 
     async def scan(
-        self, progress: Progress, stations: Sequence[int] | None = None,
+        self,
+        progress: Progress,
+        stations: Sequence[int] | None = None,
         stop_after: int | None = None,
-    ) -> list[Found]:  # fmt: skip
+    ) -> list[Found]:
         del progress, stations, stop_after
         return [Found(STATION)]
 

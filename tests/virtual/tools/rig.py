@@ -47,13 +47,15 @@ def mechanics(
             **({"travel": {"min_rev": travel[0], "max_rev": travel[1]}} if travel else {}),
             "load": [
                 {
-                    "inertia_kgm2": j, "stiffness_nm_per_rad": k, "damping_nms_per_rad": d,
+                    "inertia_kgm2": j,
+                    "stiffness_nm_per_rad": k,
+                    "damping_nms_per_rad": d,
                     "backlash_rad": backlash,
                 }
                 for j, k, d in loads
             ],
         }
-    )  # fmt: skip
+    )
 
 
 @dataclass

@@ -50,9 +50,11 @@ def braked(
 
 
 async def brake_of(
-    axis: Axis, session: CyclicSession, asked: BrakeSettings = ASKED,
+    axis: Axis,
+    session: CyclicSession,
+    asked: BrakeSettings = ASKED,
     kept: dict[str, object] | None = None,
-) -> BrakeResult:  # fmt: skip
+) -> BrakeResult:
     """As a job or the command line does it; what is read from files is the same."""
 
     def keep(name: str, arrays: Mapping[str, object], meta: dict[str, object]) -> None:
@@ -65,9 +67,11 @@ async def brake_of(
 
 
 async def on(
-    drive: str, spec: MechanicsSpec, asked: BrakeSettings = ASKED,
+    drive: str,
+    spec: MechanicsSpec,
+    asked: BrakeSettings = ASKED,
     settings: Mapping[str, int] | None = None,
-) -> tuple[BrakeResult, DirectBench]:  # fmt: skip
+) -> tuple[BrakeResult, DirectBench]:
     async with direct(spec, drive=drive, settings=settings) as bench:
         mode = bench.axis.drive.require("mode")
         before = await settings_of(bench.axis.drive, mode)
@@ -143,9 +147,7 @@ async def test_the_shaft_itself_after_the_limit_was_passed() -> None:
 async def test_an_open_brake_moves_by_the_preload_alone() -> None:
     """Its output is another one than the drive was reported: it follows the power stage."""
     spec = braked(2.0 * RATED_NM)
-    spec = spec.model_copy(
-        update={"motor": spec.motor.model_copy(update={"brake_output": False})}
-    )  # fmt: skip
+    spec = spec.model_copy(update={"motor": spec.motor.model_copy(update={"brake_output": False})})
     found, _ = await on("m6l", spec, settings=M6L)
     assert found.verdict == "not_closed"
     (way,) = found.ways

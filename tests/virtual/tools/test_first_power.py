@@ -45,9 +45,11 @@ def motor(
 
 
 async def first_power(
-    bench: DirectBench, asked: FirstPowerSettings = ASKED, progress: At | None = None,
+    bench: DirectBench,
+    asked: FirstPowerSettings = ASKED,
+    progress: At | None = None,
     kept: dict[str, Any] | None = None,
-) -> FirstPowerResult:  # fmt: skip
+) -> FirstPowerResult:
     """As a job or the command line does it; what is read from files is the same."""
 
     def keep(name: str, arrays: Mapping[str, object], meta: dict[str, object]) -> None:

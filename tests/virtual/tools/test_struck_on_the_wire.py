@@ -44,9 +44,7 @@ async def work(b: Bench | CanBench, part: str, known: Known | None, progress: Pr
             assert known is not None
             facts = completed(await read_facts(axis), known.mechanics)
             how = Learning(WIDE, "auto", "free")
-            await learn_notches(
-                axis, session, how, facts, known.outcome, known.mechanics, progress
-            )  # fmt: skip
+            await learn_notches(axis, session, how, facts, known.outcome, known.mechanics, progress)
 
 
 async def struck(

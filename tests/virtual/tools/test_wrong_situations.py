@@ -65,8 +65,10 @@ class Family:
 MMS7 = Family(
     "mms7",
     {"2008:02": 13804, "2008:03": 42532, "2008:04": 14039, "2008:05": 42297, "2008:01": 1},
-    {"2001:06": 8000, "2005:03": 5000}, "6072:00", 0x40,
-)  # fmt: skip
+    {"2001:06": 8000, "2005:03": 5000},
+    "6072:00",
+    0x40,
+)
 M6L = Family(
     "m6l", {"2009:0B": 900, "2009:0C": 100}, {"2008:01": 20000, "2009:27": 2000}, "6072:00", 0x40,
     5e-5,
@@ -136,7 +138,7 @@ async def test_start_gains_that_oscillate(family: Family) -> None:
             with pytest.raises(DriveError):
                 await sweep(
                     b.axis, b.session, SweepSettings(WIDE, kind=kind, loop="speed"), silent()
-                )  # fmt: skip
+                )
         with pytest.raises(DriveError):
             await step_response(b.axis, b.session, StepSettings(WIDE), silent())
         # Autotune lends it gains to be measured with, and finds better ones.
@@ -368,9 +370,10 @@ async def test_autotune_is_cancelled_after_it_has_written(
 
 @pytest.mark.parametrize("tool", ["sweep", "inertia", "step"])
 @pytest.mark.parametrize(
-    ("family", "fraction"), [(MMS7, 0.0), (MMS7, 0.2), (MMS7, 0.6), (M6L, 0.6)],
+    ("family", "fraction"),
+    [(MMS7, 0.0), (MMS7, 0.2), (MMS7, 0.6), (M6L, 0.6)],
     ids=["mms7-0.0", "mms7-0.2", "mms7-0.6", "m6l-0.6"],
-)  # fmt: skip
+)
 async def test_single_tools_are_cancelled(family: Family, tool: str, fraction: float) -> None:
     async with unharmed(ONE, family) as b:
         at = At("", lambda: task.cancel(), fraction)  # noqa: PLW0108

@@ -259,8 +259,10 @@ def test_signals_are_packed_into_pdos_of_eight_bytes() -> None:
     pdos, left = plan(inputs, [_signal(0x607A)])
     assert left == ()
     assert [(p.direction, p.cob_id, p.size) for p in pdos] == [
-        ("tx", 0x183, 8), ("tx", 0x283, 4), ("rx", 0x203, 4),
-    ]  # fmt: skip
+        ("tx", 0x183, 8),
+        ("tx", 0x283, 4),
+        ("rx", 0x203, 4),
+    ]
     assert (pdos[1].communication, pdos[1].mapping) == (0x1801, 0x1A01)
 
 
@@ -352,9 +354,11 @@ async def test_a_halt_that_nobody_receives_does_not_say_that_it_was_received() -
 def test_a_fixed_mapping_is_reported_as_such_and_leaves_nothing_behind() -> None:
     """The put-back of what never changed was refused as well, and hid the reason."""
     objects = {
-        (0x1800, 1): (0x40000185).to_bytes(4, "little"), (0x1800, 2): b"\xff",
-        (0x1A00, 0): b"\x01", (0x1A00, 1): (0x60410010).to_bytes(4, "little"),
-    }  # fmt: skip
+        (0x1800, 1): (0x40000185).to_bytes(4, "little"),
+        (0x1800, 2): b"\xff",
+        (0x1A00, 0): b"\x01",
+        (0x1A00, 1): (0x60410010).to_bytes(4, "little"),
+    }
     before = dict(objects)
 
     def read(_station: int, index: int, subindex: int) -> bytes:

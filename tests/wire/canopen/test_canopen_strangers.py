@@ -81,8 +81,9 @@ def test_the_list_of_errors_is_read_and_emptied_as_cia_301_has_it(master: RawMas
     assert master.read(0x1003, 0) == "4f03100000000000"
 
 
-@pytest.mark.parametrize("taken", [0x000, 0x001, 0x07F, 0x101, 0x180, 0x585, 0x605, 0x6E0, 0x705,
-                                   0x780, 0x20000185])  # fmt: skip
+@pytest.mark.parametrize(
+    "taken", [0x000, 0x001, 0x07F, 0x101, 0x180, 0x585, 0x605, 0x6E0, 0x705, 0x780, 0x20000185]
+)
 @pytest.mark.parametrize("index", [0x1400, 0x1800])
 def test_a_pdo_gets_no_identifier_of_another_service(
     master: RawMaster, index: int, taken: int

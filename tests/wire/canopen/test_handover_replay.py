@@ -57,9 +57,7 @@ def on_can(profile: Profile, folder: Path) -> Iterator[OnCan]:
     with CanWire(SlcanSide(path), [node]):
         network = canopen.Network()
         network.NOTIFIER_CYCLE = 0.02
-        network.connect(
-            interface="slcan", channel=str(path), bitrate=1_000_000, sleep_after_open=0
-        )  # fmt: skip
+        network.connect(interface="slcan", channel=str(path), bitrate=1_000_000, sleep_after_open=0)
         try:
             yield OnCan(profile, node, network)
         finally:

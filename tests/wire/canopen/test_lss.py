@@ -213,8 +213,6 @@ def test_the_command_line_finds_names_and_sets(bench: Bench) -> None:
     wrong = run(cli.app, ["lss", "bit-rate", bench.url, "250", "--identity", "1:2", "--yes"])
     assert wrong.exit_code == 1
     by_identity = ":".join(str(number) for number in truth(bench.node))
-    rate = run(
-        cli.app, ["lss", "bit-rate", bench.url, "250", "--identity", by_identity, "--yes"]
-    )  # fmt: skip
+    rate = run(cli.app, ["lss", "bit-rate", bench.url, "250", "--identity", by_identity, "--yes"])
     assert rate.exit_code == 0, rate.output
     assert bench.node.lss.stored_rate == 3

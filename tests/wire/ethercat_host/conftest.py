@@ -69,9 +69,11 @@ class Rig:
     @asynccontextmanager
     async def link(self, *, scan: bool = True) -> AsyncIterator[Bus]:
         link = EthercatLink(
-            "ec0m", url="ethercat://virtual0", launcher=self.namespace.command([]),
+            "ec0m",
+            url="ethercat://virtual0",
+            launcher=self.namespace.command([]),
             lockstep=1.0 if self.lockstep else 0.0,
-        )  # fmt: skip
+        )
         bus = Bus(link)
         await link.open()
         try:

@@ -101,8 +101,10 @@ def test_from_the_first_start_to_the_first_drive(network: Namespace, tmp_path: P
 
     assert found["roles"]["status"] == 200
     assert {key: found["roles"]["said"][key] for key in ("name", "ethercat", "office")} == {
-        "name": "cabinet-3", "ethercat": "ec0m", "office": "off0"
-    }  # fmt: skip
+        "name": "cabinet-3",
+        "ethercat": "ec0m",
+        "office": "off0",
+    }
     refused = found["scan of the office"]
     assert refused["said"]["state"] == "failed"
     assert refused["said"]["problem"]["code"] == "station.box-office-port"

@@ -299,8 +299,9 @@ def test_a_first_look_whose_frame_is_lost_brings_no_old_answer(
     values = iter(range(1, 100))
     slave = ScriptedSlave(
         lambda _: [expedited(0x6041, 0, next(values).to_bytes(4, "little"))],
-        delay_s=0.001, counts=counts,
-    )  # fmt: skip
+        delay_s=0.001,
+        counts=counts,
+    )
     box = slave.box()
     for number in range(1, 21):
         if number == 20:

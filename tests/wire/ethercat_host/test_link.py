@@ -24,9 +24,11 @@ from tests.wire.ethercat_host.conftest import Rig, repeated, until
 
 STATUS = Address(0x6041, 0, "UINT16")
 RECORD = [
-    Address(0x2001, 0, "UINT8"), Address(0x2001, 1, "UINT16"),
-    Address(0x2001, 2, "UINT8"), Address(0x2001, 3, "UINT32"),
-]  # fmt: skip
+    Address(0x2001, 0, "UINT8"),
+    Address(0x2001, 1, "UINT16"),
+    Address(0x2001, 2, "UINT8"),
+    Address(0x2001, 3, "UINT32"),
+]
 LONG = Address(0x2002, 0, "OCTETS")
 
 

@@ -224,11 +224,13 @@ def test_velocity_ramps_down_to_zero() -> None:
     ("turns", "reported"),
     [
         # Blocked: nothing is left to push with; turned back by its load: as well.
-        (0, 0), (-300, 0),
+        (0, 0),
+        (-300, 0),
         # It lags: braked from where it is. It overtakes: braked from what it was reported.
-        (400, 400), (2500, 1000),
+        (400, 400),
+        (2500, 1000),
     ],
-)  # fmt: skip
+)
 def test_an_axis_that_takes_too_much_torque_is_braked_from_its_own_speed(
     turns: int, reported: int
 ) -> None:

@@ -202,8 +202,10 @@ def test_complete_access_download_of_a_record(wire: Wire) -> None:
     answer = wire.sdo(b"\x31\x01\x20\x00" + struct.pack("<I", len(data)) + data)
     assert answer == b"\x70\x01\x20\x00" + bytes(4)
     assert [wire.device.values[0x2001, n] for n in (1, 2, 3)] == [
-        b"\x01\x02", b"\x03", b"\x04\x05\x06\x07",
-    ]  # fmt: skip
+        b"\x01\x02",
+        b"\x03",
+        b"\x04\x05\x06\x07",
+    ]
 
 
 def test_complete_access_cannot_change_a_read_only_entry(wire: Wire) -> None:

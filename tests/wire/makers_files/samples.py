@@ -8,8 +8,9 @@ from __future__ import annotations
 _TYPES = {8: "SINT", 16: "UINT", 32: "DINT"}
 
 
-def _scalar(index: int, name: str, kind: str, bits: int, access: str, mapping: str = "",
-            default: str = "") -> str:  # fmt: skip
+def _scalar(
+    index: int, name: str, kind: str, bits: int, access: str, mapping: str = "", default: str = ""
+) -> str:
     pdo = f"<PdoMapping>{mapping}</PdoMapping>" if mapping else ""
     info = f"<Info><DefaultData>{default}</DefaultData></Info>" if default else ""
     return (
@@ -132,12 +133,12 @@ def esi(
     """A file with one device; ``coe`` are the attributes of its CoE mailbox."""
     return (
         '<?xml version="1.0"?><EtherCATInfo><Vendor><Id>#x00000A2B</Id><Name>Example</Name>'
-        f"</Vendor><Descriptions><Devices><Device><Type ProductCode=\"#x190\" RevisionNo=\"#x2\">"
+        f'</Vendor><Descriptions><Devices><Device><Type ProductCode="#x190" RevisionNo="#x2">'
         f"ES4</Type>{name}<Info>{info}</Info><Profile><Dictionary><DataTypes>{RESOLUTION}</DataTypes><Objects>{OBJECTS}"
         f"</Objects></Dictionary></Profile>{sms or managers()}{pdos}"
         f'<Mailbox DataLinkLayer="1"><CoE {coe}>{commands}</CoE>{box}</Mailbox>{dc}{chip}'
         "</Device></Devices></Descriptions></EtherCATInfo>"
-    ).encode()  # fmt: skip
+    ).encode()
 
 
 SAMPLES: dict[str, bytes] = {

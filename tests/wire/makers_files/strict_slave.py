@@ -144,10 +144,12 @@ def _pdo(item: Element) -> FilePdo:
 
 def _manager(item: Element) -> FileManager:
     return FileManager(
-        number(item.get("StartAddress")), number(item.get("ControlByte")),
-        number(item.get("DefaultSize")), number(item.get("MinSize")),
+        number(item.get("StartAddress")),
+        number(item.get("ControlByte")),
+        number(item.get("DefaultSize")),
+        number(item.get("MinSize")),
         number(item.get("MaxSize")) or 0xFFFF,
-    )  # fmt: skip
+    )
 
 
 def _mode(item: Element) -> Mode:
@@ -271,11 +273,13 @@ def _profile(file: File) -> Profile:
         data = bytes.fromhex(item.findtext("Info/DefaultData") or "")
         parameters.append(
             _parameter(
-                f"{number(item.findtext('Index')):04X}:00", _BASE[item.findtext("Type") or ""],  # type: ignore[arg-type]
-                item.findtext("Flags/Access") or "ro", mapping or "none",  # type: ignore[arg-type]
+                f"{number(item.findtext('Index')):04X}:00",
+                _BASE[item.findtext("Type") or ""],  # type: ignore[arg-type]
+                item.findtext("Flags/Access") or "ro",
+                mapping or "none",  # type: ignore[arg-type]
                 int.from_bytes(data, "little"),
             )
-        )  # fmt: skip
+        )
     sets = tuple(
         PdoSet(
             index=p.index, direction="rx" if p.index < 0x1800 else "tx", fixed=p.fixed,

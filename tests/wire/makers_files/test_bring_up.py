@@ -45,9 +45,11 @@ async def brought(
     arguments.append(wire)
     segment = VirtualSegment.start("ec0s", arguments, namespace)
     link = EthercatLink(
-        "ec0m", url="ethercat://virtual0", launcher=namespace.command([]),
+        "ec0m",
+        url="ethercat://virtual0",
+        launcher=namespace.command([]),
         lockstep=haste,
-    )  # fmt: skip
+    )
     await link.open()
     try:
         # A search that lost frames on a busy computer is made again, as the page offers.

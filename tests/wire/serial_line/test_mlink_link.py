@@ -52,8 +52,10 @@ def test_objects_that_share_a_register_are_refused() -> None:
         ("2100:00", "UINT16"), ("3000:00", "UINT16"), ("6099:00", "UINT8"), ("6099:01", "UINT32"),
     )  # fmt: skip
     assert ambiguous_objects(profile) == {
-        (0x2100, 0): "3000:00", (0x3000, 0): "2100:00", (0x6099, 0): "6099:01",
-    }  # fmt: skip
+        (0x2100, 0): "3000:00",
+        (0x3000, 0): "2100:00",
+        (0x6099, 0): "6099:01",
+    }
     layout = MlinkLayout()
     layout.configure(1, profile)
     with pytest.raises(NotAllowed, match="6099:00 from 6099:01"):
@@ -72,9 +74,11 @@ async def test_read_and_write_all_sizes(port: Path, opened: OpenLink) -> None:
     with serving(port, {1: shelf}):
         link = await opened(f"mlink://{port}")
         for address, data in (
-            (CONTROL, b"\x0f\x01"), (MODE, b"\xfd"), (TARGET, struct.pack("<i", -70_000)),
+            (CONTROL, b"\x0f\x01"),
+            (MODE, b"\xfd"),
+            (TARGET, struct.pack("<i", -70_000)),
             (Address(0x6099, 2, "UINT32"), struct.pack("<I", 0x12345678)),
-        ):  # fmt: skip
+        ):
             await link.write(1, address, data)
             assert await link.read(1, address) == data
     assert (0x6099, 2, b"\x78\x56\x34\x12") in shelf.writes

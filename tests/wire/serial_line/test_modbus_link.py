@@ -80,8 +80,9 @@ async def test_hole_in_a_bridged_gap_falls_back_to_single_reads(
         for requests in (3, 2):  # once in vain, then known
             before = slave.requests
             assert await link.read_many(1, [register(0x30), register(0x32)]) == [
-                b"\x01\0", b"\x02\0",
-            ]  # fmt: skip
+                b"\x01\0",
+                b"\x02\0",
+            ]
             assert slave.requests - before == requests
 
 

@@ -227,8 +227,9 @@ def test_overlapping_and_lonely_values_are_not_joined() -> None:
 
 @given(
     st.lists(st.tuples(st.integers(0, 300), st.integers(1, 2)), max_size=60),
-    st.integers(2, 20), st.integers(0, 5),
-)  # fmt: skip
+    st.integers(2, 20),
+    st.integers(0, 5),
+)
 def test_every_value_is_in_one_block(raw: list[tuple[int, int]], longest: int, gap: int) -> None:
     places = [_place(start, count) for start, count in raw]
     blocks = plan_blocks(places, longest, gap)

@@ -38,11 +38,13 @@ class Bus(ScriptedPort):
 
 async def found(bus: Bus, stations: Sequence[int], stop_after: int | None = None) -> list[int]:
     link = RegisterLink(
-        "modbus://scripted", SETTINGS, TableLayout(),
+        "modbus://scripted",
+        SETTINGS,
+        TableLayout(),
         line=lambda settings, on_change: Line(
             settings, on_change=on_change, clock=bus.clock, sleep=bus.sleep, opener=lambda _: bus
         ),
-    )  # fmt: skip
+    )
     shares: list[float] = []
     await link.open()
     drives = await link.scan(lambda share, _: shares.append(share), stations, stop_after=stop_after)
