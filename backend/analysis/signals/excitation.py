@@ -23,6 +23,8 @@ from backend.analysis.signals.ramps import ramped_periods
 
 Kind = Literal["multisine", "chirp", "prbs", "stepped_sine"]
 Spacing = Literal["log", "linear"]
+#: Of so many odd lines one is left empty, to show odd distortion; which one is drawn from this.
+_OF_ODD, _DRAWN = 4, 41
 
 
 @dataclass(frozen=True)
@@ -114,8 +116,9 @@ def choose_lines(
 ) -> IntArray:
     """Excited bins between two frequencies, at most ``count`` of them.
 
-    ``odd_only`` takes odd bins alone: even-order distortion then falls on the empty even bins
-    and odd-order distortion on the odd bins that were left out.
+    ``odd_only`` takes odd bins alone, and leaves one of every four of them empty: even-order
+    distortion then falls on the even bins and odd-order distortion on those that were left out.
+    Which one of four is drawn, and always the same (random odd multisine).
 
     Raises:
         ValueError: no bin lies between the two frequencies.
@@ -127,6 +130,10 @@ def choose_lines(
     allowed = np.arange(first, last + 1)
     if odd_only:
         allowed = allowed[allowed % 2 == 1]
+        groups = -(-allowed.size // _OF_ODD)
+        left_out = np.random.default_rng(_DRAWN).integers(0, _OF_ODD, groups)
+        places = _OF_ODD * np.arange(groups) + left_out
+        allowed = np.delete(allowed, places[places < allowed.size])
     if count is None or count >= allowed.size:
         return allowed.astype(np.int64)
     if spacing == "linear":

@@ -143,7 +143,7 @@ def _sweep_settings(request: SweepRequest) -> sweep_evaluation.SweepSettings:
     return sweep_evaluation.SweepSettings(
         request.envelope, request.kind, request.loop, request.f_min_hz, request.f_max_hz,
         request.share, request.realisations, request.base_motion, request.rated_torque_nm,
-        excitation=request.excitation,
+        excitation=request.excitation, odd_lines=request.odd_lines,
     )  # fmt: skip
 
 
