@@ -20,11 +20,10 @@ import numpy as np
 from backend.analysis.signals.arrays import FloatArray, IntArray
 from backend.analysis.signals.low_crest import low_crest_period
 from backend.analysis.signals.ramps import ramped_periods
+from backend.analysis.thresholds import excitation as threshold
 
 Kind = Literal["multisine", "chirp", "prbs", "stepped_sine"]
 Spacing = Literal["log", "linear"]
-#: Of so many odd lines one is left empty, to show odd distortion; which one is drawn from this.
-_OF_ODD, _DRAWN = 4, 41
 
 
 @dataclass(frozen=True)
@@ -130,9 +129,9 @@ def choose_lines(
     allowed = np.arange(first, last + 1)
     if odd_only:
         allowed = allowed[allowed % 2 == 1]
-        groups = -(-allowed.size // _OF_ODD)
-        left_out = np.random.default_rng(_DRAWN).integers(0, _OF_ODD, groups)
-        places = _OF_ODD * np.arange(groups) + left_out
+        groups = -(-allowed.size // threshold.OF_ODD)
+        left_out = np.random.default_rng(0).integers(0, threshold.OF_ODD, groups)
+        places = threshold.OF_ODD * np.arange(groups) + left_out
         allowed = np.delete(allowed, places[places < allowed.size])
     if count is None or count >= allowed.size:
         return allowed.astype(np.int64)
