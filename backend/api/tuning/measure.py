@@ -120,6 +120,7 @@ _PARTS: dict[str, tuple[str, ...]] = {
     "sweep-speed_loop": ("verified", "sweep"),
     "step": ("step",),
 }
+_LOOP = "sweep-speed_loop"
 
 
 def _conclude(store: MeasurementStore, files: Sequence[str], result: JobResult) -> None:
@@ -136,7 +137,9 @@ def _conclude(store: MeasurementStore, files: Sequence[str], result: JobResult) 
         for name in _PARTS.get(kind, ()) if "candidates" in result else ():
             part = part.get(name) if isinstance(part, dict) else None
         if isinstance(part, dict):
-            store.conclude(file, part)
+            verified = result.get("verified") if kind == _LOOP else None
+            verdict = verified.get("verdict") if isinstance(verified, dict) else None
+            store.conclude(file, part, verdict if isinstance(verdict, dict) else None)
 
 
 def _sweep_settings(request: SweepRequest) -> sweep_evaluation.SweepSettings:
