@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from backend.report.document import Block, Note, Table
+from backend.report.document import Block, Note, Table, Tone
 from backend.report.numbers import NONE, fixed, hertz
 from backend.report.texts import Words
 from backend.tools.autotune.result import BandInfo, IntervalInfo, VerdictInfo
@@ -22,7 +22,7 @@ def bands(verdict: VerdictInfo, words: Words) -> list[Block]:
         f"verdict.coverage.{verdict.coverage}", last=hertz(verdict.last_crossover_hz),
         gain=fixed(verdict.shown_gain_db, 1, "dB"),
     )  # fmt: skip
-    tone = "warn" if verdict.coverage == "predicted" else "plain"
+    tone: Tone = "warn" if verdict.coverage == "predicted" else "plain"
     return [Table(head, rows, (False, True, True, True)), Note(covered, tone)]
 
 

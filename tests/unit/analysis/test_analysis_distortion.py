@@ -152,7 +152,7 @@ def test_what_happens_where_the_speed_reverses_is_friction_and_elsewhere_play():
 
 
 def test_odd_lines_tell_even_and_odd_distortion_and_noise_apart() -> None:
-    """Speed is x + a·x² + b·x³ with noise. What x³ makes of it on the lines left out is computed."""
+    """Speed is x + a·x² + b·x³ with noise; what x³ puts on the lines left out is computed."""
     odd = choose_lines(5.0, 400.0, RATE / PERIOD, odd_only=True)
     rng = np.random.default_rng(11)
     found = {}
