@@ -12,9 +12,9 @@ from drivers.virtual.mechanics import MechanicsSpec, RoughTorqueSpec
 from drivers.virtual.mechanics.rough_feedback import RoughFeedbackSpec
 
 FAMILIES = ("mms7", "m6l", "r6l", "generic402")
-#: A range is drawn from, a list chosen from, anything else taken as it is. Groups of options are
-#: those of `RoughTorqueSpec` (torque), `RoughFeedbackSpec` (feedback), and of the mechanics.
-Draw = tuple[float, float] | list[float] | bool | str
+#: A range is drawn from, a list chosen from, a set taken whole, anything else as it is. Groups of
+#: options are those of `RoughTorqueSpec` (torque), `RoughFeedbackSpec` (feedback), the mechanics.
+Draw = tuple[float, float] | list[float] | frozenset[str] | bool | str
 #: One class of behaviour each: how it is drawn.
 CLASSES: dict[str, dict[str, dict[str, Draw]]] = {
     "as assumed": {},
@@ -47,7 +47,10 @@ CLASSES: dict[str, dict[str, dict[str, Draw]]] = {
     },
     "brake opens late": {"mechanics": {"brake": True}, "feedback": {"brake_opens_s": (0.1, 0.4)}},
     "load out of balance": {"mechanics": {"place_nm": (0.01, 0.1)}},
+    "608Fh alone": {"feedback": {"lacks": frozenset({"6092"})}},
 }  # fmt: skip
+#: Only a drive whose resolution the standard's objects give can lack one of them.
+_ONLY = {"608Fh alone": "generic402"}
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,7 @@ def case_of(number: int) -> Case:
     rng = np.random.default_rng(7919 * number + 13)
     kind = list(CLASSES)[number % len(CLASSES)]
     turn, place = divmod(number, len(CLASSES))
-    drive = FAMILIES[(turn + place) % len(FAMILIES)]
+    drive = _ONLY.get(kind) or FAMILIES[(turn + place) % len(FAMILIES)]
     options = {
         group: {name: _drawn(rng, given) for name, given in draws.items()}
         for group, draws in CLASSES[kind].items()
@@ -90,6 +93,8 @@ def case_of(number: int) -> Case:
 def _drawn(rng: np.random.Generator, given: Draw) -> Any:
     if isinstance(given, tuple):
         return float(rng.uniform(*given))
+    if isinstance(given, frozenset):
+        return tuple(sorted(given))
     return float(rng.choice(given)) if isinstance(given, list) else given
 
 

@@ -678,9 +678,28 @@ class distortion:
 class excitation_found:
     """`response/excitation_found.py`."""
 
-    UNLIKE = 0.05
-    """[ratio] Two passes of a period that differ by more than this share of the power are not the
-    same. Origin: 855a6a86."""
+    # UNLIKE, UNLIKE_TWICE, AS_MUCH: Two passes of a period that differ by more than this share of
+    # the power are not the same: where all later ones are as much alike, and where there are two
+    # alone.
+    UNLIKE = 0.3
+    """[ratio] Origin: tests/unit/analysis/test_foreign_response.py."""
+    UNLIKE_TWICE = 0.05
+    """[ratio] Origin: 855a6a86."""
+    AS_MUCH = 0.1
+    """[ratio] Origin: tests/unit/analysis/test_foreign_response.py."""
+    # SILENT, PARTS: An input is silent below this share of its usual size, over so many parts of
+    # the record.
+    SILENT = 0.1
+    """[ratio] Origin: tests/unit/analysis/test_foreign_response.py."""
+    PARTS = 200
+    """[count] Origin: tests/unit/analysis/test_foreign_response.py."""
+    # NO_PASS, OF_PERIOD: Two parts of passes that differ by more than this, relative to the power
+    # of each of them, are none (2 where they have nothing in common); so many parts are looked at
+    # in a period.
+    NO_PASS = 1.0
+    """[ratio] Origin: tests/unit/analysis/test_foreign_response.py."""
+    OF_PERIOD = 16
+    """[count] Origin: tests/unit/analysis/test_foreign_response.py."""
     AS_GOOD = 0.01
     """[ratio] The shortest lag whose correlation comes this near to the best one is the period.
     Origin: 855a6a86."""
@@ -699,12 +718,14 @@ class excitation_found:
     GAP = 2.5
     """[ratio] Amplitudes part into excited and not where neighbours in order differ by this factor.
     Origin: 855a6a86."""
-    # ONE_TONE, ONE_WAY: Of a chirp, one frequency holds this share of the power of each moment, and
-    # moves one way.
+    # ONE_TONE, ONE_WAY, SLOW_BINS: Of a chirp, one frequency holds this share of the power of each
+    # moment, and moves on as before. The lowest bins of a moment hold its slow motion.
     ONE_TONE = 0.6
     """[ratio] Origin: 855a6a86."""
     ONE_WAY = 0.85
     """[ratio] Origin: 855a6a86."""
+    SLOW_BINS = 3
+    """[count] Origin: tests/unit/analysis/test_foreign_response.py."""
     TRANSIENT = 4.0
     """[ratio] The first periods hold the transient while they differ so many times more than the
     later ones. Origin: 855a6a86."""
@@ -994,6 +1015,14 @@ class two_signals:
     NOT_QUITE = 0.1
     """[ratio] Of what the two are folded differently by, so much may be wrong: a drive's speed is
     not quite a filter of first order. Origin: 04cd1261."""
+
+
+class excitation:
+    """`signals/excitation.py`."""
+
+    OF_ODD = 4
+    """[count] Of so many odd lines one is left empty, to show odd distortion. Origin:
+    tests/unit/analysis/test_analysis_distortion.py."""
 
 
 class line_spectra:

@@ -86,6 +86,12 @@ def sweep(
     share: Annotated[float, typer.Option(help="excitation's share of the torque")] = 0.35,
     realisations: Annotated[int, typer.Option(help="pairs of realisations")] = 2,
     excitation: Annotated[WaveformName, typer.Option(help="signal")] = WaveformName.multisine,
+    odd_lines: Annotated[
+        bool,
+        typer.Option(
+            "--odd-lines", help="excite odd lines alone; tells noise, even and odd distortion apart"
+        ),
+    ] = False,
     rated_torque_nm: Rated = None,
     consent: Consent = False,
     out: Out = None,
@@ -99,7 +105,7 @@ def sweep(
     more: dict[str, object] = {
         "kind": kind.value, "loop": loop.value, "f_min_hz": f_min_hz, "f_max_hz": f_max_hz,
         "share": share, "realisations": realisations, "rated_torque_nm": rated_torque_nm,
-        "excitation": excitation.value,
+        "excitation": excitation.value, "odd_lines": odd_lines,
     }  # fmt: skip
 
     async def here() -> dict[str, object]:
@@ -110,7 +116,7 @@ def sweep(
         settings = sweep_evaluation.SweepSettings(
             Envelope(travel_rev, speed_rpm, torque_percent, 60.0), kind.value, loop.value,
             f_min_hz, f_max_hz, share, realisations, rated_torque_nm=rated_torque_nm,
-            excitation=excitation.value,
+            excitation=excitation.value, odd_lines=odd_lines,
         )  # fmt: skip
         async with exchanging(url, station, profile, cycle_ms, settings.envelope, consent) as (
             found,

@@ -217,13 +217,18 @@ class MeasurementStore:
         write_atomically(self.folder / name, pack(kind, drive, arrays, meta, saved, result))
         return name
 
-    def conclude(self, name: str, result: Mapping[str, object]) -> None:
+    def conclude(
+        self, name: str, result: Mapping[str, object], verdict: Mapping[str, object] | None = None
+    ) -> None:
         """Add to a file what was concluded from it, so that a later evaluation can be compared.
+
+        ``verdict`` on a tuned loop rests on other measurements as well, and is kept as it is.
 
         Raises:
             NotAllowed: no such file. StorageFailed: the disk; the file is as it was.
         """
-        self._add(self.load(name), name, {"result": result})
+        more = {} if verdict is None else {"verdict": verdict}
+        self._add(self.load(name), name, {"result": result, **more})
 
     def sign(
         self, name: str, signature: Mapping[str, object], result: Mapping[str, object]

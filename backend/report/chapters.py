@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from backend.report.document import Block, Figure, Heading, Note, Table
 from backend.report.facts import Measured
+from backend.report.loop_bands import bands
 from backend.report.numbers import (
     fixed,
     hertz,
@@ -76,6 +77,8 @@ def _sweep(measured: Measured, view: SweepView, words: Words) -> list[Block]:
         blocks += _resonances(view, words)
     if view.margins and view.kind != "mechanics":
         blocks.append(_margins(view, other, words))
+    if measured.verdict is not None:
+        blocks += bands(measured.verdict, words)
     if view.saturated_share > 0.0:
         share = fixed(view.saturated_share * 100, 1, "%")
         blocks.append(Note(words("warn.saturated", share=share), "warn"))

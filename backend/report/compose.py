@@ -22,6 +22,7 @@ from backend.report.numbers import NONE, fixed, hertz, margin, milliseconds, mom
 from backend.report.texts import Words
 from backend.report.tools import kind_title, tool_verdict
 from backend.report.views import SweepView
+from backend.tools.autotune.result import VerdictInfo
 from backend.tools.step.result import StepAnswer
 from backend.tools.tool import ToolResult
 
@@ -111,7 +112,26 @@ def _verdict(measured: Measured, words: Words) -> Note:
             return Note(f"{kind}: {words('untrusted')}", "warn")
         reported = f"{words('resonances')} {', '.join(peaks)}" if peaks else words("no_resonance")
         return Note(f"{kind}: {reported}", "good")
+    if measured.verdict is not None:
+        return _tuned_verdict(measured.verdict, view, kind, words)
     return _loop_verdict(view, kind, words)
+
+
+def _tuned_verdict(verdict: VerdictInfo, view: SweepView, kind: str, words: Words) -> Note:
+    """Of what was measured and what is predicted above it, the worse one."""
+    if not verdict.stable or verdict.contradicted:
+        return Note(words("loop.unstable", kind=kind), "fault")
+    worst = verdict.stated
+    loop = _Loop(worst.phase_margin_deg, worst.gain_margin_db, worst.ms)
+    tone, name = _judged(loop)
+    if verdict.coverage == "predicted" and tone == "good":
+        tone, name = "warn", "incomplete"
+    text = words(
+        "loop.verdict.bands", kind=kind, verdict=words(name), pm=fixed(loop.phase_deg, 0, "°"),
+        gm=fixed(loop.gain_db, 1, "dB"), ms=fixed(loop.ms, 2),
+        bw=hertz(margin(view.margins, "bandwidth_hz")),
+    )  # fmt: skip
+    return Note(text, tone)
 
 
 def _step_verdict(view: StepAnswer, kind: str, words: Words) -> Note:
@@ -148,6 +168,14 @@ class _Loop:
         return None not in (self.phase_deg, self.gain_db, self.ms)
 
 
+def _judged(loop: _Loop) -> tuple[Tone, str]:
+    """Tone and word for a loop; where a figure is missing it is not called sound."""
+    tone: Tone = "good" if loop.within(_SOUND) else "warn" if loop.within(_POOR) else "fault"
+    if tone == "good" and not loop.complete:
+        return "warn", "incomplete"
+    return tone, {"good": "sound", "warn": "close"}.get(tone, "poor")
+
+
 def _loop_verdict(view: SweepView, kind: str, words: Words) -> Note:
     found = view.margins
     if found.get("stable") is False:
@@ -157,12 +185,9 @@ def _loop_verdict(view: SweepView, kind: str, words: Words) -> Note:
     )
     if loop.phase_deg is None and loop.gain_db is None and loop.ms is None:
         return Note(words("loop.unknown", kind=kind), "warn")
-    tone: Tone = "good" if loop.within(_SOUND) else "warn" if loop.within(_POOR) else "fault"
-    verdict = words({"good": "sound", "warn": "close"}.get(tone, "poor"))
-    if tone == "good" and not loop.complete:
-        tone, verdict = "warn", words("incomplete")
+    tone, verdict = _judged(loop)
     text = words(
-        "loop.verdict", kind=kind, verdict=verdict, pm=fixed(loop.phase_deg, 0, "°"),
+        "loop.verdict", kind=kind, verdict=words(verdict), pm=fixed(loop.phase_deg, 0, "°"),
         gm=fixed(loop.gain_db, 1, "dB"), ms=fixed(loop.ms, 2),
         bw=hertz(margin(found, "bandwidth_hz")), low=hertz(margin(found, "from_hz")),
         high=hertz(margin(found, "to_hz")),

@@ -8,6 +8,7 @@ from datetime import datetime
 
 from backend.health.records import Condition
 from backend.report.views import AnyView
+from backend.tools.autotune.result import VerdictInfo
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,8 @@ class Measured:
     settings: Mapping[str, object]
     view: AnyView
     earlier: Measured | None = None
+    verdict: VerdictInfo | None = None
+    """On a tuned loop, over all frequencies; None where no tuning verified it."""
 
 
 @dataclass(frozen=True)

@@ -175,6 +175,31 @@ TEXTS: dict[str, tuple[str, str]] = {
         "{kind}：{verdict}。测量频段 {low} 至 {high}：相位裕度 {pm}，增益裕度 {gm}，"
         "Ms {ms}，带宽 {bw}。缺少的数值位于该频段之外。",
     ),
+    "loop.verdict.bands": (
+        "{kind}: {verdict}. The worse of what was measured and what is predicted above it: phase "
+        "margin {pm}, gain margin {gm}, Ms {ms}; bandwidth {bw}.",
+        "{kind}：{verdict}。取测得部分与其上预测部分中较差者：相位裕度 {pm}，增益裕度 {gm}，"
+        "Ms {ms}；带宽 {bw}。",
+    ),
+    "verdict.band": ("Margins by band", "各频段裕度"),
+    "verdict.measured": ("measured", "测得"),
+    "verdict.predicted": ("predicted", "预测"),
+    "verdict.peak": ("Largest |S|", "最大 |S|"),
+    "verdict.coverage.measured": (
+        "All crossovers lie within the measured band.",
+        "所有穿越频率均在所测频段内。",
+    ),
+    "verdict.coverage.gain_steps": (
+        "The loop may cross 0 dB up to {last}, above the measured band: it was stable with {gain} "
+        "more gain, which bounds the margins there.",
+        "回路最高可能在 {last} 穿越 0 dB，高于所测频段：增益提高 {gain} 时仍稳定，"
+        "由此限定该处的裕度。",
+    ),
+    "verdict.coverage.predicted": (
+        "The loop may cross 0 dB up to {last}, above the measured band: its margins there are "
+        "predicted only.",
+        "回路最高可能在 {last} 穿越 0 dB，高于所测频段：该处的裕度仅为预测。",
+    ),
     "loop.rule": (
         "Sound: phase margin 45° or more, gain margin 8 dB or more, Ms below 2. "
         "Not sound: below 30°, below 6 dB, or Ms above 2.5.",

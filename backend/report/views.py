@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from backend.library.measurements import BadMeasurement
+from backend.tools.autotune.result import VerdictInfo
 from backend.tools.registry import BY_KIND
 from backend.tools.tool import ToolResult
 from drivers.texts.answers import messages_in
@@ -56,6 +57,22 @@ class SweepView(View):
 
 
 AnyView = SweepView | ToolResult
+
+
+def verdict_of(kept: object) -> VerdictInfo | None:
+    """The verdict that an automatic tuning left beside its measurement; None where there is none.
+
+    Raises:
+        BadMeasurement: it is not what a tuning concludes.
+    """
+    if kept is None:
+        return None
+    try:
+        return VerdictInfo.model_validate(kept)
+    except ValidationError as error:
+        raise BadMeasurement(
+            "report.result-not-complete", tool="autotune", cause=str(error)
+        ) from error
 
 
 def view_of(tool: object, result: dict[str, object]) -> AnyView:

@@ -33,6 +33,8 @@ Structure = Literal["unknown", "motor_speed", "load_speed", "speed_loop"]
 #: Between where a load counts as compliant, medium and stiff, as for measurements of our own.
 _COMPLIANT_HZ, _MEDIUM_HZ = 80.0, 300.0
 _CLIPPED = 0.01
+#: Scatter of the written times that is worth a word, as a share of a step.
+_UNEVEN = 0.05
 
 
 @dataclass(frozen=True)
@@ -209,13 +211,14 @@ def _as_json(
             "structure": settings.structure,
             "time_unit": signals.time_unit,
             "repeated_rows": signals.repeated_rows,
+            "time_jitter": signals.jitter,
             "band_means": "another run of the same machine, 0.7 to 2 times the level",
             "empty_even": found.empty[0],
             "empty_odd": found.empty[1],
             "real_poles_hz": sorted(model.poles_hz) if model is not None else [],
         },
         "axis": axis,
-        **sentences("warnings", _warnings(found, axis), "warning"),
+        **sentences("warnings", _warnings(found, axis, signals), "warning"),
     }
 
 
@@ -275,8 +278,12 @@ def _load(found: ForeignResponse) -> LoadClass:
     return "medium" if first < _MEDIUM_HZ else "stiff"
 
 
-def _warnings(found: ForeignResponse, axis: dict[str, object] | None) -> list[Text]:
+def _warnings(
+    found: ForeignResponse, axis: dict[str, object] | None, signals: Signals
+) -> list[Text]:
     said = []
+    if signals.jitter > _UNEVEN:
+        said.append(text("import.times-scatter", share=signals.jitter))
     if found.excitation != "periodic":
         said.append(text("import.not-periodic"))
     elif found.periods_used < 4:

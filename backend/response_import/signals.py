@@ -16,6 +16,14 @@ from drivers.texts.message import text
 
 #: Steps of time may differ from their median by this share: a clock that is written in few digits.
 _JITTER = 0.1
+#: Written times may scatter by so much of a step about an even clock (standard deviation): they are
+#: those of the recorder, while the samples are even.
+_SCATTER = 0.3
+#: More alike from one step to the next, in size of the correlation, is a pattern and no scatter.
+_PATTERN = 0.5
+#: A sample is lost where the times behind a step lie so much of a step later than those before it,
+#: in the median of so many to each side.
+_LOST, _BESIDE = 0.5, 12
 #: Rates between which a recording of an axis lies.
 _SLOWEST_HZ, _FASTEST_HZ = 10.0, 10e6
 #: Factors to seconds.
@@ -34,6 +42,8 @@ class Signals:
     output_name: str
     time_unit: str
     repeated_rows: int = 0
+    jitter: float = 0.0
+    """Standard deviation of the written times from an even clock, as a share of a step."""
 
 
 def column_of(table: Table, wanted: str, use: str, name: str) -> int:
@@ -129,10 +139,11 @@ def signals_of(
         _check_rate(sample_rate_hz, name, "sample rate")
         return Signals(u, y, sample_rate_hz, table.names[first], table.names[second], "rate")
     unit = time_unit or unit_in(table.names[at])
-    rate, kept = _clock(columns[0] * TIME_UNITS[unit], name, table, at, unit)
+    same = (np.diff(u) == 0.0) & (np.diff(y) == 0.0)
+    rate, kept, jitter = _clock(columns[0] * TIME_UNITS[unit], same, name, table, at, unit)
     return Signals(
         u[kept], y[kept], rate, table.names[first], table.names[second], unit,
-        int(columns[0].size - np.count_nonzero(kept)),
+        int(columns[0].size - np.count_nonzero(kept)), jitter,
     )  # fmt: skip
 
 
@@ -192,9 +203,13 @@ def _check_rate(rate: float, name: str, what: str) -> None:
 
 
 def _clock(
-    t: FloatArray, name: str, table: Table, column: int, unit: str
-) -> tuple[float, np.ndarray]:
-    """Rate, and the rows that count: a row that repeats the time and all values counts once."""
+    t: FloatArray, same: np.ndarray, name: str, table: Table, column: int, unit: str
+) -> tuple[float, np.ndarray, float]:
+    """Rate, the rows that count, and the clock's jitter.
+
+    A row that repeats time and values (``same`` [n - 1]) counts once; one that repeats the time
+    alone has a time in few digits.
+    """
     head = table.names[column]
 
     def place(row: int) -> str:
@@ -206,7 +221,8 @@ def _clock(
         raise BadRecording(
             "import.time-column-not-rise", parameter="time", value=float(t[0]), name=name, head=head
         )
-    back = np.flatnonzero(steps < 0)
+    # Times that scatter may go back by less than a step.
+    back = np.flatnonzero(steps < -float(np.median(steps)))
     if back.size:
         row = int(back[0]) + 1
         raise BadRecording(
@@ -219,7 +235,7 @@ def _clock(
             t=t[row - 1],
             other_t=t[row],
         )
-    kept[1:] = steps > 0
+    kept[1:] = (steps != 0) | ~same
     again = np.flatnonzero(steps == 0)
     for row in again[:1]:
         if again.size > 0.01 * t.size:
@@ -240,10 +256,15 @@ def _clock(
     # A clock in few digits steps unevenly and keeps its pace.
     even = usual * np.arange(steps.size + 1)
     pace = float(np.polyfit(np.arange(even.size), t[kept], 1)[0])
-    drift = np.abs(t[kept] - np.median(t[kept] - pace * np.arange(even.size))
-                   - pace * np.arange(even.size))  # fmt: skip
-    if np.any(uneven) and float(np.max(drift)) > _JITTER * pace:
-        at = int(np.flatnonzero(uneven)[0])
+    off = (t[kept] - pace * np.arange(even.size)) / pace
+    drift = np.abs(off - np.median(off))
+    # Times scatter to and fro; a lost sample moves all that follow.
+    lost, (jitter, pattern) = _lost(off), _scatter(off)
+    wrong = lost if lost.size else np.flatnonzero(uneven)
+    if np.any(uneven) and float(np.max(drift)) > _JITTER and (
+        lost.size or jitter > _SCATTER or pattern > _PATTERN
+    ):
+        at = int(wrong[0])
         row = int(rows[at + 1])
         raise BadRecording(
             "import.ms-after-row-before",
@@ -254,7 +275,7 @@ def _clock(
             place=place(row),
             steps_ms=steps[at] * 1e3,
             usual_ms=usual * 1e3,
-            count_nonzero=int(np.count_nonzero(uneven)),
+            count_nonzero=int(wrong.size),
         )
     rate = 1.0 / pace
     _check_rate(rate, name, f"sample rate (time in {unit})")
@@ -262,4 +283,33 @@ def _clock(
     nearest = round(rate)
     if nearest and abs(rate - nearest) < 1e-5 * rate:
         rate = float(nearest)
-    return rate, kept
+    return rate, kept, jitter
+
+
+def _lost(off: FloatArray) -> np.ndarray:
+    """Steps after which the times [n], in steps from an even clock, stay later."""
+    if off.size < 2 * _BESIDE + 1:
+        return np.flatnonzero(np.abs(np.diff(off)) > _LOST)
+    windows = np.median(np.lib.stride_tricks.sliding_window_view(off, _BESIDE), axis=1)
+    # Before step i lie the times up to i, behind it those from i + 1.
+    later = windows[_BESIDE:] - windows[:-_BESIDE]
+    inner = np.flatnonzero(later > _LOST) + _BESIDE - 1
+    steps = np.diff(off)
+    # Of the steps about a lost sample it is the longest one.
+    found = set()
+    for i in inner:
+        first = max(int(i) - _BESIDE, 0)
+        found.add(first + int(np.argmax(steps[first : int(i) + _BESIDE])))
+    return np.array(sorted(found), dtype=np.int64)
+
+
+def _scatter(off: FloatArray) -> tuple[float, float]:
+    """Deviation about the median of the neighbours, as a clock may drift slowly, and its pattern:
+    the size of the correlation between one step and the next."""
+    width = min(4 * _BESIDE + 1, off.size)
+    middle = np.median(np.lib.stride_tricks.sliding_window_view(off, width), axis=1)
+    first = (width - 1) // 2
+    left = off[first : first + middle.size] - middle
+    power = float(np.sum(left**2))
+    alike = abs(float(np.sum(left[1:] * left[:-1]))) / power if power > 0.0 else 0.0
+    return float(np.std(left)), alike

@@ -37,6 +37,20 @@ from backend.analysis.thresholds import distortion as threshold
 
 
 @dataclass(frozen=True)
+class Detected:
+    """Median motion on empty lines between odd ones, relative to that on the lines around.
+
+    What an even or an odd nonlinearity makes of odd lines falls on even or on odd ones (Pintelon &
+    Schoukens, section 4.3). ``even`` and ``odd`` are without the ``noise`` that is left in the mean
+    over the periods, and with friction.
+    """
+
+    even: float
+    odd: float
+    noise: float
+
+
+@dataclass(frozen=True)
 class Distortion:
     """Motion on empty bins relative to that on the lines around; noise is taken out.
 
@@ -49,6 +63,7 @@ class Distortion:
     level: float = 0.0
     before: float = 0.0
     at_reversals: float = 0.0
+    detected: Detected | None = None
 
     @property
     def play(self) -> bool:
@@ -110,6 +125,10 @@ def distortion(
         return np.asarray(np.sqrt(np.maximum(pure, 0.0)) / around)
 
     share, plain = relative(rest), relative(before)
+    detected = None
+    if np.all(e.lines % 2 == 1):
+        powers = (np.mean(before, axis=0), np.mean(noise, axis=0))
+        detected = _detected(empty, powers[0], powers[1], around)
     upper = f >= threshold.LOWEST * path.sample_rate_hz
     if np.count_nonzero(upper) < threshold.FEWEST:
         return none
@@ -117,13 +136,29 @@ def distortion(
     highest = f >= threshold.HIGHEST * path.sample_rate_hz
     if not _stands_out(rest, noise, upper, threshold.ABOVE_NOISE):
         if not _stands_out(rest, noise, highest, threshold.FAR_ABOVE_NOISE):
-            return Distortion(np.asarray(np.interp(frf.frequency_hz, f, share)))
+            quiet = np.asarray(np.interp(frf.frequency_hz, f, share))
+            return Distortion(quiet, detected=detected)
         upper = highest
     return Distortion(
         # What lies below the first empty bins is shown by all of them, not by one beside a valley.
         np.asarray(np.interp(frf.frequency_hz, f, share, left=float(np.median(share)))),
-        float(np.median(share[upper])), float(np.median(plain[upper])), _ratio(falls),
+        float(np.median(share[upper])), float(np.median(plain[upper])), _ratio(falls), detected,
     )  # fmt: skip
+
+
+def _detected(
+    empty: IntArray, power: FloatArray, noise: FloatArray, around: FloatArray
+) -> Detected | None:
+    """Of powers [bins]; None where too few bins of either kind are empty."""
+    shares = []
+    for parity in (0, 1):
+        use = empty % 2 == parity
+        if np.count_nonzero(use) < threshold.FEWEST:
+            return None
+        # Single bins scatter like a power of two degrees of freedom, whose median is no mean.
+        pure = neighbour_mean(power[use] - noise[use], threshold.REACH) / around[use] ** 2
+        shares.append(float(np.sqrt(max(float(np.median(pure)), 0.0))))
+    return Detected(shares[0], shares[1], float(np.sqrt(np.median(noise / around**2))))
 
 
 def _stands_out(

@@ -6,7 +6,7 @@ A periodic input is the better instrument by far (Pintelon & Schoukens, *System 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -20,7 +20,7 @@ Excited = Literal["periodic", "chirp", "noise"]
 
 @dataclass(frozen=True)
 class ExcitationFound:
-    """``lines`` are excited DFT bins of one period (periodic), else empty.
+    """``period_samples`` and ``periods`` of a periodic one, which lies in ``stretch`` (samples).
 
     ``repeat_error`` is the share of the input's power that its periods do not have in common.
     """
@@ -29,18 +29,78 @@ class ExcitationFound:
     period_samples: int = 0
     periods: int = 0
     repeat_error: float = 0.0
+    stretch: slice = field(default_factory=lambda: slice(None))
 
 
 def find_excitation(signal: FloatArray) -> ExcitationFound:
     """Kind of excitation of an input [n] that is not constant."""
-    u = signal - np.mean(signal)
-    period = _period(u)
-    if period:
-        count = u.size // period
-        rows = u[u.size - count * period :].reshape(count, period)
-        error = float(np.mean(np.var(rows, axis=0)) / np.mean(u**2))
-        return ExcitationFound("periodic", period, count, error)
-    return ExcitationFound("chirp" if _is_chirp(u) else "noise")
+    whole = slice(0, signal.size)
+    for stretch in dict.fromkeys(((whole.start, whole.stop), _loud(signal - np.median(signal)))):
+        u = signal[slice(*stretch)]
+        u = u - np.mean(u)
+        period = _period(u)
+        if period:
+            first, end = _passes(u, period)
+            count = (end - first) // period
+            if count < threshold.LEAST_PERIODS:
+                continue
+            rows = u[end - count * period : end].reshape(count, period)
+            error = float(np.mean(np.var(rows, axis=0)) / np.mean(rows**2))
+            found = slice(stretch[0] + first, stretch[0] + end)
+            return ExcitationFound("periodic", period, count, error, found)
+    return ExcitationFound("chirp" if _is_chirp(signal - np.mean(signal)) else "noise")
+
+
+def _loud(u: FloatArray) -> tuple[int, int]:
+    """First sample and end of the longest stretch that is not silent.
+
+    A recording usually begins before its excitation, and ends after it.
+    """
+    width = max(u.size // threshold.PARTS, 8)
+    power = np.convolve(u**2, np.full(width, 1.0 / width), "same")
+    loud = power > threshold.SILENT**2 * float(np.percentile(power, 90))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], loud, [False]]).astype(np.int8)))
+    begins, ends = edges[::2], edges[1::2]
+    if not begins.size:
+        return 0, u.size
+    longest = int(np.argmax(ends - begins))
+    first, end = int(begins[longest]), int(ends[longest])
+    # Half of what is looked at together may be silent at an end.
+    half = width // 2 + 1
+    return first + half * (first > 0), end - half * (end < u.size)
+
+
+def _silent_before_or_after(silent: BoolArray) -> BoolArray:
+    """Which are silent with nothing but silence before or behind them."""
+    loud = np.flatnonzero(~silent)
+    outside = np.ones(silent.size, dtype=bool)
+    if loud.size:
+        outside[loud[0] : loud[-1] + 1] = False
+    return outside
+
+
+def _passes(u: FloatArray, period: int) -> tuple[int, int]:
+    """First sample and end of the stretch in which every period is followed by the same one."""
+    width = max(period // threshold.OF_PERIOD, 1)
+
+    def around(power: FloatArray) -> FloatArray:
+        steps = np.cumsum(np.concatenate([[0.0], power]))
+        return np.asarray((steps[width:] - steps[:-width]) / width)
+
+    both = 0.5 * around(u[period:] ** 2 + u[:-period] ** 2)
+    least = threshold.SILENT**2 * float(np.mean(u**2))
+    alike = (around((u[period:] - u[:-period]) ** 2) < threshold.NO_PASS * both) | (both < least)
+    alike &= ~_silent_before_or_after(both < least)
+    if np.all(alike):
+        return 0, u.size
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], alike, [False]]).astype(np.int8)))
+    begins, ends = edges[::2], edges[1::2]
+    if not begins.size:
+        return 0, 0
+    longest = int(np.argmax(ends - begins))
+    first, end = int(begins[longest]), int(ends[longest]) - 1 + width + period
+    # A part at an end may be silent in half of it.
+    return first + width * (first > 0), end - width * (end < u.size)
 
 
 def _period(u: FloatArray) -> int:
@@ -72,16 +132,26 @@ def _period(u: FloatArray) -> int:
         return 0
     values = alike[first + peaks]
     best = float(np.max(values))
-    if best < 1.0 - threshold.UNLIKE:
-        return 0
-    return int(first + peaks[np.flatnonzero(values >= best - threshold.AS_GOOD)[0]])
+    period = int(first + peaks[np.flatnonzero(values >= best - threshold.AS_GOOD)[0]])
+    # Noise in a recorded input takes as much from every pass; what is alike by chance is so once.
+    later = alike[2 * period : n - period + 1 : period]
+    again = (
+        later.size > 0
+        and float(np.min(later)) > best - threshold.AS_MUCH
+        and best > 1.0 - threshold.UNLIKE
+    )
+    return period if again or best > 1.0 - threshold.UNLIKE_TWICE else 0
 
 
 def _is_chirp(u: FloatArray) -> bool:
-    """One tone at a time whose frequency moves one way, perhaps several times."""
+    """One tone at a time whose frequency keeps moving as it does, perhaps to and fro.
+
+    Beside it there may be a slow motion that keeps the axis from sticking.
+    """
     width = max(u.size // 64, 64)
     _f, _t, parts = scipy.signal.stft(u, nperseg=width, noverlap=width // 2, boundary=None)
     power = np.abs(parts) ** 2
+    power[: threshold.SLOW_BINS] = 0.0
     total = np.sum(power, axis=0)
     loud = total > 0.05 * np.max(total)
     if np.count_nonzero(loud) < 8:
@@ -90,10 +160,10 @@ def _is_chirp(u: FloatArray) -> bool:
     near = [float(np.sum(power[max(k - 3, 0) : k + 4, i])) for i, k in enumerate(top)]
     single = float(np.median(np.asarray(near)[loud] / total[loud]))
     way = np.diff(top[loud].astype(float))
-    moves = way[way != 0]
+    moves = np.sign(way[way != 0])
     if single < threshold.ONE_TONE or moves.size < 4:
         return False
-    return bool(max(np.mean(moves > 0), np.mean(moves < 0)) > threshold.ONE_WAY)
+    return bool(np.mean(moves[1:] == moves[:-1]) > threshold.ONE_WAY)
 
 
 def transient_periods(*spectra: FloatArray) -> int:

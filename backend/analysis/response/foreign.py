@@ -119,7 +119,8 @@ def evaluate(
             raise NoResponse(code, value=float(signal[0]))
     found = find_excitation(signal_in)
     if found.kind == "periodic":
-        lines = _by_periods(signal_in, signal_out, sample_rate_hz, found.period_samples)
+        rows = (signal_in[found.stretch], signal_out[found.stretch])
+        lines = _by_periods(*rows, sample_rate_hz, found.period_samples)
     else:
         lines = _by_window(signal_in, signal_out, sample_rate_hz)
     lines = _cut(lines, band_hz)

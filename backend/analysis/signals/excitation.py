@@ -20,6 +20,7 @@ import numpy as np
 from backend.analysis.signals.arrays import FloatArray, IntArray
 from backend.analysis.signals.low_crest import low_crest_period
 from backend.analysis.signals.ramps import ramped_periods
+from backend.analysis.thresholds import excitation as threshold
 
 Kind = Literal["multisine", "chirp", "prbs", "stepped_sine"]
 Spacing = Literal["log", "linear"]
@@ -114,8 +115,9 @@ def choose_lines(
 ) -> IntArray:
     """Excited bins between two frequencies, at most ``count`` of them.
 
-    ``odd_only`` takes odd bins alone: even-order distortion then falls on the empty even bins
-    and odd-order distortion on the odd bins that were left out.
+    ``odd_only`` takes odd bins alone, and leaves one of every four of them empty: even-order
+    distortion then falls on the even bins and odd-order distortion on those that were left out.
+    Which one of four is drawn, and always the same (random odd multisine).
 
     Raises:
         ValueError: no bin lies between the two frequencies.
@@ -127,6 +129,10 @@ def choose_lines(
     allowed = np.arange(first, last + 1)
     if odd_only:
         allowed = allowed[allowed % 2 == 1]
+        groups = -(-allowed.size // threshold.OF_ODD)
+        left_out = np.random.default_rng(0).integers(0, threshold.OF_ODD, groups)
+        places = threshold.OF_ODD * np.arange(groups) + left_out
+        allowed = np.delete(allowed, places[places < allowed.size])
     if count is None or count >= allowed.size:
         return allowed.astype(np.int64)
     if spacing == "linear":

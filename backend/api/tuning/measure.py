@@ -120,6 +120,7 @@ _PARTS: dict[str, tuple[str, ...]] = {
     "sweep-speed_loop": ("verified", "sweep"),
     "step": ("step",),
 }
+_LOOP = "sweep-speed_loop"
 
 
 def _conclude(store: MeasurementStore, files: Sequence[str], result: JobResult) -> None:
@@ -136,14 +137,16 @@ def _conclude(store: MeasurementStore, files: Sequence[str], result: JobResult) 
         for name in _PARTS.get(kind, ()) if "candidates" in result else ():
             part = part.get(name) if isinstance(part, dict) else None
         if isinstance(part, dict):
-            store.conclude(file, part)
+            verified = result.get("verified") if kind == _LOOP else None
+            verdict = verified.get("verdict") if isinstance(verified, dict) else None
+            store.conclude(file, part, verdict if isinstance(verdict, dict) else None)
 
 
 def _sweep_settings(request: SweepRequest) -> sweep_evaluation.SweepSettings:
     return sweep_evaluation.SweepSettings(
         request.envelope, request.kind, request.loop, request.f_min_hz, request.f_max_hz,
         request.share, request.realisations, request.base_motion, request.rated_torque_nm,
-        excitation=request.excitation,
+        excitation=request.excitation, odd_lines=request.odd_lines,
     )  # fmt: skip
 
 

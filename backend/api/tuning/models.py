@@ -40,6 +40,11 @@ class SweepRequest(TuneLimits):
         description="a stepped sine is one tone after another, beside a closed loop, in one pair "
         "of realisations; the others excite the whole band at once",
     )
+    odd_lines: bool = Field(
+        default=False,
+        description="of mechanics by a multisine: odd lines alone, which tell noise, even and odd "
+        "distortion apart",
+    )
 
 
 class ExcitationInfo(Message):

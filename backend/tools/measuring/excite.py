@@ -48,10 +48,13 @@ class Sequence:
     base: FloatArray | None = None
 
 
-def band_for(sample_rate_hz: float, f_min_hz: float, f_max_hz: float | None) -> Band:
+def band_for(
+    sample_rate_hz: float, f_min_hz: float, f_max_hz: float | None, *, odd_only: bool = False
+) -> Band:
     """Lines up to 0.4 of the sample rate, and never above 1200 Hz unless asked for."""
     top = min(0.4 * sample_rate_hz, 1200.0) if f_max_hz is None else f_max_hz
-    return Band(f_min_hz, min(top, 0.4 * sample_rate_hz), 200 if sample_rate_hz < 2000 else 300)
+    count = 200 if sample_rate_hz < 2000 else 300
+    return Band(f_min_hz, min(top, 0.4 * sample_rate_hz), count, odd_only)
 
 
 def _speed_of(samples: npt.NDArray[np.floating], rate: float, inertia: float) -> FloatArray:

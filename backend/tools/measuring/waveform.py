@@ -35,11 +35,12 @@ _ORDERS = range(7, 16)
 
 @dataclass(frozen=True)
 class Band:
-    """Which lines: lowest and highest frequency, at most how many."""
+    """Which lines: lowest and highest frequency, at most how many; ``odd_only``: odd ones alone."""
 
     f_min_hz: float
     f_max_hz: float
     count: int = 200
+    odd_only: bool = False
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,9 @@ def grid(waveform: Waveform, rate_hz: float, band: Band) -> Grid:
     if waveform == "prbs":
         order = int(np.clip(np.log2(period + 1), _ORDERS[0], _ORDERS[-1]))
         period = 2**order - 1
-    lines = choose_lines(band.f_min_hz, band.f_max_hz, rate_hz / period, count=band.count)
+    lines = choose_lines(
+        band.f_min_hz, band.f_max_hz, rate_hz / period, count=band.count, odd_only=band.odd_only
+    )
     # Its own bin carries the base motion.
     return Grid(waveform, rate_hz, period, lines[lines > 1])
 

@@ -14,6 +14,7 @@ from backend.analysis.mechanics.identify import Identification, identify_with_pa
 from backend.analysis.mechanics.mechanical_model import MechanicalModel
 from backend.analysis.mechanics.resonance import Resonance
 from backend.analysis.mechanics.resonance_table import resonance_table
+from backend.analysis.response.distortion import Detected
 from backend.analysis.response.frf import Frf, Quantity, Record, estimate_periodic
 from backend.analysis.response.reported import (
     charged,
@@ -85,6 +86,8 @@ class SweepSettings:
     inertia_deviation: float | None = None
     pairs_before: int = 0
     """Of a loop's own response: pairs of realisations whose phases are not to be used again."""
+    odd_lines: bool = False
+    """Of mechanics by a multisine: odd lines alone, which tell even and odd distortion apart."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +116,8 @@ class SweepResult:
     speed_filter_hz: float | None = None
     hold: Hold | None = None
     """What the drive tells of its loops, or what the recording showed of them."""
+    detected: Detected | None = None
+    """Noise and distortion on the lines that were left empty, where they were."""
 
 
 def evaluate(
@@ -232,6 +237,7 @@ def _mechanics(
         current_bandwidth_hz=path.current_bandwidth_hz,
         speed_filter_hz=path.response_bandwidth_hz,
         hold=path.hold,
+        detected=found.distortion.detected if found.distortion is not None else None,
     )
 
 
@@ -327,6 +333,8 @@ def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tupl
     rate, (_low, highest) = found.corrected.sample_rate_hz, found.corrected.valid_band_hz
     if found.trusted and highest < MODEL_SHARE * rate * (1.0 - 1e-6):
         said.append(text("sweep.folded-back", highest_hz=highest))
+    if found.distortion is not None and (apart := found.distortion.detected) is not None:
+        said.append(text("sweep.distortion-detected", **asdict(apart)))
     if found.torque_dropped:
         said.append(_DROPPED)
     if found.by_place is not None:
@@ -501,6 +509,7 @@ def as_json(result: SweepResult) -> dict[str, object]:
         "coulomb_nm": frf.coulomb_nm,
         "noise": _numbers(frf.noise),
         "distortion": _numbers(frf.distortion),
+        "detected": asdict(result.detected) if result.detected is not None else None,
         "periods_used": frf.periods_used,
         "periods_dropped": frf.periods_dropped,
         "direct": {

@@ -54,6 +54,8 @@ def check(settings: SweepSettings) -> None:
         raise OutOfRange("sweep.realisations-possible", value=settings.realisations, limit="1…8")
     if settings.excitation == "stepped" and settings.loop == "none":
         raise OutOfRange("sweep.stepped-sine-lasts-too")
+    if settings.odd_lines and (settings.excitation != "multisine" or settings.kind != "mechanics"):
+        raise OutOfRange("sweep.odd-lines-need-multisine", parameter="odd_lines", value=True)
     if settings.f_min_hz < 3.0:
         raise OutOfRange("sweep.lowest-line-must-lie", value=settings.f_min_hz, limit="3 Hz")
     if settings.f_max_hz is not None and settings.f_max_hz < 4 * settings.f_min_hz:
@@ -146,7 +148,9 @@ async def drive_limit_percent(axis: Axis) -> float:
 
 def sequences_of(setup: Setup, settings: SweepSettings) -> tuple[excite.Sequence, ...]:
     """The excitation; too little room becomes the user's error."""
-    band = excite.band_for(setup.rate, settings.f_min_hz, settings.f_max_hz)
+    band = excite.band_for(
+        setup.rate, settings.f_min_hz, settings.f_max_hz, odd_only=settings.odd_lines
+    )
     try:
         if settings.kind != "mechanics":
             position = settings.kind == "position_loop"

@@ -60,7 +60,9 @@ async def preview(axis: Axis, settings: SweepSettings, sample_rate_hz: float) ->
         travel_rad=envelope.travel_rev * _TURN,
     )
     inertia = settings.inertia_kgm2 or facts.drive_inertia_kgm2 or 1e-4
-    band = excite.band_for(sample_rate_hz, settings.f_min_hz, settings.f_max_hz)
+    band = excite.band_for(
+        sample_rate_hz, settings.f_min_hz, settings.f_max_hz, odd_only=settings.odd_lines
+    )
     try:
         sequences = await asyncio.to_thread(
             _sequences, settings, sample_rate_hz, band, room, inertia

@@ -52,6 +52,14 @@ class ModelInfo(_Part):
     modes: tuple[ModeInfo, ...]
 
 
+class DetectedInfo(_Part):
+    """Median motion on lines that were left empty, as a share of that on the lines around."""
+
+    even: float = Field(description="on even lines, without noise")
+    odd: float = Field(description="on odd lines, without noise")
+    noise: float = Field(description="scatter of the mean over the periods")
+
+
 class SweepAnswer(ToolResult):
     """The response [lines] with its deviations, and what is read from it.
 
@@ -82,6 +90,7 @@ class SweepAnswer(ToolResult):
     coulomb_nm: float | None
     noise: tuple[float | None, ...]
     distortion: tuple[float | None, ...]
+    detected: DetectedInfo | None = Field(description="None where not only odd lines were excited")
     periods_used: int
     periods_dropped: int
     direct: DirectResponse

@@ -149,3 +149,37 @@ def test_what_happens_where_the_speed_reverses_is_friction_and_elsewhere_play():
     assert fast.at_reversals < 1.0
     assert fast.play
     assert not slow.play
+
+
+def test_odd_lines_tell_even_and_odd_distortion_and_noise_apart() -> None:
+    """Speed is x + a·x² + b·x³ with noise; what x³ puts on the lines left out is computed."""
+    odd = choose_lines(5.0, 400.0, RATE / PERIOD, odd_only=True)
+    rng = np.random.default_rng(11)
+    found = {}
+    for name, (square, cube, noise) in {
+        "even": (0.3, 0.0, 1e-4), "odd": (0.0, 0.3, 1e-4), "noise": (0.0, 0.0, 0.05),
+    }.items():  # fmt: skip
+        records = []
+        for number in range(4):
+            e = multisine(
+                sample_rate_hz=RATE, period_samples=PERIOD, lines=odd, realisation=number // 2,
+                invert=bool(number % 2), iterations=20, periods=4,
+            )  # fmt: skip
+            one = e.one_period / np.std(e.one_period)
+            moved = one + square * one**2 + cube * one**3
+            whole = np.resize(np.roll(moved, e.first_sample % PERIOD), e.samples.size)
+            whole = whole + rng.normal(0.0, noise, e.samples.size) if noise else whole
+            records.append(Record(e, whole, None))
+        frf = estimate_periodic(tuple(records), PATH, "torque_mode")
+        found[name] = distortion(tuple(records), PATH, "torque_mode", frf).detected
+    assert all(each is not None for each in found.values())
+    for name in ("even", "odd"):
+        other = "odd" if name == "even" else "even"
+        assert getattr(found[name], name) > 0.05
+        assert getattr(found[name], other) < 0.01
+        assert found[name].noise < 0.001
+    spectrum = np.abs(np.fft.rfft(one + 0.3 * one**3))
+    left_out = np.setdiff1d(np.arange(odd[0], odd[-1] + 1, 2), odd)
+    expected = np.sqrt(np.mean(spectrum[left_out] ** 2) / np.mean(spectrum[odd] ** 2))
+    assert found["odd"].odd == pytest.approx(expected, rel=0.2)
+    assert found["noise"].noise > 2 * max(found["noise"].even, found["noise"].odd) > 0.0

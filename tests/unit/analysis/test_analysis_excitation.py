@@ -148,3 +148,15 @@ def test_scaled_is_what_the_bus_object_can_carry():
 def test_impossible_multisines_are_refused(kwargs, message):
     with pytest.raises(ValueError, match=message):
         multisine(sample_rate_hz=1000.0, period_samples=1000, **kwargs)
+
+
+def test_odd_lines_leave_even_and_some_odd_ones_to_tell_distortion() -> None:
+    """Of every four odd lines one is empty, not always the same place, and every time the same."""
+    lines = choose_lines(5.0, 400.0, 1.0, odd_only=True)
+    assert np.all(lines % 2 == 1)
+    odd = np.arange(5, 400, 2)
+    left_out = np.setdiff1d(odd, lines)
+    groups = (left_out - 5) // 2 // 4
+    assert groups.tolist() == list(range(49)) or groups.tolist() == list(range(50))
+    assert np.unique((left_out - 5) // 2 % 4).size == 4
+    assert np.array_equal(lines, choose_lines(5.0, 400.0, 1.0, odd_only=True))

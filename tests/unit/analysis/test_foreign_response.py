@@ -171,3 +171,44 @@ def test_what_supports_no_answer_says_why() -> None:
         evaluate(np.ones(5000), rng.normal(size=5000), RATE)
     with pytest.raises(NoResponse, match="too-short"):
         evaluate(rng.normal(size=100), rng.normal(size=100), RATE)
+
+
+TIMES = np.arange(round(10 * RATE)) / RATE
+DRAWN = np.random.default_rng(4)
+EXCITED = {
+    "before and after nothing": (
+        np.concatenate([np.zeros(5000), multisine(RATE, LINES, 1.0, 10, 1), np.zeros(7500)]),
+        "periodic",
+    ),
+    "noise of 10 dB": (
+        multisine(RATE, LINES, 1.0, 10, 1)
+        + DRAWN.normal(size=TIMES.size) * 0.32 * np.std(multisine(RATE, LINES, 1.0, 1, 1)),
+        "periodic",
+    ),
+    "ramped in": (multisine(RATE, LINES, 1.0, 10, 1) * np.minimum(TIMES, 1.0), "periodic"),
+    "chirp beside a slow motion": (
+        chirp(TIMES, 5.0, 10.0, 400.0) + 2.0 * np.sin(np.pi * TIMES), "chirp",
+    ),
+    "chirp up and down": (
+        np.concatenate([(c := chirp(TIMES[:12500], 5.0, 5.0, 400.0)), c[::-1]]), "chirp",
+    ),
+    "noise": (DRAWN.normal(size=TIMES.size), "noise"),
+    "filtered noise": (np.convolve(DRAWN.normal(size=TIMES.size), np.ones(40), "same"), "noise"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", EXCITED)
+def test_the_excitation_is_found_as_recordings_hold_it(name: str) -> None:
+    signal, kind = EXCITED[name]
+    assert find_excitation(signal).kind == kind
+
+
+def test_a_recording_with_silence_around_is_evaluated_by_its_periods() -> None:
+    bench = Bench(noise=1e-4)
+    torque = EXCITED["before and after nothing"][0]
+    u, y = bench.record(torque, RATE, 5)
+    found = evaluate(u, y, RATE)
+    assert found.method == "periods"
+    assert 7 <= found.periods_used <= 9
+    plain = evaluate(*bench.record(multisine(RATE, LINES, 1.0, 10, 1), RATE, 5), RATE)
+    assert np.median(np.abs(np.log(found.response / plain.response))) < 0.005

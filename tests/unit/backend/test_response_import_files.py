@@ -194,6 +194,26 @@ def test_a_clock_in_few_digits_keeps_its_rate() -> None:
     assert found.sample_rate_hz == 2500.0
 
 
+def test_times_that_scatter_are_those_of_an_even_clock() -> None:
+    """A recorder that is late by up to a half step writes the samples of an even clock."""
+    late = T + np.random.default_rng(2).uniform(0.0, 0.0005, N)
+    found = read(text(time=late))
+    assert found.sample_rate_hz == pytest.approx(1000.0, rel=1e-4)
+    assert found.signal_in.size == N
+    # Uniform over half a step: 0.5/sqrt(12).
+    assert found.jitter == pytest.approx(0.144, rel=0.1)
+    gone = np.delete(np.arange(N), 230)
+    lines = text(time=late).splitlines()
+    with pytest.raises(BadRecording, match=r"line 23[1-3].*lost"):
+        read("\n".join([lines[0], *(lines[1 + i] for i in gone)]))
+
+
+def test_a_repeated_row_counts_once_and_a_repeated_time_does_not_take_a_sample() -> None:
+    lines = text().splitlines()
+    check(read("\n".join([*lines[:200], lines[199], *lines[200:]])))
+    assert read(_with(200, 0, "0.199")).signal_in.size == N
+
+
 def test_units_make_nm_and_rad_per_second() -> None:
     scale = scale_of("permille", "rpm", 2.39, None, None)
     assert scale.factor_in == pytest.approx(0.00239)

@@ -87,6 +87,7 @@ import_time-goes-back = { $name }, { $place }: the time { QUOTED($head) } goes b
     .remedy = cut the file there: it holds several recordings, or another column is meant
 import_time-stands-rows = { $name }, { $place }: the time { QUOTED($head) } stands at { NUM($t, format: ".9g") } s ({ $again_size } rows do)
     .remedy = export the time with more digits, or give the sample rate instead
+import_times-scatter = the written times scatter by { NUM($share, format: ".0%") } of a sample about an even clock: the samples are taken as even, and where they are not, the band holds it as noise
 import_too-much-memory = { $name } needs more memory than is given to an import
     .remedy = export a shorter part of the recording, or fewer columns
 import_unit-not-known = the { $use } unit { QUOTED($value) } is not known

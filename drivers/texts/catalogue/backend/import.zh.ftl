@@ -87,6 +87,7 @@ import_time-goes-back = { $name }，{ $place }：时间 { QUOTED($head) } 从 { 
     .remedy = 请在该处截断文件：其中有多段记录，或应为其他列
 import_time-stands-rows = { $name }，{ $place }：时间 { QUOTED($head) } 停在 { NUM($t, format: ".9g") } s（共 { $again_size } 行）
     .remedy = 请以更多位数导出时间，或改为给出采样率
+import_times-scatter = 记录的时间在均匀时钟附近散布，为采样间隔的 { NUM($share, format: ".0%") }：按均匀采样处理；若采样实际不均匀，误差带将其作为噪声计入
 import_too-much-memory = { $name } 需要的内存超过导入所给的内存
     .remedy = 请导出较短的记录，或较少的列
 import_unit-not-known = { $use } 单位 { QUOTED($value) } 未知

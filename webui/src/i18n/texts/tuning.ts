@@ -57,6 +57,10 @@ export const tuning = {
   'sweep.shareHelp': ['of the torque limit', '占转矩限制'],
   'sweep.count': ['Realisations', '重复次数'],
   'sweep.countHelp': ['more take longer and show less noise', '越多越慢，噪声越小'],
+  'sweep.odd': [
+    'Odd lines alone: tells noise, even and odd distortion apart',
+    '仅奇数谱线：区分噪声、偶次失真和奇次失真',
+  ],
   'sweep.base': [
     'Move slowly to and fro meanwhile, so that friction does not hold the axis',
     '测量时缓慢往复运动，以克服静摩擦',

@@ -30,7 +30,9 @@ export function SweepForm({ drive, way }: { drive: string; way: Measurable }) {
   const [share, setShare] = useRemembered(drive, 'sweep.share', 35)
   const [count, setCount] = useRemembered(drive, 'sweep.count', 2)
   const [base, setBase] = useState(true)
+  const [odd, setOdd] = useState(false)
   const stepped = signal === 'stepped'
+  const canOdd = signal === 'multisine' && kind === 'mechanics'
   const limits = useLimits(drive)
   const start = useAction()
   const obstacle = useObstacle(drive)
@@ -49,6 +51,7 @@ export function SweepForm({ drive, way }: { drive: string; way: Measurable }) {
           share: share / 100,
           realisations: count,
           base_motion: base,
+          odd_lines: odd && canOdd,
           cycle_ms: way.cycleMs,
         }
   const go = () =>
@@ -156,6 +159,13 @@ export function SweepForm({ drive, way }: { drive: string; way: Measurable }) {
           checked={base}
           onChange={(event) => setBase(event.currentTarget.checked)}
         />
+        {canOdd && (
+          <Checkbox
+            label={t('sweep.odd')}
+            checked={odd}
+            onChange={(event) => setOdd(event.currentTarget.checked)}
+          />
+        )}
       </details>
       <details onToggle={(event) => setPreviewed(event.currentTarget.open)}>
         <summary>{t('excite.title')}</summary>
