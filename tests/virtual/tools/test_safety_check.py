@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from backend.axis.cyclic_mode import keeping_mode
+from backend.axis.restoring import RestoreFailed
 from backend.tools.safety_check.result import SafetyResult
 from backend.tools.safety_check.run import TOOL, plan_of
 from backend.tools.safety_check.settings import SafetySettings
@@ -62,10 +63,11 @@ def braked(bench: DirectBench) -> None:
 
 
 async def recorded(
-    bench: DirectBench, act: Callable[[DirectBench], None] | None, asked: SafetySettings = ASKED
-) -> SafetyResult:
+    bench: DirectBench, act: Callable[[DirectBench], None] | None, asked: SafetySettings = ASKED,
+    kept: dict[str, Any] | None = None,
+) -> SafetyResult:  # fmt: skip
     """As a job does it; what is read from files is the same."""
-    kept: dict[str, Any] = {}
+    kept = {} if kept is None else kept
 
     def keep(name: str, arrays: Mapping[str, object], meta: dict[str, object]) -> None:
         kept.update(arrays=arrays, meta=meta)
@@ -99,9 +101,12 @@ async def test_safe_torque_off_coasts_by_friction_alone() -> None:
 
 
 async def test_torque_that_remains_is_told_as_danger() -> None:
-    """What keeps it running against its friction is torque."""
+    """What keeps it running against its friction is torque. Its mode cannot be restored then."""
+    kept: dict[str, Any] = {}
     async with direct(stiff(), drive="r6l") as bench:
-        found = await recorded(bench, told_only)
+        with pytest.raises(RestoreFailed):
+            await recorded(bench, told_only, kept=kept)
+    found = TOOL.reevaluate(kept["arrays"], kept["meta"])
     assert found.verdict == "torque_remains"
     assert found.torque_free_ms is None
     assert "Put the axis out of use" in TOOL.text(TOOL.report(found).notes[0].name)
