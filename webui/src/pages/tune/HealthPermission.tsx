@@ -148,7 +148,13 @@ function Permit({
           value={at}
           onChange={(event) => setAt(event.currentTarget.value)}
         />
-        <NumberField label={t('health.lasts')} value={lasts} min={1} max={366} onChange={setLasts} />
+        <NumberField
+          label={t('health.lasts')}
+          value={lasts}
+          min={1}
+          max={366}
+          onChange={setLasts}
+        />
         <NumberField label={t('health.pause')} value={pause} min={5} onChange={setPause} />
         <TextInput
           label={t('health.permittedBy')}

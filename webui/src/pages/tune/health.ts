@@ -59,7 +59,9 @@ export function toneOf(finding: HealthFinding): 'warn' | 'good' | 'info' {
 }
 
 /** What is known of an axis against its baseline, in one word. */
-export function stateOf(health: AxisHealth): 'none' | 'wrong' | 'changed' | 'suspected' | 'same' | 'open' {
+export function stateOf(
+  health: AxisHealth,
+): 'none' | 'wrong' | 'changed' | 'suspected' | 'same' | 'open' {
   if (!health.baseline) return 'none'
   if (!health.baseline.intact) return 'wrong'
   if (health.changed > 0) return 'changed'
