@@ -14,6 +14,7 @@ from profiles.importer.esi import EsiDevice, open_esi, read_device
 from profiles.importer.export_eds import export_dcf, export_eds
 from profiles.importer.files import import_file, write_profile
 from profiles.importer.report import Finding, ImportFailed, ImportReport
+from profiles.importer.texts import decode_text, decode_xml
 
 __all__ = [
     "ConfiguredValue",
@@ -26,6 +27,8 @@ __all__ = [
     "ImportReport",
     "ImportedProfile",
     "build_profile",
+    "decode_text",
+    "decode_xml",
     "describe_dictionary",
     "export_dcf",
     "export_eds",

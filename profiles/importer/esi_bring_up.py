@@ -138,7 +138,12 @@ class _Reader:
     def _mode(self, mode: Element) -> ClockMode:
         name = tidy(text_of(child(mode, "Name"))) or "unnamed"
         place = f"{self._file}: OpMode {name[:20]}"
-        activate = whole_number(text_of(child(mode, "AssignActivate")) or "0", place, self._report)
+        word = text_of(child(mode, "AssignActivate")) or "0"
+        if re.fullmatch(r"0\d{3}", word):
+            # Register bits: nobody writes them in decimal with a leading zero.
+            self._report.repaired(place, f"AssignActivate {word} was read as hexadecimal")
+            word = f"#x{word}"
+        activate = whole_number(word, place, self._report)
         if activate is None or not 0 <= activate <= 0xFFFF:
             self._report.left_out(place, "AssignActivate is no number of 16 bits")
             activate = 0
