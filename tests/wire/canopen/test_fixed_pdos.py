@@ -95,9 +95,9 @@ async def test_an_axis_moves_by_its_fixed_pdos(cob_access: str) -> None:
     profile = eds(cob_access)
     async with linked(profile, profile) as (bench, link):
         bench.device.write(0x6060, 0, b"\x01")
-        before = [bytes([pdo.kind]) for pdo in bench.node.objects.pdos]
+        before = [bytes([pdo.kind]) for pdo in bench.node._objects.pdos]
         blocks = await _run(link, [CONTROL, TARGET])
-        used = {pdo.identifier for pdo in bench.node.objects.pdos if pdo.valid}
+        used = {pdo.identifier for pdo in bench.node._objects.pdos if pdo.valid}
         assert {0x205, 0x1A5, 0x1C7} <= used
         # What the PDO holds beside the signals keeps the drive's own value.
         assert bench.device.value(0x6060) == 1
@@ -110,7 +110,7 @@ async def test_an_axis_moves_by_its_fixed_pdos(cob_access: str) -> None:
         assert "axis/6060:00" in blocks[-1].channels
         await cyclic.drive_to(5, State.SWITCH_ON_DISABLED)
         await cyclic.stop()
-        assert [bytes([pdo.kind]) for pdo in bench.node.objects.pdos] == before
+        assert [bytes([pdo.kind]) for pdo in bench.node._objects.pdos] == before
 
 
 async def test_a_drive_that_holds_something_else_than_its_file_is_refused() -> None:
@@ -126,7 +126,7 @@ async def test_a_drive_that_holds_something_else_than_its_file_is_refused() -> N
     async with linked(other, known) as (bench, link):
         with pytest.raises(NotAllowed, match="60FF0020h"):
             await _run(link, [CONTROL, TARGET])
-        assert {pdo.kind for pdo in bench.node.objects.pdos} == {255}
+        assert {pdo.kind for pdo in bench.node._objects.pdos} == {255}
         await asyncio.sleep(0)
 
 
