@@ -17,7 +17,7 @@ _REGISTERS = ("Reg0400", "Reg0410", "Reg0420")
 
 
 def read(data: bytes) -> File:
-    device = ElementTree.fromstring(data).find("Descriptions/Devices/Device")  # noqa: S314 - ours
+    device = ElementTree.fromstring(data).find("Descriptions/Devices/Device")
     assert device is not None
     return File(device)
 

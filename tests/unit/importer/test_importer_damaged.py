@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from datetime import datetime
+
 import pytest
 
 from profiles.check import check
-from profiles.importer import ImportFailed, import_file
+from profiles.importer import ImportFailed, export_eds, import_file
 from profiles.importer.build import ImportedProfile
 from profiles.schema import PdoIdentifier
 from tests.unit.importer.test_importer_oddities import (
@@ -220,3 +222,16 @@ def test_a_pdo_holds_as_many_entries_as_its_count_says() -> None:
     assert rx.identifier == PdoIdentifier(cob_id=0x200, of_node=True)
     assert rx.identifier.at(5) == 0x205
     assert tx.identifier == PdoIdentifier(cob_id=0x181, of_node=False, fixed=True)
+
+
+def test_pdos_are_exported_as_they_were_imported() -> None:
+    text = eds(
+        OBJECTS,
+        pdo_of(0, [0x60400010, 0x607A0020, 0x60400010], "$NODEID+0x220", 2),
+        pdo_of(0x400, [0x60410010], "0x181", 1, "const"),
+    )
+    before = taken(text, "a.eds").profile
+    again = taken(export_eds(before, datetime(2020, 1, 2), "a.eds").encode(), "a.eds").profile
+    assert again.pdo == before.pdo
+    assert again.pdo is not None
+    assert [each.entries for each in again.pdo.sets] == [("6040:00", "607A:00"), ("6041:00",)]
