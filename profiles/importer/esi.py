@@ -161,6 +161,10 @@ def open_esi(data: bytes, name: str, report: ImportReport) -> EsiFile:
         raise ImportFailed(
             f"{name} is a network configuration (ENI), not a device description (ESI)"
         )
+    if root.tag in ("EtherCATDict", "EtherCATModule"):
+        raise ImportFailed(
+            f"{name} is a part of an ESI file ({root.tag}): choose the file with <EtherCATInfo>"
+        )
     if root.tag != "EtherCATInfo":
         raise ImportFailed(f"{name} is not an ESI file: its root is <{root.tag[:40]}>")
     devices = children(child(child(root, "Descriptions"), "Devices"), "Device")
@@ -223,7 +227,16 @@ def _contents(file: EsiFile, element: Element) -> tuple[list[DescribedEntry], li
                     seen.add(entry.key)
                     entries.append(entry)
     if not described:
-        file.report.noted(file.name, "there is no object dictionary: only what the PDOs name")
+        elsewhere = [
+            text_of(child(profile, "DictionaryFile")) for profile in children(element, "Profile")
+        ]
+        named = tidy(", ".join(filter(None, elsewhere)), 80)
+        file.report.noted(
+            file.name,
+            f"its objects are in another file, {named}: only what the PDOs name"
+            if named
+            else "there is no object dictionary: only what the PDOs name",
+        )
     pdos = []
     for part in parts:
         pdo_reader = PdoReader(file.name, file.report, entries, seen, part)

@@ -99,6 +99,15 @@ def test_numbers_as_some_makers_write_them() -> None:
     assert profile.by_key["2001:00"].default_raw == -5
 
 
+def test_objects_that_lie_in_another_file() -> None:
+    text = WHOLE.replace("<Dictionary>", "<DictionaryFile>axis.xml</DictionaryFile><Other>")
+    imported = taken(text.replace("</Dictionary>", "</Other>").encode(), "x.xml")
+    assert "another file, axis.xml" in findings(imported)
+    assert set(imported.profile.by_key) == {"6040:00", "6041:00", "6064:00", "607A:00"}
+    with pytest.raises(ImportFailed, match="a part of an ESI file"):
+        import_file(b"<EtherCATDict/>", "axis.xml")
+
+
 # Modules --------------------------------------------------------------------------------------
 
 
