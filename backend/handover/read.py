@@ -155,7 +155,9 @@ def _init_commands(root: Element, profile: Profile, slave: int | None) -> Iterat
         # CiA 301: 1 is a download, 2 an upload; tools that count the other way give data with it.
         if ccs is not None and number(ccs, place) != _CCS_DOWNLOAD and not data:
             continue
-        transitions = [(each.text or "").strip() for each in command.findall("Transition")]
+        transitions = [
+            (each.text or "").strip(" <>\r\n\t") for each in command.findall("Transition")
+        ]
         upward = [each for each in transitions if each in _UPWARD] or transitions
         index = number(command.findtext("Index"), place)
         subindex = number(command.findtext("SubIndex"), place)

@@ -45,6 +45,12 @@ def test_lists_in_the_encoding_of_their_country(encoding: str, comment: str) -> 
     assert writes(declared.encode(encoding)) == TAKEN
 
 
+def test_a_transition_as_twincat_shows_a_command_of_the_file() -> None:
+    text = mailbox(LIMIT).replace(">PS<", ">&lt;PS&gt;<")
+    (write,) = read_list(f"<EtherCATMailbox>{text}</EtherCATMailbox>".encode(), MMS7).writes
+    assert (write.key, write.transition) == ("6072:00", "PS")
+
+
 def test_a_namespace_changes_nothing() -> None:
     assert writes(f'<EtherCATMailbox xmlns="urn:x">{mailbox(LIMIT)}</EtherCATMailbox>') == TAKEN
 

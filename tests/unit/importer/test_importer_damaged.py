@@ -99,6 +99,17 @@ def test_numbers_as_some_makers_write_them() -> None:
     assert profile.by_key["2001:00"].default_raw == -5
 
 
+def test_init_commands_as_tools_of_masters_write_them() -> None:
+    commands = (
+        "<Mailbox><CoE><InitCmds><InitCmd><Transition>&lt;PS&gt;</Transition><Index>#x6060</Index>"
+        "<SubIndex>0</SubIndex><Data>08</Data></InitCmd></InitCmds></CoE></Mailbox>"
+    )
+    rules = taken(WHOLE.replace("</Device>", f"{commands}</Device>").encode(), "x.xml").profile
+    assert rules.bring_up is not None
+    (command,) = rules.bring_up.init_commands
+    assert (command.transition, command.index, command.data) == ("PS", 0x6060, "08")
+
+
 def test_objects_that_lie_in_another_file() -> None:
     text = WHOLE.replace("<Dictionary>", "<DictionaryFile>axis.xml</DictionaryFile><Other>")
     imported = taken(text.replace("</Dictionary>", "</Other>").encode(), "x.xml")
