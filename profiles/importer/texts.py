@@ -36,7 +36,7 @@ def decode_text(data: bytes, name: str, report: ImportReport) -> str:
         if data.startswith(mark):
             return data[len(mark) :].decode(encoding, "replace")
     for zero, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
-        if data[zero : zero + 1] == b"\0" and 0 < data[1 - zero] < 0x80:
+        if len(data) > 1 and data[zero] == 0 and 0 < data[1 - zero] < 0x80:
             report.repaired(name, "UTF-16 without a byte order mark")
             return data.decode(encoding, "replace")
     try:
