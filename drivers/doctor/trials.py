@@ -144,6 +144,12 @@ def _clock_then_cycle(cause: Cause, profile: Profile) -> Iterator[Trial]:
     yield from _longer_cycle(cause, profile)
 
 
+def _clock_then_contents(cause: Cause, profile: Profile) -> Iterator[Trial]:
+    """Where the drive does not say why: what files get wrong most often."""
+    yield from _other_clock(cause, profile)
+    yield from _own_contents(cause, profile)
+
+
 _Rule = Callable[[Cause, Profile], Iterator[Trial]]
 _BY_CAUSE: dict[str, _Rule] = {
     "assignment_locked": _own_assignment,
@@ -158,6 +164,8 @@ _BY_CAUSE: dict[str, _Rule] = {
     "sync0_unsteady": _longer_cycle,
     "cycle_refused": _clock_then_cycle,
     "watchdog_refused": _usual_watchdog,
+    "makers_code": _clock_then_contents,
+    "unknown": _clock_then_contents,
     "can_mapping_refused": _own_contents,
     "can_bus_full": _longer_cycle,
     "can_outputs_late": _longer_cycle,

@@ -68,11 +68,14 @@ def test_one_setting_differs_in_each_trial() -> None:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "code", ["supply_low", "cable", "drive_fault", "station_silent", "unknown"]
-)
+@pytest.mark.parametrize("code", ["supply_low", "cable", "drive_fault", "station_silent"])
 def test_what_no_setting_changes_is_not_tried(code: str) -> None:
     assert of(code, profile(clock_modes=MODES)) == []
+
+
+def test_a_code_of_the_maker_tells_nothing_so_clocks_and_contents_are_tried() -> None:
+    settings = {setting for setting, _, _ in of("makers_code", servo_profile())}
+    assert settings == {"bring_up.clock_modes", "pdo.remappable"}
 
 
 def test_no_more_than_some_trials_and_none_twice() -> None:

@@ -39,7 +39,7 @@ def _as_remappable(profile: Profile) -> Profile:
 @pytest.mark.parametrize(
     ("name", "setting", "after"),
     [
-        ("shifted_clock", "bring_up.clock_modes", "0330h"),
+        ("two_pulses", "bring_up.clock_modes", "0700h"),
         ("two_each_way", "pdo.remappable", "false"),
     ],
 )
