@@ -94,7 +94,7 @@ class _Bus:
         self.attached: list[Profile] = []
         self.running = False
         self.cycles: list[float] = []
-        self.cyclic = self
+        self.cyclic = self.doctor = self
 
     def attach(self, _station: int, known: Profile) -> None:
         assert not self.running
