@@ -406,6 +406,18 @@ class PdoPart(Frozen):
     bits: int = Field(ge=1, le=64 * 8)
 
 
+class PdoIdentifier(Frozen):
+    """The CAN identifier (COB-ID) of a PDO as the maker delivers it."""
+
+    cob_id: int = Field(ge=1, le=0x7FF, description="with `of_node` the node-ID is added")
+    of_node: bool
+    fixed: bool = Field(default=False, description="14xxh:01 or 18xxh:01 cannot be written")
+
+    def at(self, node: int) -> int:
+        """The identifier of a node."""
+        return (self.cob_id + node if self.of_node else self.cob_id) & 0x7FF
+
+
 class PdoSet(Frozen):
     """One PDO: its mapping object and default contents as ``key`` list."""
 
@@ -422,6 +434,9 @@ class PdoSet(Frozen):
     mandatory: bool = False
     exclude: tuple[int, ...] = Field(
         default=(), description="PDOs that cannot be assigned together with this one"
+    )
+    identifier: PdoIdentifier | None = Field(
+        default=None, description="CANopen: the COB-ID as delivered"
     )
     source: str
 

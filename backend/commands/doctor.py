@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Annotated, Any
 
@@ -13,9 +14,11 @@ from backend.commands.printing import print_text, words_of
 from backend.commands.session import opened, run, show_progress
 from backend.station.matching import match_profiles
 from drivers.doctor.diagnosis import Cause
+from drivers.doctor.trials import trials
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import Address, CyclicSignal, Link
 from profiles import load_profile
+from profiles.schema import Profile as ProfileOf
 
 _INPUTS = ((0x6041, "UINT16"), (0x6064, "INT32"))
 _OUTPUTS = ((0x6040, "UINT16"),)
@@ -28,6 +31,9 @@ def doctor(
     profile: Profile = None,
     as_json: Json = False,
     server: Server = None,
+    try_settings: Annotated[
+        bool, typer.Option("--try", help="try other settings of the bring-up, each undone")
+    ] = False,
 ) -> None:
     """Why a drive does not reach Operational. Nothing moves.
 
@@ -36,13 +42,16 @@ def doctor(
     """
 
     async def work() -> bool:
-        if at := server_for(url, server):
+        at = server_for(url, server)
+        if at and try_settings:
+            raise NotAllowed("command.doctor-tries-alone", value=url)
+        if at:
             results = await _by_server(at, url, station)
         else:
             async with opened(url) as link:
                 if link.doctor is None:
                     raise NotAllowed("command.doctor-knows-not", value=url)
-                results = await _here(link, station, profile)
+                results = await _here(link, station, profile, try_settings=try_settings)
         _show(results, as_json=as_json)
         return all(each["reached"] for each in results)
 
@@ -59,7 +68,9 @@ async def _by_server(at: str, url: str, station: int | None) -> list[dict[str, A
         return list(answer.json())
 
 
-async def _here(link: Link, station: int | None, profile: str | None) -> list[dict[str, Any]]:
+async def _here(
+    link: Link, station: int | None, profile: str | None, *, try_settings: bool
+) -> list[dict[str, Any]]:
     found = {each.station: each for each in await link.scan(show_progress, None)}
     results = []
     # A station that was named and not found is examined all the same: that is the question.
@@ -69,8 +80,40 @@ async def _here(link: Link, station: int | None, profile: str | None) -> list[di
         chosen = load_profile(profile) if profile else best
         if chosen is not None:
             link.attach(number, chosen)
-        results.append(await examined(link, number))
+        cause, result = await _examined(link, number)
+        if try_settings and cause and chosen is not None:
+            result["trials"] = await tried(link, number, chosen, cause)
+        results.append(result)
     return results
+
+
+async def tried(
+    link: Link, station: int, profile: ProfileOf, causes: Sequence[Cause]
+) -> list[dict[str, Any]]:
+    """Each setting by itself until the station reaches Operational; then all is as it was.
+
+    The exchange has ended and the drive is back in Pre-Operational after each trial, and the
+    profile that was attached before is attached again.
+    """
+    found = []
+    for trial in trials(causes, profile):
+        link.attach(station, trial.profile)
+        try:
+            _, result = await _examined(link, station, trial.cycle_factor)
+        finally:
+            link.attach(station, profile)
+        found.append(
+            {
+                "setting": trial.setting,
+                "before": trial.before,
+                "after": trial.after,
+                "reached": result["reached"],
+                "refusal": result["refusal"],
+            }
+        )
+        if result["reached"]:
+            break
+    return found
 
 
 async def examined(link: Link, station: int) -> dict[str, Any]:
@@ -79,6 +122,12 @@ async def examined(link: Link, station: int) -> dict[str, Any]:
     Raises:
         NotAllowed: the bus has no doctor, or no cyclic exchange.
     """
+    return (await _examined(link, station))[1]
+
+
+async def _examined(
+    link: Link, station: int, cycle_factor: int = 1
+) -> tuple[tuple[Cause, ...], dict[str, Any]]:
     cyclic = link.cyclic
     if cyclic is None or link.doctor is None:
         raise NotAllowed("command.doctor-knows-not", value=link.url)
@@ -86,7 +135,7 @@ async def examined(link: Link, station: int) -> dict[str, Any]:
     inputs = [CyclicSignal(station, Address(i, 0, k), f"{i:04X}") for i, k in _INPUTS]  # type: ignore[arg-type]
     outputs = [CyclicSignal(station, Address(i, 0, k), f"{i:04X}") for i, k in _OUTPUTS]  # type: ignore[arg-type]
     try:
-        await cyclic.configure(inputs, outputs, _CYCLE_S[link.kind])
+        await cyclic.configure(inputs, outputs, _CYCLE_S[link.kind] * cycle_factor)
         await cyclic.start()
     except DriveError as error:
         refusal = error
@@ -95,7 +144,7 @@ async def examined(link: Link, station: int) -> dict[str, Any]:
     finally:
         if refusal is None:
             await cyclic.stop()
-    return {
+    return result.causes, {
         "station": station,
         "reached": result.reached,
         "refusal": None if refusal is None else refusal.message,
@@ -133,3 +182,18 @@ def _show(results: list[dict[str, Any]], *, as_json: bool) -> None:
                     line += words_of("printed.should-be", expected=str(fact["expected"]))
                 print(line)
             print_text("printed.cause-remedy", remedy=str(cause["remedy"]))
+        _show_trials(each.get("trials"))
+
+
+def _show_trials(tried_settings: list[dict[str, Any]] | None) -> None:
+    if tried_settings is None:
+        return
+    if not tried_settings:
+        print_text("printed.nothing-to-try")
+    for trial in tried_settings:
+        facts = {name: str(trial[name]) for name in ("setting", "before", "after")}
+        if trial["reached"]:
+            print_text("printed.trial-reaches", **facts)
+        else:
+            refusal = trial["refusal"] or words_of("printed.not-operational")
+            print_text("printed.trial-does-not", refusal=str(refusal), **facts)

@@ -30,6 +30,7 @@ from profiles.importer import (
     ImportedProfile,
     ImportFailed,
     export_eds,
+    export_esi,
     import_file,
     write_profile,
 )
@@ -236,6 +237,19 @@ def export_description(
     """Write a profile's objects as a CANopen EDS file."""
     profile = load_profile(drive)
     write_atomically(out, export_eds(profile, datetime.now(), out.name).encode("utf-8"))
+    print_text("printed.written", file=str(out))
+
+
+@app.command("export-esi")
+@reporting_errors
+def export_slave_information(
+    drive: str, out: Annotated[Path, typer.Argument(help="the ESI file to write")]
+) -> None:
+    """Write a profile's objects and bring-up as an EtherCAT ESI file."""
+    profile = load_profile(drive)
+    if profile.link("ethercat") is None:
+        raise NotAllowed("command.no-ethercat-profile", value=drive)
+    write_atomically(out, export_esi(profile))
     print_text("printed.written", file=str(out))
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Literal, Protocol
 
+from backend.handover.listed import ControllerList, Listed
 from backend.handover.model import (
     Consequence,
     StartupWrite,
@@ -16,7 +17,6 @@ from backend.handover.model import (
     rank,
     write_of,
 )
-from backend.handover.read import ControllerList, Listed
 from backend.motion.classes import motion_of
 from drivers.codec import decode, encode, size_of
 from drivers.errors import DriveError
@@ -46,6 +46,8 @@ _OVERWRITES: dict[Consequence, str] = {
 }
 #: On the way up, with the mailbox working (ETG.1000.6); empty where the format states none.
 _STATES = ("IP", "PS", "SO", "")
+#: Objects that set the process data up, which every list writes (ETG.1000.6 clause 5.6.7).
+_PDO_OBJECTS = (range(0x1600, 0x1800), range(0x1A00, 0x1C00), range(0x1C12, 0x1C14))
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,13 +215,16 @@ def diagnose(profile: Profile, listed: ControllerList) -> tuple[Finding, ...]:
         parameter = profile.by_key.get(write.key)
 
         note = partial(_noted, found, write)
-        if write.key in seen:
+        # A list of PDOs or of their objects is emptied, filled and given its length at last.
+        fills_pdo = any(write.index in each for each in _PDO_OBJECTS)
+        if write.key in seen and not fills_pdo:
             note("twice", before=seen[write.key])
         seen.setdefault(write.key, write.place)
         if write.transition not in _STATES:
             note("state", transition=write.transition[:10])
         if parameter is None:
-            note("unknown", title=profile.title)
+            if not fills_pdo:
+                note("unknown", title=profile.title)
             continue
         _check(profile, parameter, write, note)
         place = rank(profile, parameter)

@@ -15,6 +15,7 @@ from functools import partial
 from drivers.canopen import frames
 from drivers.canopen.busload import BusLoad
 from drivers.canopen.drive_setup import DriveSetup, ReadObject, WriteObject
+from drivers.canopen.fixed_pdo import FixedPdo
 from drivers.canopen.frames import Frame
 from drivers.canopen.images import CONTROL_WORD, Images
 from drivers.canopen.pdo import PdoPlan, plan_within_load
@@ -57,6 +58,7 @@ class CanopenCyclic:
         clock: LoopClock | None = None,
     ) -> None:
         self.load: BusLoad | None = None
+        self._fixed_pdos: dict[int, tuple[FixedPdo, ...]] = {}
         self.dc = None
         self.left_over: tuple[tuple[CyclicSignal, str], ...] = ()
         """Signals of the last `configure` that are not exchanged, and why."""
@@ -107,6 +109,10 @@ class CanopenCyclic:
         else:
             self._without_cyclic_modes.add(station)
 
+    def take_pdos(self, station: int, fixed: Sequence[FixedPdo]) -> None:
+        """PDOs of the drive that it does not let be mapped anew."""
+        self._fixed_pdos[station] = tuple(fixed)
+
     def speak(self, station: int, dialect: Dialect) -> None:
         """How the drive takes its commands; by SDO all the same where it has no cyclic mode."""
         self._dialects[station] = dialect
@@ -141,7 +147,9 @@ class CanopenCyclic:
             )
         by_sdo = [s for s in outputs if self._by_sdo(s.station)]
         cyclic = [s for s in outputs if not self._by_sdo(s.station)]
-        planned = plan_within_load(inputs, cyclic, cycle_s, self._settings.bitrate)
+        planned = plan_within_load(
+            inputs, cyclic, cycle_s, self._settings.bitrate, self._fixed_pdos
+        )
         why = "the drive has no cyclic mode: it is commanded by SDO"
         self.left_over = (*planned.left_over, *((s, why) for s in by_sdo))
         if not planned.pdos:

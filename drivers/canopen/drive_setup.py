@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from drivers.canopen.pdo import INVALID, PdoPlan, SdoWrite, set_up
+from drivers.canopen.fixed_pdo import FixedPdo
+from drivers.canopen.pdo import INVALID, SYNCHRONOUS, PdoPlan, SdoWrite, set_up
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
 from drivers.motion.interpolation import interpolation_period
 
@@ -39,7 +40,10 @@ class DriveSetup:
                 if number not in used:
                     self._silence(station, 0x1800 + number)
         for pdo in pdos:
-            self._map(pdo)
+            if pdo.fixed is None:
+                self._map(pdo)
+            else:
+                self._take_over(pdo, pdo.fixed)
 
     def guard(self, station: int) -> bool:
         """Let the drive watch our heartbeat; False where it has no consumer (1016h)."""
@@ -116,6 +120,68 @@ class DriveSetup:
                 pdo_number=pdo.number + 1,
                 cause=refusal.text,
             ) from refusal
+
+    def _take_over(self, pdo: PdoPlan, fixed: FixedPdo) -> None:
+        """Use a PDO as the drive has it; only identifier and kind may be changed.
+
+        Raises:
+            NotAllowed: it holds something else than its file says, or cannot be used with SYNC.
+        """
+        station = pdo.station
+        held = self._held(station, pdo.mapping)
+        same = len(held) == len(fixed.words) and all(
+            have == want or (want is None and have & 0xFF == 8 * size)
+            for have, want, (_, size) in zip(held, fixed.words, fixed.entries, strict=False)
+        )
+        if not same:
+            raise NotAllowed(
+                "canopen.fixed-pdo-differs",
+                drive=f"node {station}",
+                parameter=f"{pdo.mapping:04X}:00",
+                node=station,
+                pdo_number=pdo.number + 1,
+                held=", ".join(f"{word:08X}h" for word in held) or "0",
+            )
+        cob = int.from_bytes(self._read(station, pdo.communication, 1), "little")
+        kind = self._read(station, pdo.communication, 2)
+        wanted = pdo.cob_id | cob & _PDO_FLAGS
+        synchronous = bytes([SYNCHRONOUS])
+        if (cob, kind) == (wanted, synchronous):
+            return
+        closed = (cob | INVALID).to_bytes(4, "little")
+        opens = self._tried(station, SdoWrite(pdo.communication, 1, closed))
+        # Outputs of another kind act as soon as they arrive; inputs would come when they like.
+        needs_kind = kind != synchronous and pdo.direction == "tx"
+        kept = self._tried(station, SdoWrite(pdo.communication, 2, synchronous))
+        if opens:
+            opens = self._tried(
+                station, SdoWrite(pdo.communication, 1, wanted.to_bytes(4, "little"))
+            )
+        elif cob == wanted:
+            opens = True
+        if not opens or (needs_kind and not kept):
+            raise NotAllowed(
+                "canopen.fixed-pdo-without-sync",
+                drive=f"node {station}",
+                parameter=f"{pdo.communication:04X}:{1 if not opens else 2:02d}",
+                node=station,
+                pdo_number=pdo.number + 1,
+            )
+
+    def _held(self, station: int, mapping: int) -> list[int]:
+        count = self._read(station, mapping, 0)[0]
+        return [
+            int.from_bytes(self._read(station, mapping, n), "little")
+            for n in range(1, min(count, 8) + 1)
+        ]
+
+    def _tried(self, station: int, write: SdoWrite) -> bool:
+        """`_change`, and whether the drive took it."""
+        try:
+            self._change(station, write)
+        except Rejected:
+            return False
+        return True
 
     def _remember(self, pdo: PdoPlan, cob: bytes) -> None:
         """The list is undone from its end: invalid first, then the mapping, then valid again."""

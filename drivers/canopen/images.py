@@ -68,18 +68,16 @@ class Images:
         taken: list[str] = []
         given: list[str] = []
         for pdo in pdos:
-            start = 0
             names, slots = (taken, self.inputs) if pdo.direction == "tx" else (given, self.outputs)
-            for signal in pdo.signals:
+            for signal, start in pdo.placed():
                 slot = Slot(pdo.cob_id, start, signal.address.type, len(names))
                 key = (signal.station, signal.address.index or 0, signal.address.subindex)
                 slots[key] = slot
                 names.append(signal.channel)
-                start += slot.size
             if pdo.direction == "tx":
-                self.lengths[pdo.cob_id] = start
+                self.lengths[pdo.cob_id] = pdo.size
             else:
-                self.frames[pdo.cob_id] = bytearray(start)
+                self.frames[pdo.cob_id] = bytearray(pdo.size)
         self.channels = (*taken, *given)
         self.values = [0] * len(taken)
 

@@ -21,6 +21,7 @@ from drivers.canopen.bus import BUS
 from drivers.canopen.channel import SdoChannel
 from drivers.canopen.cyclic import CanopenCyclic
 from drivers.canopen.doctor import Examiner
+from drivers.canopen.fixed_pdo import fixed_pdos
 from drivers.canopen.frames import HEARTBEAT, SDO_ANSWER, SDO_REQUEST, Frame
 from drivers.canopen.lss.access import LssAccess
 from drivers.canopen.lss.codes import ANSWER as LSS_ANSWER
@@ -143,6 +144,7 @@ class CanopenLink:
         self._profiles[station] = profile
         self._cyclic.set_modes(station, profile.supported_modes)
         self._cyclic.speak(station, dialect_of(profile))
+        self._cyclic.take_pdos(station, fixed_pdos(profile, station))
 
     def unreachable(self, station: int, address: Address) -> Text | None:
         """See `drivers.link.Link.unreachable`; SDO transfers carry every object."""

@@ -6,11 +6,13 @@ Source: CiA 301 v4.2.0 clauses 7.5.2.35 to 7.5.2.38 (PDO parameters) and 7.2.2 (
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 from drivers.canopen.busload import LIMIT, BusLoad, bus_load, require_room
+from drivers.canopen.fixed_pdo import FixedPdo, chosen
 from drivers.canopen.frames import RPDO, TPDO
 from drivers.codec import size_of
 from drivers.link import CyclicSignal
@@ -19,21 +21,25 @@ MAX_ENTRIES = 4
 """Entries per PDO that every drive takes: DS_C has only subindices 1 to 4 (003:432-475)."""
 
 INVALID = 0x80000000
-_SYNCHRONOUS = 1
+SYNCHRONOUS = 1
 
 
 @dataclass(frozen=True, slots=True)
 class PdoPlan:
-    """One PDO of one node: number 0 to 3, identifier, and the signals in order."""
+    """One PDO of one node: number from 0 on, identifier, and the signals in order."""
 
     station: int
     direction: Literal["rx", "tx"]
     number: int
     signals: tuple[CyclicSignal, ...]
+    fixed: FixedPdo | None = None
+    """What the drive holds there, where it does not let the contents be changed."""
 
     @property
     def cob_id(self) -> int:
-        """Identifier of the pre-defined connection set."""
+        """Identifier of the pre-defined connection set, or the drive's own of a fixed PDO."""
+        if self.fixed is not None:
+            return self.fixed.cob_id
         return (RPDO if self.direction == "rx" else TPDO)[self.number] + self.station
 
     @property
@@ -49,7 +55,20 @@ class PdoPlan:
     @property
     def size(self) -> int:
         """Bytes."""
+        if self.fixed is not None:
+            return self.fixed.size
         return sum(size_of(s.address.type) or 0 for s in self.signals)
+
+    def placed(self) -> Iterator[tuple[CyclicSignal, int]]:
+        """Each signal with the byte at which it begins."""
+        starts = (
+            {(a.index, a.subindex): start for a, start in self.fixed.starts()} if self.fixed else {}
+        )
+        at = 0
+        for signal in self.signals:
+            place = (signal.address.index, signal.address.subindex)
+            yield signal, starts.get(place, at)
+            at += size_of(signal.address.type) or 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,10 +81,13 @@ class SdoWrite:
 
 
 def plan(
-    inputs: Sequence[CyclicSignal], outputs: Sequence[CyclicSignal]
+    inputs: Sequence[CyclicSignal],
+    outputs: Sequence[CyclicSignal],
+    fixed: Mapping[int, Sequence[FixedPdo]] = MappingProxyType({}),
 ) -> tuple[tuple[PdoPlan, ...], tuple[CyclicSignal, ...]]:
     """Distribute signals over four PDOs of 8 bytes per node and direction, in the order given.
 
+    ``fixed`` has the PDOs of stations that cannot be mapped anew: those are used as they are.
     Returns the PDOs and the signals that found no room (or are not mappable at all).
     """
     pdos: list[PdoPlan] = []
@@ -77,6 +99,12 @@ def plan(
     for direction, signals in directions:
         for station in sorted({s.station for s in signals}):
             own = [s for s in signals if s.station == station]
+            given = [each for each in fixed.get(station, ()) if each.direction == direction]
+            if given:
+                taken, rest = chosen(given, own)
+                left += rest
+                pdos += [PdoPlan(station, direction, f.number, each, f) for f, each in taken]
+                continue
             groups, rest = _pack(own)
             left += rest
             pdos += [PdoPlan(station, direction, n, tuple(g)) for n, g in enumerate(groups)]
@@ -101,6 +129,7 @@ def plan_within_load(
     outputs: Sequence[CyclicSignal],
     cycle_s: float,
     bitrate: int,
+    fixed: Mapping[int, Sequence[FixedPdo]] = MappingProxyType({}),
 ) -> LoadedPlan:
     """As `plan`, leaving out the less important signals while the bus would be too full.
 
@@ -113,7 +142,7 @@ def plan_within_load(
     kept_in, kept_out = list(inputs), list(outputs)
     dropped: list[tuple[CyclicSignal, str]] = []
     while True:
-        pdos, left = plan(kept_in, kept_out)
+        pdos, left = plan(kept_in, kept_out, fixed)
         sizes = [p.size for p in pdos]
         if not pdos:
             load = None
@@ -168,7 +197,7 @@ def set_up(pdo: PdoPlan, flags: int = 0) -> list[SdoWrite]:
     identifier = pdo.cob_id | flags
     return [
         SdoWrite(pdo.communication, 1, struct.pack("<I", identifier | INVALID)),
-        SdoWrite(pdo.communication, 2, bytes([_SYNCHRONOUS])),
+        SdoWrite(pdo.communication, 2, bytes([SYNCHRONOUS])),
         SdoWrite(pdo.mapping, 0, b"\0"),
         *(
             SdoWrite(pdo.mapping, n, struct.pack("<I", entry))

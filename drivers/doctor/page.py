@@ -25,6 +25,12 @@ state, port counters, the assigned process data, 1C32h, 603Fh and 1018h; of a CA
 frames of the bus, boot-up, heartbeat, emergencies, its PDO identifiers and those of the other
 nodes, 1000h, 1005h, 1018h, 603Fh and 6041h.
 
+`servodeck doctor BUS_URL --station 1 --try` goes on where a setting of this program may be the
+cause: the assignment or contents of the process data, the refused command of the maker's file,
+AssignActivate, the watchdog, or the cycle. It changes one setting at a time, at most four, and
+takes the drive up again. Each is undone before the next, also the one that works: what it names
+is then set in the profile by hand. It opens the bus itself, so no server may hold it.
+
 The frames of the last minute are behind *Frames of the last minute* on the same page, and by
 `servodeck bus record BUS_URL --out FILE.pcapng`; every support bundle has them.
 

@@ -12,8 +12,10 @@ from profiles.importer.dictionary import describe_dictionary
 from profiles.importer.eds import read_eds
 from profiles.importer.esi import EsiDevice, open_esi, read_device
 from profiles.importer.export_eds import export_dcf, export_eds
+from profiles.importer.export_esi import export_esi
 from profiles.importer.files import import_file, write_profile
 from profiles.importer.report import Finding, ImportFailed, ImportReport
+from profiles.importer.texts import decode_text, decode_xml
 
 __all__ = [
     "ConfiguredValue",
@@ -26,9 +28,12 @@ __all__ = [
     "ImportReport",
     "ImportedProfile",
     "build_profile",
+    "decode_text",
+    "decode_xml",
     "describe_dictionary",
     "export_dcf",
     "export_eds",
+    "export_esi",
     "import_file",
     "is_dcf",
     "open_esi",

@@ -343,6 +343,7 @@ def _pdo_spec(
                     sync_manager=pdo.sync_manager,
                     mandatory=pdo.mandatory,
                     exclude=pdo.exclude,
+                    identifier=pdo.identifier,
                     source=pdo.source,
                 )
             )

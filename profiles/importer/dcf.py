@@ -3,21 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from profiles.importer.eds import MAX_BYTES, device_identity, object_values
+from profiles.importer.eds import MAX_BYTES, identity_of
+from profiles.importer.eds_sections import (
+    COMPACT,
+    OBJECT,
+    SUBOBJECT,
+    Section,
+    node_id_of,
+    read_sections,
+)
 from profiles.importer.report import ImportFailed, ImportReport
 from profiles.importer.texts import check_size, decode_text
+from profiles.importer.values import TYPE_BY_CODE, node_relative, parse_number
+from profiles.schema import DataType
 
 
 @dataclass(frozen=True, slots=True)
 class ConfiguredValue:
-    """One ``ParameterValue`` as it stands in the file."""
+    """One ``ParameterValue`` as it stands in the file; what is added to the node-ID is the sum.
+
+    ``type`` is that of the file, None where it gives none.
+    """
 
     index: int
     subindex: int
     text: str
     line: int
+    type: DataType | None = None
 
 
 def is_dcf(data: bytes) -> bool:
@@ -35,11 +49,11 @@ def read_dcf_values(data: bytes, name: str, report: ImportReport) -> Iterator[Co
         ImportFailed: too big, or no object of it has a value.
     """
     check_size(data, MAX_BYTES, name)
+    sections = read_sections(decode_text(data, name, report), name, report)
+    node_id = node_id_of(sections, name)
     found = [
-        ConfiguredValue(index, subindex, text, line)
-        for index, subindex, text, line in object_values(
-            decode_text(data, name, report), name, report
-        )
+        replace(value, text=_of_node(value, node_id, name, report))
+        for value in _values(sections, name)
     ]
     if not found:
         raise ImportFailed(f"{name} sets no values: an EDS describes a drive, a DCF configures it")
@@ -54,4 +68,35 @@ def read_dcf_identity(data: bytes, name: str) -> tuple[int | None, int | None]:
     """
     check_size(data, MAX_BYTES, name)
     quiet = ImportReport()
-    return device_identity(decode_text(data, name, quiet), name, quiet)
+    sections = read_sections(decode_text(data, name, quiet), name, quiet)
+    return identity_of(sections, name, quiet)
+
+
+def _values(sections: dict[str, Section], name: str) -> Iterator[ConfiguredValue]:
+    """Every object that has a ``ParameterValue``.
+
+    Values of arrays in compact storage stand in a section of their own, as ``[607DValue]``.
+    """
+    for title, section in sections.items():
+        if (match := COMPACT.match(title)) and match[2] == "value":
+            kind = _type_of(sections.get(match[1], section), name)
+            for key, text in section.values.items():
+                if key.isdecimal() and 1 <= int(key) <= 254 and text:
+                    yield ConfiguredValue(int(match[1], 16), int(key), text, section.line, kind)
+            continue
+        value = section.get("parametervalue")
+        found = SUBOBJECT.match(title) or OBJECT.match(title)
+        if value and found:
+            subindex = int(found[2], 16) if found.lastindex == 2 else 0
+            kind = _type_of(section, name)
+            yield ConfiguredValue(int(found[1], 16), subindex, value, section.line, kind)
+
+
+def _type_of(section: Section, name: str) -> DataType | None:
+    code = parse_number(section.word("datatype"), name, ImportReport())
+    return TYPE_BY_CODE.get(int(code)) if code is not None else None
+
+
+def _of_node(value: ConfiguredValue, node_id: int | None, name: str, report: ImportReport) -> str:
+    added = node_relative(value.text, f"{name}:{value.line}", report)
+    return value.text if added is None or node_id is None else f"{added + node_id:#x}"

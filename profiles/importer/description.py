@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from profiles.bring_up import BringUp
-from profiles.schema import Access, DataType, LinkKind, PdoMapping, Raw
+from profiles.schema import Access, DataType, LinkKind, PdoIdentifier, PdoMapping, Raw
 
 MAX_ENTRIES = 20_000
 """More entries than any drive has: a file with more is broken or hostile."""
@@ -51,6 +51,8 @@ class DescribedPdo:
     sync_manager: int | None = None
     mandatory: bool = False
     exclude: tuple[int, ...] = ()
+    identifier: PdoIdentifier | None = None
+    """CANopen: the COB-ID as delivered."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,22 +7,21 @@ use, one that guesses in silence is dangerous. So everything repaired or left ou
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import Literal
 
 from profiles.importer.description import (
     MAX_ENTRIES,
     DescribedEntry,
-    DescribedPdo,
     Description,
 )
+from profiles.importer.eds_pdo import read_pdos
+from profiles.importer.eds_sections import COMPACT, OBJECT, SUBOBJECT, Section, read_sections
 from profiles.importer.report import ImportFailed, ImportReport
 from profiles.importer.texts import check_size, decode_text
 from profiles.importer.values import (
     TYPE_BY_CODE,
     default_value,
     fit,
+    named_type,
     parse_access,
     parse_number,
     tidy,
@@ -31,25 +30,8 @@ from profiles.importer.values import (
 from profiles.schema import DataType, PdoMapping, Raw
 
 MAX_BYTES = 8 * 2**20
-_MAX_LINES = 400_000
-
-_OBJECT = re.compile(r"(?:0x)?([0-9a-f]{4})$")
-_SUBOBJECT = re.compile(r"(?:0x)?([0-9a-f]{4})\s*_?sub\s*_?(?:0x)?([0-9a-f]{1,2})$")
-_COMPACT = re.compile(r"(?:0x)?([0-9a-f]{4})(name|value|denotation)$")
 _DEFTYPE = re.compile(r"(?:0x)?([0-9a-f]{1,3})(?:sub([0-9a-f]{1,2}))?$")
 _MODULE = re.compile(r"m\d+|supportedmodules|dynamicchannels")
-
-
-@dataclass(slots=True)
-class _Section:
-    """A section's values by lower-case key, and the line it starts on."""
-
-    line: int
-    values: dict[str, str] = field(default_factory=dict)
-
-    def get(self, *names: str) -> str:
-        """The first of these values that is not empty: editors write keys without values."""
-        return next((self.values[n] for n in names if self.values.get(n)), "")
 
 
 def read_eds(data: bytes, name: str, report: ImportReport) -> Description:
@@ -59,8 +41,8 @@ def read_eds(data: bytes, name: str, report: ImportReport) -> Description:
         ImportFailed: too big, or no object with a known type in it.
     """
     check_size(data, MAX_BYTES, name)
-    sections = _sections(decode_text(data, name, report), name, report)
-    device = sections.get("deviceinfo", _Section(0))
+    sections = read_sections(decode_text(data, name, report), name, report)
+    device = sections.get("deviceinfo", Section(0))
     if "deviceinfo" not in sections:
         report.noted(name, "there is no [DeviceInfo] section: the drive is not identified")
     entries = _Entries(sections, name, report).read()
@@ -80,43 +62,23 @@ def read_eds(data: bytes, name: str, report: ImportReport) -> Description:
         revision=_identity(device, "revisionnumber", name, report)
         or _own_identity(entries, "1018:03"),
         entries=tuple(entries),
-        pdos=tuple(_pdos(entries, name, report)),
+        pdos=tuple(read_pdos(entries, sections, name, report)),
         baudrates=_bit_rates(device),
     )
 
 
-def object_values(
-    text: str, name: str, report: ImportReport
-) -> Iterator[tuple[int, int, str, int]]:
-    """Index, subindex, ``ParameterValue`` and line of every object that has one (a DCF).
-
-    Values of arrays in compact storage stand in a section of their own, as ``[607DValue]``.
-    """
-    for title, section in _sections(text, name, report).items():
-        if (match := _COMPACT.match(title)) and match[2] == "value":
-            for key, text_of_key in section.values.items():
-                if key.isdecimal() and 1 <= int(key) <= 254 and text_of_key:
-                    yield int(match[1], 16), int(key), text_of_key, section.line
-            continue
-        value = section.get("parametervalue")
-        if not value:
-            continue
-        if match := _SUBOBJECT.match(title):
-            yield int(match[1], 16), int(match[2], 16), value, section.line
-        elif match := _OBJECT.match(title):
-            yield int(match[1], 16), 0, value, section.line
-
-
-def device_identity(text: str, name: str, report: ImportReport) -> tuple[int | None, int | None]:
+def identity_of(
+    sections: dict[str, Section], name: str, report: ImportReport
+) -> tuple[int | None, int | None]:
     """Vendor and product number of [DeviceInfo]; None where the file gives none."""
-    device = _sections(text, name, ImportReport()).get("deviceinfo", _Section(0))
+    device = sections.get("deviceinfo", Section(0))
     return (
         _identity(device, "vendornumber", name, report),
         _identity(device, "productnumber", name, report),
     )
 
 
-def _identity(device: _Section, key: str, name: str, report: ImportReport) -> int | None:
+def _identity(device: Section, key: str, name: str, report: ImportReport) -> int | None:
     number = parse_number(device.get(key), f"{name}: {key}", report)
     return None if number is None else _real_identity(number)
 
@@ -141,64 +103,35 @@ def _own_identity(entries: list[DescribedEntry], key: str) -> int | None:
 _BIT_RATES = {f"baudrate_{kbit}": kbit * 1000 for kbit in (10, 20, 50, 125, 250, 500, 800, 1000)}
 
 
-def _bit_rates(device: _Section) -> tuple[int, ...]:
+def _bit_rates(device: Section) -> tuple[int, ...]:
     return tuple(
         rate for key, rate in _BIT_RATES.items() if device.get(key) in ("1", "0x1", "0x01")
     )
 
 
-def _sections(text: str, name: str, report: ImportReport) -> dict[str, _Section]:
-    sections: dict[str, _Section] = {}
-    current: _Section | None = None
-    for number, raw in enumerate(text.splitlines()[:_MAX_LINES], start=1):
-        line = raw.strip().strip("\ufeff\0\x1a")
-        place = f"{name}:{number}"
-        if not line or line[0] in ";#" or line.startswith("//"):
-            continue
-        if line[0] == "[":
-            title = line[1:].partition("]")[0].strip().lower()
-            if "]" not in line:
-                report.repaired(place, f"the section heading {line[:40]!r} is not closed")
-            if title in sections:
-                report.noted(place, f"section [{title[:40]}] comes a second time")
-            current = sections.setdefault(title, _Section(number))
-            continue
-        key, equals, value = line.partition("=")
-        if not equals:
-            report.left_out(place, f"{line[:60]!r} is neither a section nor a value")
-        elif current is None:
-            report.left_out(place, f"{key.strip()[:40]!r} stands before the first section")
-        else:
-            key = key.strip().lower().replace(" ", "")
-            if key in current.values and current.values[key] != value.strip():
-                report.noted(place, f"{key[:40]} is given twice, the first one counts")
-            current.values.setdefault(key, value.strip())
-    return sections
-
-
 class _Entries:
     """Object sections to entries."""
 
-    def __init__(self, sections: dict[str, _Section], name: str, report: ImportReport) -> None:
+    def __init__(self, sections: dict[str, Section], name: str, report: ImportReport) -> None:
         self._sections = sections
         self._name = name
         self._report = report
         self._configured = 0
-        self._objects: dict[int, _Section] = {}
-        self._members: dict[int, dict[int, _Section]] = {}
-        self._compact: dict[tuple[int, str], _Section] = {}
-        self._deftypes: dict[tuple[int, int | None], _Section] = {}
+        self._objects: dict[int, Section] = {}
+        self._members: dict[int, dict[int, Section]] = {}
+        self._compact: dict[tuple[int, str], Section] = {}
+        self._deftypes: dict[tuple[int, int | None], Section] = {}
         self._sort()
 
     def _sort(self) -> None:
         modules = 0
         for title, section in self._sections.items():
-            if match := _SUBOBJECT.match(title):
+            if match := SUBOBJECT.match(title):
                 index, subindex = int(match[1], 16), int(match[2], 16)
                 self._members.setdefault(index, {})[subindex] = section
-            elif match := _COMPACT.match(title):
+            elif match := COMPACT.match(title):
                 self._compact[int(match[1], 16), match[2]] = section
-            elif match := _OBJECT.match(title):
+            elif match := OBJECT.match(title):
                 self._objects[int(match[1], 16)] = section
             elif match := _DEFTYPE.match(title):
                 subindex_text = match[2]
@@ -237,14 +170,14 @@ class _Entries:
             self._report.repaired(
                 f"{self._name}:{line}", f"{index:04X}h has subindices but no section of its own"
             )
-            parent = _Section(line)
+            parent = Section(line)
         place = f"{self._name}:{parent.line} [{index:04X}]"
-        compact = parse_number(parent.get("compactsubobj"), place, self._report)
+        compact = parse_number(parent.word("compactsubobj"), place, self._report)
         if compact and 0 < compact <= 254 and not members:
             return self._compact_object(index, parent, int(compact))
         if not members:
             return self._entry(index, 0, parent, parent, "")
-        count = parse_number(parent.get("subnumber"), place, self._report)
+        count = parse_number(parent.word("subnumber"), place, self._report)
         if count is not None and count != len(members):
             self._report.noted(
                 place, f"{int(count)} subindices are announced and {len(members)} given"
@@ -259,17 +192,17 @@ class _Entries:
             for entry in self._entry(index, subindex, member, parent, title)
         ]
 
-    def _is_value(self, member: _Section, parent: _Section) -> bool:
+    def _is_value(self, member: Section, parent: Section) -> bool:
         kind = self._type(member, parent, self._name)
         return kind is not None and kind not in ("UINT8", "INT8", "BOOL")
 
-    def _compact_object(self, index: int, parent: _Section, count: int) -> list[DescribedEntry]:
-        names = self._compact.get((index, "name"), _Section(0))
-        values = self._compact.get((index, "value"), _Section(0))
+    def _compact_object(self, index: int, parent: Section, count: int) -> list[DescribedEntry]:
+        names = self._compact.get((index, "name"), Section(0))
+        values = self._compact.get((index, "value"), Section(0))
         title = tidy(parent.get("parametername"))
         entries = []
         for subindex in range(1, count + 1):
-            member = _Section(parent.line, dict(parent.values))
+            member = Section(parent.line, dict(parent.values))
             member.values["parametername"] = names.get(str(subindex)) or f"{title}{subindex}"
             if value := values.get(str(subindex)):
                 member.values["defaultvalue"] = value
@@ -277,11 +210,11 @@ class _Entries:
         return entries
 
     def _entry(
-        self, index: int, subindex: int, section: _Section, parent: _Section, title: str
+        self, index: int, subindex: int, section: Section, parent: Section, title: str
     ) -> list[DescribedEntry]:
         place = f"{self._name}:{section.line} [{index:04X}sub{subindex:X}]"
         data_type = self._type(section, parent, place)
-        access_text = section.get("accesstype", "access") or parent.get("accesstype")
+        access_text = section.word("accesstype", "access") or parent.word("accesstype")
         if not access_text:
             self._report.repaired(place, "no access is given, taken as read-only")
             access_text = "ro"
@@ -317,7 +250,7 @@ class _Entries:
         return [entry]
 
     def _limit(
-        self, section: _Section, key: str, data_type: DataType, place: str
+        self, section: Section, key: str, data_type: DataType, place: str
     ) -> int | float | None:
         text = section.get(key)
         if re.search(r"node[-_ ]?id", text, re.I):
@@ -325,16 +258,18 @@ class _Entries:
         number = parse_number(text, f"{place} {key}", self._report)
         return fit(number, data_type, key, place, self._report)
 
-    def _type(self, section: _Section, parent: _Section, place: str) -> DataType | None:
-        code = parse_number(section.get("datatype"), place, self._report)
-        if code is None:
-            kind = parse_number(section.get("objecttype"), place, self._report)
-            if kind == 2:  # DOMAIN needs no data type
-                return "OCTETS"
-            code = parse_number(parent.get("datatype"), place, self._report)
-        if code is None:
+    def _type(self, section: Section, parent: Section, place: str) -> DataType | None:
+        text = section.word("datatype")
+        if not text and parse_number(section.word("objecttype"), place, self._report) == 2:
+            return "OCTETS"  # a DOMAIN needs no data type
+        text = text or parent.word("datatype")
+        if named := named_type(text, None):
+            self._report.repaired(place, f"data type {text[:30]} is written by its name")
+            return named
+        number = parse_number(text, place, self._report)
+        if number is None:
             return None
-        code = int(code)
+        code = int(number)
         found = TYPE_BY_CODE.get(code)
         if found is None:
             found = self._deftype(code, place)
@@ -346,7 +281,7 @@ class _Entries:
         """Types that a file defines itself, as an editor does for values with limits."""
         member = self._deftypes.get((code, 2)) or self._members.get(code, {}).get(2)
         if member is not None:
-            base = parse_number(member.get("datatype"), place, self._report)
+            base = parse_number(member.word("datatype"), place, self._report)
             known = None if base is None else TYPE_BY_CODE.get(int(base))
             if known is not None:
                 self._report.noted(place, f"data type {code:#06x} is defined by the file itself")
@@ -375,37 +310,11 @@ class _Entries:
                     self._report.noted(place, f"{index:04X}h is listed but not described")
 
 
-def _mapping(section: _Section, parent: _Section, access_text: str) -> PdoMapping:
-    text = (section.get("pdomapping") or parent.get("pdomapping")).split(";")[0].strip().lower()
+def _mapping(section: Section, parent: Section, access_text: str) -> PdoMapping:
+    text = (section.word("pdomapping") or parent.word("pdomapping")).lower()
     if text not in ("1", "0x1", "true", "yes", "0x01", "01"):
         return "none"
     access = access_text.strip().lower()
     if access in ("ro", "r", "rwr", "const"):
         return "tx"
     return "rx" if access in ("wo", "w", "rww") else "rxtx"
-
-
-def _pdos(entries: list[DescribedEntry], name: str, report: ImportReport) -> list[DescribedPdo]:
-    """Default mappings out of the defaults of 1600h… and 1A00h…."""
-    keys = {e.key for e in entries}
-    pdos: list[DescribedPdo] = []
-    by_index: dict[int, list[DescribedEntry]] = {}
-    for entry in entries:
-        if 0x1600 <= entry.index < 0x1800 or 0x1A00 <= entry.index < 0x1C00:
-            by_index.setdefault(entry.index, []).append(entry)
-    for index, mapping in sorted(by_index.items()):
-        mapped: list[str] = []
-        for entry in sorted(mapping, key=lambda e: e.subindex):
-            value = entry.default_raw
-            if entry.subindex == 0 or not isinstance(value, int) or value == 0:
-                continue
-            key = f"{value >> 16 & 0xFFFF:04X}:{value >> 8 & 0xFF:02X}"
-            if key in keys:
-                mapped.append(key)
-            elif value >> 16 & 0xFFFF >= 0x20:  # below are dummies that only fill space
-                report.left_out(f"{name} [{index:04X}]", f"{key} is mapped but not described")
-        fixed = all(e.access == "ro" for e in mapping)
-        if mapped or not fixed:
-            direction: Literal["rx", "tx"] = "rx" if index < 0x1A00 else "tx"
-            pdos.append(DescribedPdo(index, direction, tuple(mapped), fixed, name))
-    return pdos

@@ -84,7 +84,9 @@ class _Reader:
 
     def _commands(self) -> tuple[InitCommand, ...]:
         found: list[InitCommand] = []
-        for item in children(child(self._mailbox, "CoE"), "InitCmd"):
+        coe = child(self._mailbox, "CoE")
+        # Some files have the list of an ENI, one level deeper.
+        for item in (*children(coe, "InitCmd"), *children(child(coe, "InitCmds"), "InitCmd")):
             place = f"{self._file}: InitCmd"
             index = whole_number(text_of(child(item, "Index")), place, self._report)
             subindex = whole_number(text_of(child(item, "SubIndex")) or "0", place, self._report)
@@ -93,7 +95,8 @@ class _Reader:
                 self._report.left_out(place, f"a command to {text_of(child(item, 'Index'))[:12]!r}")
                 continue
             for transition in children(item, "Transition"):
-                letters = text_of(transition).upper()
+                # TwinCAT shows commands of the file as <PS>, and some tools write them so.
+                letters = text_of(transition).upper().strip("<>")
                 if _TRANSITION.fullmatch(letters) is None or not 0 <= subindex <= 255:
                     self._report.left_out(place, f"{index:04X}h on transition {letters[:12]!r}")
                     continue
@@ -138,7 +141,12 @@ class _Reader:
     def _mode(self, mode: Element) -> ClockMode:
         name = tidy(text_of(child(mode, "Name"))) or "unnamed"
         place = f"{self._file}: OpMode {name[:20]}"
-        activate = whole_number(text_of(child(mode, "AssignActivate")) or "0", place, self._report)
+        word = text_of(child(mode, "AssignActivate")) or "0"
+        if re.fullmatch(r"0\d{3}", word):
+            # Register bits: nobody writes them in decimal with a leading zero.
+            self._report.repaired(place, f"AssignActivate {word} was read as hexadecimal")
+            word = f"#x{word}"
+        activate = whole_number(word, place, self._report)
         if activate is None or not 0 <= activate <= 0xFFFF:
             self._report.left_out(place, "AssignActivate is no number of 16 bits")
             activate = 0

@@ -6,6 +6,7 @@ from typing import Literal
 from xml.etree.ElementTree import Element
 
 from profiles.importer.description import MAX_ENTRIES, DescribedEntry, DescribedPdo
+from profiles.importer.esi_modules import Part
 from profiles.importer.report import ImportReport
 from profiles.importer.values import named_type, tidy, whole_number
 from profiles.importer.xml_tree import attribute_of, child, children, flag_of, name_of, text_of
@@ -23,8 +24,14 @@ class PdoReader:
     """Reads ``RxPdo`` and ``TxPdo``; objects that only a PDO names are added to ``entries``."""
 
     def __init__(
-        self, file: str, report: ImportReport, entries: list[DescribedEntry], seen: set[str]
+        self,
+        file: str,
+        report: ImportReport,
+        entries: list[DescribedEntry],
+        seen: set[str],
+        part: Part,
     ) -> None:
+        self._part_of_device = part
         self._file = file
         self._report = report
         self._entries = entries
@@ -41,6 +48,8 @@ class PdoReader:
         if index is None:
             self._report.left_out(place, "a PDO without an index")
             return []
+        if flag_of(child(pdo, "Index"), "DependOnSlot"):
+            index += self._part_of_device.pdo_shift
         where = f"{place} {index:04X}h"
         layout: list[tuple[str | None, int]] = []
         keys: list[str] = []
@@ -77,6 +86,8 @@ class PdoReader:
         """One stretch of the PDO; index 0 is padding. None: it cannot be understood."""
         object_index = whole_number(text_of(child(item, "Index")), where, self._report)
         bits = whole_number(text_of(child(item, "BitLen")), where, self._report)
+        if object_index and flag_of(child(item, "Index"), "DependOnSlot"):
+            object_index += self._part_of_device.index_shift
         if not object_index:
             return (None, bits) if bits and bits <= _MOST_BITS else None
         subindex = whole_number(text_of(child(item, "SubIndex")), where, self._report) or 0

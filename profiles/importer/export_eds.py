@@ -84,9 +84,10 @@ def _file(
         members.sort(key=lambda p: p.subindex or 0)
     lines = _head(profile, created, file_name, objects) + commissioning
     lines += _lists({*objects, *_MANDATORY})
+    pdos = _Pdos(profile)
     for index in sorted({*objects, *_MANDATORY}):
         known = objects.get(index)
-        lines += _object(index, known, values) if known else _mandatory(index, profile)
+        lines += _object(index, known, values, pdos) if known else _mandatory(index, profile)
     return "\r\n".join(lines) + "\r\n"
 
 
@@ -163,27 +164,30 @@ def _mandatory(index: int, profile: Profile) -> list[str]:
     return lines
 
 
-def _object(index: int, members: list[Parameter], values: Mapping[str, Raw]) -> list[str]:
+def _object(
+    index: int, members: list[Parameter], values: Mapping[str, Raw], pdos: _Pdos
+) -> list[str]:
     if len(members) == 1 and members[0].subindex == 0:
-        return [f"[{index:04X}]", *_entry(members[0], members[0].name, values), ""]
+        return [f"[{index:04X}]", *_entry(members[0], members[0].name, values, pdos), ""]
     titles = {p.name.partition(":")[0].strip() for p in members}
     title = titles.pop() if len(titles) == 1 else f"Object {index:04X}h"
     counted = [p for p in members if p.subindex]
+    count = pdos.counts.get(index, counted[-1].subindex or 0)
     lines = [
         f"[{index:04X}]", f"ParameterName={_text(title)}", f"ObjectType=0x{_RECORD:X}",
         f"SubNumber={len(counted) + 1}", "",
         f"[{index:04X}sub0]", "ParameterName=Highest subindex", f"ObjectType=0x{_VARIABLE:X}",
-        "DataType=0x0005", "AccessType=ro", f"DefaultValue={counted[-1].subindex or 0}",
+        "DataType=0x0005", "AccessType=ro", f"DefaultValue={count}",
         "PDOMapping=0", "",
     ]  # fmt: skip
     for parameter in counted:
         name = parameter.name.partition(":")[2].strip() or parameter.name
         lines.append(f"[{index:04X}sub{parameter.subindex or 0:X}]")
-        lines += [*_entry(parameter, name, values), ""]
+        lines += [*_entry(parameter, name, values, pdos), ""]
     return lines
 
 
-def _entry(parameter: Parameter, name: str, values: Mapping[str, Raw]) -> list[str]:
+def _entry(parameter: Parameter, name: str, values: Mapping[str, Raw], pdos: _Pdos) -> list[str]:
     access = parameter.access
     if access == "rw" and parameter.pdo in ("rx", "tx"):
         access_text = "rww" if parameter.pdo == "rx" else "rwr"
@@ -194,7 +198,7 @@ def _entry(parameter: Parameter, name: str, values: Mapping[str, Raw]) -> list[s
         f"ObjectType=0x{_VARIABLE:X}",
         f"DataType=0x{_CODE[parameter.type]:04X}",
         f"AccessType={access_text}",
-        f"DefaultValue={_value(parameter)}",
+        f"DefaultValue={_value(parameter, pdos)}",
         f"PDOMapping={int(parameter.pdo != 'none')}",
     ]
     if parameter.key in values and parameter.type != "OCTETS":
@@ -217,10 +221,26 @@ _COB_IDS = {
 }
 
 
-def _value(parameter: Parameter) -> str:
+class _Pdos:
+    """What the profile says of its PDOs beyond the defaults of their objects."""
+
+    def __init__(self, profile: Profile) -> None:
+        sets = profile.pdo.sets if profile.pdo is not None else ()
+        self.counts = {s.index: len(s.layout or s.entries) for s in sets if s.entries}
+        """Entries in use: objects may have more subindices."""
+        self.cob_ids = _COB_IDS | {
+            f"{s.index - 0x200:04X}:01": (
+                f"{'$NODEID+' if s.identifier.of_node else ''}0x{s.identifier.cob_id:X}"
+            )
+            for s in sets
+            if s.identifier is not None
+        }
+
+
+def _value(parameter: Parameter, pdos: _Pdos) -> str:
     default = parameter.default_raw
-    if default is None and parameter.key in _COB_IDS:
-        return _COB_IDS[parameter.key]
+    if default is None and parameter.key in pdos.cob_ids:
+        return pdos.cob_ids[parameter.key]
     if default is None or parameter.type == "OCTETS":
         return ""
     return _text(str(default))

@@ -131,7 +131,6 @@ def _named(device: EsiDevice) -> str:
 
 
 @_without_collection()
-@_without_collection()
 def write_profile(imported: Profile, folder: Path) -> Path:
     """Write ``folder/DRIVE/profile.yaml``, to be edited like any other profile.
 

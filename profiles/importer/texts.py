@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 
 from profiles.importer.report import ImportFailed, ImportReport
@@ -13,10 +14,11 @@ _MARKS = (
 )
 _DECLARED = re.compile(rb"^\s*<\?xml[^>]*?encoding\s*=\s*[\"']([A-Za-z0-9._-]{1,40})[\"'][^>]*\?>")
 _DECLARATION = re.compile(r"^\s*<\?xml[^>]*\?>")
+#: By the names that Python gives them; a file may use any alias.
 _KNOWN_ENCODINGS = {
-    "utf-8", "utf8", "us-ascii", "ascii", "utf-16", "gb2312", "gbk", "gb18030", "big5",
-    "shift_jis", "sjis", "euc-jp", "euc-kr", "ks_c_5601-1987", "iso-8859-1", "iso-8859-2",
-    "iso-8859-15", "latin1", "windows-1250", "windows-1251", "windows-1252", "windows-936",
+    "utf-8", "ascii", "utf-16", "utf-16-le", "utf-16-be", "gb2312", "gbk", "gb18030", "big5",
+    "shift_jis", "cp932", "euc_jp", "euc_kr", "cp949", "iso8859-1", "iso8859-2", "iso8859-9",
+    "iso8859-15", "cp1250", "cp1251", "cp1252", "cp1254",
 }  # fmt: skip
 
 
@@ -33,9 +35,10 @@ def decode_text(data: bytes, name: str, report: ImportReport) -> str:
     for mark, encoding in _MARKS:
         if data.startswith(mark):
             return data[len(mark) :].decode(encoding, "replace")
-    if data[1:2] == b"\0" and data[:1].isascii():
-        report.repaired(name, "UTF-16 without a byte order mark")
-        return data.decode("utf-16-le", "replace")
+    for zero, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
+        if len(data) > 1 and data[zero] == 0 and 0 < data[1 - zero] < 0x80:
+            report.repaired(name, "UTF-16 without a byte order mark")
+            return data.decode(encoding, "replace")
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:
@@ -51,6 +54,14 @@ def _looks_chinese(data: bytes) -> bool:
     return pairs * 2 > sum(map(len, runs))
 
 
+def _python_name(encoding: str) -> str:
+    """The name of an encoding without its aliases; empty where nobody knows it."""
+    try:
+        return codecs.lookup(encoding.replace("windows-936", "gbk")).name
+    except LookupError:
+        return ""
+
+
 def decode_xml(data: bytes, name: str, report: ImportReport) -> str:
     """Text of an XML file without its declaration, so that the parser gets plain Unicode.
 
@@ -61,11 +72,11 @@ def decode_xml(data: bytes, name: str, report: ImportReport) -> str:
         text = decode_text(data, name, report)
     else:
         encoding = declared.group(1).decode("ascii").lower()
-        if encoding not in _KNOWN_ENCODINGS:
+        if _python_name(encoding) not in _KNOWN_ENCODINGS:
             report.repaired(name, f"unknown encoding {encoding!r}, read as UTF-8")
             encoding = "utf-8"
         try:
-            text = data.decode(encoding)
+            text = data.decode(encoding.replace("windows-936", "gbk"))
         except (UnicodeDecodeError, LookupError):
             report.repaired(name, f"the text is not {encoding} as declared")
             text = decode_text(data, name, report)

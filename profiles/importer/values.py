@@ -92,6 +92,7 @@ def parse_number(text: str, place: str, report: ImportReport) -> int | float | N
     if text.isascii() and text.isdigit() and text[0] != "0" and len(text) <= _LONGEST_NUMBER:
         return int(text)
     bare = text.split(";", 1)[0].strip().strip("\"'").replace("_", "").replace(" ", "")
+    bare = bare.replace("\N{MINUS SIGN}", "-")
     if not bare or bare in ("-", "0x", "0X"):
         return None
     if len(bare) > _LONGEST_NUMBER:
@@ -131,12 +132,24 @@ def _decimal(bare: str, text: str, place: str, report: ImportReport) -> int | fl
     try:
         value = float(bare)
     except ValueError:
+        if re.fullmatch(r"[0-9a-fA-F]{2,16}", bare):
+            report.repaired(place, f"{bare} was read as hexadecimal")
+            return int(bare, 16)
         report.left_out(place, f"{text.strip()!r} is not a number")
         return None
     if not math.isfinite(value):
         report.left_out(place, f"{text.strip()!r} is not a finite number")
         return None
     return value
+
+
+def node_relative(text: str, place: str, report: ImportReport) -> int | None:
+    """What is added to the node-ID in ``$NODEID+0x200``; None where the text does not name it."""
+    if not _NODE_ID.search(text):
+        return None
+    rest = _NODE_ID.sub("", text).strip().strip("+").strip()
+    number = parse_number(rest or "0", place, report)
+    return int(number) if number is not None and number >= 0 else None
 
 
 def whole_number(text: str, place: str, report: ImportReport) -> int | None:
@@ -173,6 +186,9 @@ def fit(
         return high
     if whole > high and low < 0 and whole <= 2 * high + 1:
         return whole - 2 * (high + 1)
+    if -(2**15) <= low < 0 and 2**32 + low <= whole < 2**32:
+        report.repaired(place, f"{what} {whole:#x} is a negative number of 32 bits")
+        return whole - 2**32
     if not low <= whole <= high:
         report.left_out(place, f"{what} {whole} does not fit {data_type}")
         return None

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from backend.drive.drive import Drive
 from backend.drive.readings import Reading
+from backend.handover.listed import ControllerList
 from backend.handover.model import is_lock
-from backend.handover.read import ControllerList
 from backend.motion.classes import motion_of
 from backend.parameters.set_file import ParameterSet, dump, parse, storable
 from drivers.codec import decode, encode, size_of

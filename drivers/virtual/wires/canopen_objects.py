@@ -48,6 +48,8 @@ class Pdo:
     inhibit_100us: int = 0
     event_ms: int = 0
     image: ProcessImage | None = None
+    contents_fixed: bool = False
+    identifier_fixed: bool = False
 
     @property
     def valid(self) -> bool:
@@ -93,15 +95,21 @@ class CommunicationObjects:
         base = (RPDO if direction == "rx" else TPDO)[number] + self._node_id
         index = (0x1600 if direction == "rx" else 0x1A00) + number
         spec = self._device.profile.pdo
+        sets = [s for s in (spec.sets if spec else ()) if s.index == index]
         entries = [
-            self._entry(key)
-            for pdo_set in (spec.sets if spec else ())
-            if pdo_set.index == index and pdo_set.direction == direction
-            for key in pdo_set.entries
-        ]
+            part.bits if part.key is None else self._entry(part.key)
+            for each in sets
+            for part in each.layout
+        ] or [self._entry(key) for each in sets for key in each.entries]
+        identifier = sets[0].identifier if sets else None
+        if identifier is not None:
+            base = identifier.at(self._node_id)
         cob_id = base if entries else base | INVALID
         padded = (entries + [0] * _ENTRIES)[:_ENTRIES]
-        return Pdo(direction, number, cob_id, 255, padded, len(entries))
+        pdo = Pdo(direction, number, cob_id, 255, padded, len(entries))
+        pdo.contents_fixed = bool(sets) and sets[0].fixed
+        pdo.identifier_fixed = identifier is not None and identifier.fixed
+        return pdo
 
     def _entry(self, key: str) -> int:
         index, subindex = int(key[:4], 16), int(key[5:], 16)
@@ -169,6 +177,8 @@ class CommunicationObjects:
 
     def _write_pdo(self, pdo: Pdo, subindex: int, data: bytes) -> None:
         if subindex == 1:
+            if pdo.identifier_fixed:
+                raise SdoAbort(ABORT_READ_ONLY)
             cob_id = _number(data, 4)
             if pdo.valid and not cob_id & INVALID and cob_id & _IDENTIFIER != pdo.identifier:
                 raise SdoAbort(ABORT_VALUE_RANGE)
@@ -195,6 +205,8 @@ class CommunicationObjects:
     def _write_mapping(self, pdo: Pdo, subindex: int, data: bytes) -> None:
         if subindex > _ENTRIES:
             raise SdoAbort(ABORT_NO_SUBINDEX)
+        if pdo.contents_fixed:
+            raise SdoAbort(ABORT_READ_ONLY)
         if pdo.valid:
             raise SdoAbort(ABORT_DEVICE_STATE)
         if subindex == 0:

@@ -7,8 +7,9 @@ import struct
 import pytest
 
 from backend.handover.conflicts import Verdict, changed_since, compare, diagnose, resolved
+from backend.handover.listed import ControllerList
 from backend.handover.model import hand_over
-from backend.handover.read import ControllerList, read_list
+from backend.handover.read import read_list
 from profiles import load_profile
 from profiles.schema import Raw
 from tests.unit.handover.test_formats import set_of

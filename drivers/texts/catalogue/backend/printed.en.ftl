@@ -85,6 +85,7 @@ printed_not-restored = { $name }: not restored: { $key } = { $value }
 printed_note = note: { $words }
 printed_note-beside = {"  "}note: { $words }
 printed_nothing-pending = { $drive }: nothing is pending
+printed_nothing-to-try = {"  "}no setting of this program is concerned, so nothing was tried
 printed_nothing-to-write = nothing to write
 printed_now = now
 printed_number = number { $number }
@@ -132,6 +133,8 @@ printed_starting-virtual = starting the virtual drives …
 printed_station = station { $station }
 printed_stored-version = { $name } version { $version }
 printed_then = then
+printed_trial-does-not = {"  "}tried { $setting } { $before } -> { $after }: { $refusal }; undone
+printed_trial-reaches = {"  "}tried { $setting } { $before } -> { $after }: reaches Operational; undone, to keep it set { $setting } in the profile
 printed_type-digest = type the digest to confirm this change
 printed_value-differs = { $key }  { $name }: drive { $drive } → file { $file }
 printed_value-stays = { $drive }: { $key } (was { $was }) stays as it is

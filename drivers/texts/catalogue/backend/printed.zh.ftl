@@ -82,6 +82,7 @@ printed_not-restored = { $name }：未恢复：{ $key } = { $value }
 printed_note = 注意：{ $words }
 printed_note-beside = {"  "}注意：{ $words }
 printed_nothing-pending = { $drive }：没有待恢复的值
+printed_nothing-to-try = {"  "}与本程序的设置无关，因此未作尝试
 printed_nothing-to-write = 没有需要写入的值
 printed_now = 现在
 printed_number = 编号 { $number }
@@ -129,6 +130,8 @@ printed_starting-virtual = 正在启动虚拟驱动器……
 printed_station = 站 { $station }
 printed_stored-version = { $name } 版本 { $version }
 printed_then = 之后
+printed_trial-does-not = {"  "}尝试 { $setting } { $before } -> { $after }：{ $refusal }；已撤销
+printed_trial-reaches = {"  "}尝试 { $setting } { $before } -> { $after }：可进入 Operational 状态；已撤销，如需保留请在配置文件中设置 { $setting }
 printed_type-digest = 请输入摘要以确认此更改
 printed_value-differs = { $key }  { $name }：驱动器 { $drive } → 文件 { $file }
 printed_value-stays = { $drive }：{ $key }（原值 { $was }）保持现状

@@ -1,0 +1,96 @@
+"""Rows of a controller's list and the words in them, whatever its format. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """One write of a controller's list. ``transition`` is empty where the format states none."""
+
+    index: int
+    subindex: int
+    data: bytes
+    transition: str
+    place: str
+
+    @property
+    def key(self) -> str:
+        """As a profile's key, 6081:00."""
+        return f"{self.index:04X}:{self.subindex:02X}"
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerList:
+    """A list: its format and writes in their order; ``ordered`` tells whether order counts."""
+
+    format: str
+    writes: tuple[Listed, ...]
+    ordered: bool = True
+
+
+class BadRow(ValueError):
+    """A row that cannot be read; the message has its place."""
+
+
+class SeveralSlaves(ValueError):
+    """A file writes to several slaves, and nobody said which one is meant."""
+
+    def __init__(self, slaves: int) -> None:
+        super().__init__(f"{slaves} slaves")
+        self.slaves = slaves
+
+
+def chosen(each: Sequence[_T], slave: int | None) -> _T:
+    """The only one, or the one that was asked for, counted from 1.
+
+    Raises:
+        SeveralSlaves: it is not clear which.
+    """
+    if slave is None and len(each) == 1:
+        return each[0]
+    if slave is not None and 1 <= slave <= len(each):
+        return each[slave - 1]
+    raise SeveralSlaves(len(each))
+
+
+def number(text: str | None, place: str, *, base: int = 0) -> int:
+    """A number; with base 0 also #x, 16# and 0x."""
+    word = (text or "").strip()
+    for prefix in ("#x", "16#", "0x"):
+        if word.lower().startswith(prefix):
+            word, base = word[len(prefix) :], 16
+    try:
+        # A decimal with leading zeros is none of Python's, but of everybody else's.
+        return int(word, base or 10)
+    except ValueError as error:
+        raise BadRow(f"{place}: {word[:40]!r} is no number") from error
+
+
+def listed(index: int, subindex: int, data: bytes, transition: str, place: str) -> Listed:
+    """A write to an object that can exist, with data."""
+    if not 0 <= index <= 0xFFFF or not 0 <= subindex <= 0xFF:
+        raise BadRow(f"{place}: {index:X}h:{subindex} is no object")
+    if not data:
+        raise BadRow(f"{place}: {index:04X}h:{subindex} has no data")
+    return Listed(index, subindex, data, transition, place)
+
+
+def row_of_bytes(text: str | None, place: str) -> bytes:
+    """Bytes in hex."""
+    try:
+        return bytes.fromhex((text or "").strip())
+    except ValueError as error:
+        raise BadRow(f"{place}: {(text or '')[:40]!r} is no row of bytes") from error
+
+
+def sized(value: int, size: int, place: str) -> bytes:
+    """A whole number, signed or not, in so many bytes."""
+    if not -(1 << (8 * size - 1)) <= value < 1 << (8 * size):
+        raise BadRow(f"{place}: {value} does not fit {size} bytes")
+    return (value % (1 << (8 * size))).to_bytes(size, "little")

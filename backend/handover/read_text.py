@@ -1,0 +1,210 @@
+"""Start-up lists that are text or bytes: CODESYS, CSV, shell scripts, ROS 2, concise DCF."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import shlex
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import yaml
+
+from backend.handover.listed import BadRow, Listed, chosen, listed, number, row_of_bytes, sized
+from profiles.schema import Profile
+
+_SIZE = {"bool": 1, "int8": 1, "uint8": 1, "sm8": 1, "int16": 2, "uint16": 2, "sm16": 2,
+         "int32": 4, "uint32": 4, "sm32": 4, "float": 4, "int64": 8, "uint64": 8,
+         "sm64": 8, "double": 8}  # fmt: skip
+_DOWNLOAD = re.compile(
+    r"^\s*(?:sudo\s+)?(?:\S*/)?ethercat(?P<options>\s.*)?\sdownload\s(?P<rest>.*)$"
+)
+#: Options of `ethercat` that take a word, by their short and their long name.
+_WITH_WORD = {"t": "type", "p": "position", "a": "alias", "m": "master", "d": "domain"}
+_HEADINGS = {"codesys": "line", "csv": "key"}
+_ENTRY = struct.Struct("<HBI")
+
+
+def is_script(text: str) -> bool:
+    """Whether a line of it writes by ``ethercat download``."""
+    return any(_DOWNLOAD.match(line) for line in _lines(text))
+
+
+def table_of(text: str) -> tuple[str, str] | None:
+    """Format and separator of a table by its first line; spreadsheets change the separator."""
+    first = text.partition("\n")[0].strip()
+    for separator in ";,\t":
+        words = [word.strip().strip('"').lower() for word in first.split(separator)]
+        for form, heading in _HEADINGS.items():
+            if len(words) > 2 and words[0] == heading:
+                return form, separator
+    return None
+
+
+def codesys(text: str, separator: str) -> Iterator[Listed]:
+    """The columns of the tab Startup parameters."""
+    for line, row in enumerate(csv.DictReader(io.StringIO(text), delimiter=separator), 2):
+        place = f"line {line}"
+        index, _, subindex = (row.get("Index:Subindex") or "").partition(":")
+        bits = number(row.get("Bit length"), place)
+        if bits % 8 or not 8 <= bits <= 64:
+            raise BadRow(f"{place}: a bit length of {bits} is no whole number of bytes")
+        value = sized(number(row.get("Value"), place), bits // 8, place)
+        yield listed(number(index, place), number(subindex, place), value, "PS", place)
+
+
+def csv_table(text: str, separator: str) -> Iterator[Listed]:
+    """The table that is exported here."""
+    for line, row in enumerate(csv.DictReader(io.StringIO(text), delimiter=separator), 2):
+        place = f"line {line}"
+        yield listed(
+            number(row.get("index"), place), number(row.get("subindex"), place),
+            row_of_bytes(row.get("data"), place), row.get("transition") or "", place,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Download:
+    """One line of a script; ``slave`` is how it names the slave, by position or alias."""
+
+    slave: tuple[str, str]
+    write: Listed
+
+
+def igh(text: str) -> Iterator[Download]:
+    """Every ``ethercat download`` of a script, in its order."""
+    for line, content in enumerate(_lines(text), 1):
+        match = _DOWNLOAD.match(content)
+        if match is None:
+            continue
+        place = f"line {line}"
+        options, plain = _words(f"{match['options'] or ''} {match['rest']}", place)
+        kind = options.get("type", "")
+        if len(plain) != 3 or kind not in _SIZE or kind in ("float", "double"):
+            raise BadRow(f"{place}: a download of type, index, subindex and whole number is read")
+        index, subindex, value = (_as_in_c(word, place) for word in plain)
+        write = listed(index, subindex, sized(value, _SIZE[kind], place), "PS", place)
+        yield Download((options.get("alias", ""), options.get("position", "")), write)
+
+
+def _as_in_c(word: str, place: str) -> int:
+    """A number as `ethercat` reads it: one that begins with 0 is octal."""
+    octal = re.fullmatch(r"[+-]?0[0-7]+", word.strip())
+    return int(word, 8) if octal else number(word, place)
+
+
+def _lines(text: str) -> list[str]:
+    """Lines of a shell script; one that ends with a backslash goes on in the next."""
+    lines: list[str] = []
+    for line in text.splitlines():
+        if lines and lines[-1].endswith("\\"):
+            lines[-1] = lines[-1][:-1] + line
+            lines.append("")  # keeps the numbers of the lines behind it
+            lines[-2:] = [lines[-1], lines[-2]]
+        else:
+            lines.append(line)
+    return lines
+
+
+def _words(line: str, place: str) -> tuple[dict[str, str], list[str]]:
+    """Options by their long names, and the words that are no option."""
+    try:
+        words = iter(shlex.split(line, comments=True))
+    except ValueError as error:
+        raise BadRow(f"{place}: {error}") from error
+    options: dict[str, str] = {}
+    plain: list[str] = []
+    for word in words:
+        if word.startswith("--") and len(word) > 2:
+            name, equals, value = word[2:].partition("=")
+            if equals or name in _WITH_WORD.values():
+                options[name] = value if equals else next(words, "")
+        elif re.match(r"-[a-z]", word):
+            if long := _WITH_WORD.get(word[1]):
+                options[long] = word[2:] or next(words, "")
+        elif word != "--":
+            plain.append(word)
+    return options, plain
+
+
+def ros2(text: str, profile: Profile, slave: int | None) -> Iterator[Listed]:
+    """A slave file of ethercat_driver_ros2, or a bus.yml of ros2_canopen."""
+    # Aliases make a small file as large as a bomb, and no slave file has them.
+    for event in yaml.parse(text, yaml.SafeLoader):
+        if isinstance(event, yaml.AliasEvent):
+            raise BadRow("YAML aliases are not read")
+    content = yaml.safe_load(text)
+    rows = content.get("sdo") if isinstance(content, dict) else None
+    if rows is None and isinstance(content, dict):
+        nodes = _bus_nodes(content)
+        rows = chosen(nodes, slave) if nodes else None
+    for place_number, row in enumerate(rows if isinstance(rows, list) else [], 1):
+        place = f"sdo {place_number}"
+        if not isinstance(row, dict):
+            raise BadRow(f"{place}: is no row of index, sub_index and value")
+        index, subindex, value = (_whole(row, f, place) for f in ("index", "sub_index", "value"))
+        kind = str(row.get("type") or _profile_type(profile, index, subindex))
+        if kind not in _SIZE:
+            raise BadRow(f"{place}: type {kind[:40]!r} is not known")
+        data = sized(value, _SIZE[kind], place)
+        yield listed(index, subindex, data, "PS", place)
+
+
+def _bus_nodes(content: dict[Any, Any]) -> list[Any]:
+    """Rows of each node of a bus.yml: under `nodes` with `defaults`, or each at the top."""
+    named = content.get("nodes")
+    if isinstance(named, list):
+        named = {
+            key: each for part in named if isinstance(part, dict) for key, each in part.items()
+        }
+    if isinstance(named, dict):
+        defaults = content.get("defaults")
+        shared = defaults.get("sdo") if isinstance(defaults, dict) else None
+        found = [each.get("sdo", shared) for each in named.values() if isinstance(each, dict)]
+        return [rows for rows in found if rows is not None]
+    return [each["sdo"] for each in content.values() if isinstance(each, dict) and "sdo" in each]
+
+
+def _profile_type(profile: Profile, index: int, subindex: int) -> str:
+    """bus.yml gives no type: that of the object counts."""
+    parameter = profile.by_key.get(f"{index:04X}:{subindex:02X}")
+    if parameter is None:
+        return "int32"
+    return {"REAL32": "uint32"}.get(parameter.type, parameter.type.lower())
+
+
+def _whole(row: dict[Any, Any], field: str, place: str) -> int:
+    """A whole number; bus.yml files have them as text in quotes as well."""
+    value = row.get(field)
+    if isinstance(value, str):
+        return number(value, f"{place}: {field}")
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise BadRow(f"{place}: {field} {str(value)[:40]!r} is no whole number")
+    return value
+
+
+def concise_dcf(data: bytes) -> tuple[Listed, ...] | None:
+    """Writes of 1F22h (CiA 302-2): a count, then index, subindex, size and data of each.
+
+    None where the bytes are none: only a stream that ends with its last entry is one.
+    """
+    if len(data) < 4:
+        return None
+    count = int.from_bytes(data[:4], "little")
+    at, found = 4, []
+    if count > len(data) // (_ENTRY.size + 1):
+        return None
+    for entry in range(1, count + 1):
+        if at + _ENTRY.size > len(data):
+            return None
+        index, subindex, size = _ENTRY.unpack_from(data, at)
+        at += _ENTRY.size
+        value = data[at : at + size]
+        at += size
+        if len(value) != size or not size or index < 0x1000:
+            return None
+        found.append(Listed(index, subindex, value, "", f"entry {entry}"))
+    return tuple(found) if at == len(data) and found else None

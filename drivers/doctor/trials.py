@@ -1,0 +1,178 @@
+"""Settings of ours that can be tried where a drive does not reach Operational. Pure.
+
+A trial is a profile (or a cycle) that differs in one setting. It is kept nowhere: whoever tries it
+attaches the profile as it was afterwards, and a person writes the setting into the profile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from drivers.doctor.diagnosis import Cause
+from profiles.bring_up import BringUp, ClockMode
+from profiles.schema import PdoSet, Profile
+
+MOST = 4
+"""Trials of one station: each takes the drive to Operational anew."""
+
+_ACTIVATES = (0x0300, 0x0000, 0x0700, 0x0330)
+"""Values of 0980h that drives in use want: SYNC0, no clock, SYNC0 and SYNC1, SYNC0 on its pin."""
+
+_LONGER = (2, 4)
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One changed setting: its place in the profile, its value as it is and as it is tried."""
+
+    setting: str
+    before: str
+    after: str
+    profile: Profile
+    cycle_factor: int = 1
+
+
+def trials(causes: Sequence[Cause], profile: Profile) -> tuple[Trial, ...]:
+    """What to try, for the likeliest cause first; empty where no setting of ours is concerned."""
+    found: dict[tuple[str, str], Trial] = {}
+    for cause in causes:
+        for trial in _BY_CAUSE.get(cause.code, _none)(cause, profile):
+            found.setdefault((trial.setting, trial.after), trial)
+    return tuple(found.values())[:MOST]
+
+
+def _none(_cause: Cause, _profile: Profile) -> Iterator[Trial]:
+    return iter(())
+
+
+def _rules(profile: Profile) -> BringUp:
+    return profile.bring_up or BringUp(source="doctor")
+
+
+def _with_rules(profile: Profile, **changes: object) -> Profile:
+    rules = _rules(profile).model_copy(update=changes)
+    return profile.model_copy(update={"bring_up": rules})
+
+
+def _own_assignment(_cause: Cause, profile: Profile) -> Iterator[Trial]:
+    coe = _rules(profile).coe
+    if coe.pdo_assign is not False:
+        kept = coe.model_copy(update={"pdo_assign": False})
+        yield Trial(
+            "bring_up.coe.pdo_assign", _said(coe.pdo_assign), "false",
+            _with_rules(profile, coe=kept),
+        )  # fmt: skip
+
+
+def _own_contents(_cause: Cause, profile: Profile) -> Iterator[Trial]:
+    """The PDOs as the profile describes them, none of them written."""
+    pdo = profile.pdo
+    if pdo is None or not pdo.remappable:
+        return
+    sets = tuple(_fixed(each) for each in pdo.sets)
+    kept = pdo.model_copy(update={"remappable": False, "sets": sets})
+    yield Trial(
+        "pdo.remappable", "true", "false", profile.model_copy(update={"pdo": kept})
+    )  # fmt: skip
+
+
+def _fixed(each: PdoSet) -> PdoSet:
+    return each.model_copy(update={"fixed": True})
+
+
+def _without_command(cause: Cause, profile: Profile) -> Iterator[Trial]:
+    refused = {str(fact.actual) for fact in cause.facts if fact.name == "refused_object"}
+    rules = _rules(profile)
+    left = tuple(
+        each
+        for each in rules.init_commands
+        if f"{each.index:04X}:{each.subindex:02X}" not in refused
+    )
+    if len(left) < len(rules.init_commands):
+        yield Trial(
+            "bring_up.init_commands", ", ".join(sorted(refused)), "-",
+            _with_rules(profile, init_commands=left),
+        )  # fmt: skip
+
+
+def _other_clock(_cause: Cause, profile: Profile) -> Iterator[Trial]:
+    """Operation modes of the file before values that other drives want."""
+    rules = _rules(profile)
+    used = rules.clock_mode
+    before = 0x0300 if used is None else used.assign_activate
+    others = [mode for mode in rules.clock_modes if mode is not used]
+    known = {before, *(mode.assign_activate for mode in others)}
+    shape = used or ClockMode(name="doctor")
+    others += [
+        shape.model_copy(update={"assign_activate": value, "name": "doctor"})
+        for value in _ACTIVATES
+        if value not in known
+    ]
+    for mode in others:
+        yield Trial(
+            "bring_up.clock_modes", f"{before:04X}h", f"{mode.assign_activate:04X}h",
+            _with_rules(profile, clock_modes=(mode,)),
+        )  # fmt: skip
+
+
+def _usual_watchdog(_cause: Cause, profile: Profile) -> Iterator[Trial]:
+    watchdog = _rules(profile).watchdog
+    if watchdog.process_data is None and watchdog.divider is None:
+        return
+    usual = watchdog.model_copy(update={"process_data": None, "divider": None})
+    yield Trial(
+        "bring_up.watchdog", f"{watchdog.process_data_ns or 0} ns", "-",
+        _with_rules(profile, watchdog=usual),
+    )  # fmt: skip
+
+
+def _longer_cycle(_cause: Cause, profile: Profile) -> Iterator[Trial]:
+    for factor in _LONGER:
+        yield Trial("cycle", "1", f"{factor}", profile, cycle_factor=factor)
+
+
+def _clock_then_cycle(cause: Cause, profile: Profile) -> Iterator[Trial]:
+    """A mode of the file may fix SYNC0's cycle, then a longer cycle of ours changes nothing."""
+    mode = _rules(profile).clock_mode
+    if mode is not None and mode.sync0.cycle_ns:
+        free = mode.model_copy(update={"sync0": mode.sync0.model_copy(update={"cycle_ns": 0})})
+        yield Trial(
+            "bring_up.clock_modes.sync0.cycle_ns", f"{mode.sync0.cycle_ns}", "0",
+            _with_rules(profile, clock_modes=(free,)),
+        )  # fmt: skip
+    yield from _longer_cycle(cause, profile)
+
+
+def _clock_then_contents(cause: Cause, profile: Profile) -> Iterator[Trial]:
+    """Where the drive does not say why: what files get wrong most often."""
+    yield from _other_clock(cause, profile)
+    yield from _own_contents(cause, profile)
+
+
+_Rule = Callable[[Cause, Profile], Iterator[Trial]]
+_BY_CAUSE: dict[str, _Rule] = {
+    "assignment_locked": _own_assignment,
+    "mapping_locked": _own_contents,
+    "process_data_setup": _own_contents,
+    "outputs_size": _own_contents,
+    "inputs_size": _own_contents,
+    "init_command_refused": _without_command,
+    "clock_mode_wrong": _other_clock,
+    "clock_needed": _other_clock,
+    "sync0_missing": _other_clock,
+    "sync0_unsteady": _longer_cycle,
+    "cycle_refused": _clock_then_cycle,
+    "watchdog_refused": _usual_watchdog,
+    "makers_code": _clock_then_contents,
+    "unknown": _clock_then_contents,
+    "can_mapping_refused": _own_contents,
+    "can_bus_full": _longer_cycle,
+    "can_outputs_late": _longer_cycle,
+    "can_overrun": _longer_cycle,
+    "can_cycle_short": _longer_cycle,
+}
+
+
+def _said(flag: bool | None) -> str:
+    return "-" if flag is None else str(flag).lower()

@@ -1,0 +1,103 @@
+"""Process data objects of EDS and DCF files (CiA 301 clauses 7.5.2.35 to 7.5.2.38)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from profiles.importer.description import DescribedEntry, DescribedPdo
+from profiles.importer.eds_sections import Section
+from profiles.importer.report import ImportReport
+from profiles.importer.values import node_relative, parse_number
+from profiles.schema import PdoIdentifier
+
+_IDENTIFIER = 0x7FF
+
+
+def read_pdos(
+    entries: list[DescribedEntry], sections: dict[str, Section], name: str, report: ImportReport
+) -> list[DescribedPdo]:
+    """Default mappings out of the defaults of 1600h… and 1A00h…."""
+    by_key = {e.key: e for e in entries}
+    keys = set(by_key)
+    pdos: list[DescribedPdo] = []
+    by_index: dict[int, list[DescribedEntry]] = {}
+    for entry in entries:
+        if 0x1600 <= entry.index < 0x1800 or 0x1A00 <= entry.index < 0x1C00:
+            by_index.setdefault(entry.index, []).append(entry)
+    for index, mapping in sorted(by_index.items()):
+        layout = _layout(index, mapping, sections, keys, name, report)
+        mapped = tuple(dict.fromkeys(key for key, _ in layout if key is not None))
+        fixed = all(e.access == "ro" for e in mapping)
+        if mapped or not fixed:
+            direction: Literal["rx", "tx"] = "rx" if index < 0x1A00 else "tx"
+            pdos.append(
+                DescribedPdo(
+                    index,
+                    direction,
+                    mapped,
+                    fixed,
+                    name,
+                    layout=() if len(mapped) == len(layout) else tuple(layout),
+                    identifier=_identifier(index, by_key, sections, name, report),
+                )
+            )
+    return pdos
+
+
+def _layout(
+    index: int,
+    mapping: list[DescribedEntry],
+    sections: dict[str, Section],
+    keys: set[str],
+    name: str,
+    report: ImportReport,
+) -> list[tuple[str | None, int]]:
+    """Keys and bits as delivered. Entries behind the number of subindex 0 are not in use."""
+    place = f"{name} [{index:04X}]"
+    count = parse_number(_default(sections, index, 0), place, report)
+    layout: list[tuple[str | None, int]] = []
+    for entry in sorted(mapping, key=lambda e: e.subindex):
+        value = entry.default_raw
+        if entry.subindex == 0 or not isinstance(value, int) or value == 0:
+            continue
+        # Where the file gives 0 beside entries, it is a template that nobody filled in.
+        if count and entry.subindex > count:
+            report.noted(place, f"entry {entry.subindex} is behind the {count:g} that are in use")
+            continue
+        key = f"{value >> 16 & 0xFFFF:04X}:{value >> 8 & 0xFF:02X}"
+        bits = value & 0xFF
+        if key in keys:
+            layout.append((key, bits))
+        elif bits:
+            layout.append((None, bits))
+            if value >> 16 & 0xFFFF >= 0x20:  # below are dummies that only fill space
+                report.left_out(place, f"{key} is mapped but not described")
+    return layout
+
+
+def _identifier(
+    index: int,
+    by_key: dict[str, DescribedEntry],
+    sections: dict[str, Section],
+    name: str,
+    report: ImportReport,
+) -> PdoIdentifier | None:
+    """The COB-ID as delivered, None where the file gives none that can be one."""
+    communication = index - 0x200
+    text = _default(sections, communication, 1)
+    place = f"{name} [{communication:04X}sub1]"
+    added = node_relative(text, place, report)
+    number = added if added is not None else parse_number(text, place, report)
+    if not isinstance(number, int) or not number & _IDENTIFIER:
+        return None
+    entry = by_key.get(f"{communication:04X}:01")
+    return PdoIdentifier(
+        cob_id=number & _IDENTIFIER,
+        of_node=added is not None,
+        fixed=entry is not None and entry.access == "ro",
+    )
+
+
+def _default(sections: dict[str, Section], index: int, subindex: int) -> str:
+    section = sections.get(f"{index:04x}sub{subindex:x}")
+    return "" if section is None else section.word("defaultvalue")

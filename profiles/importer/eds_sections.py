@@ -1,0 +1,76 @@
+"""Sections of EDS and DCF files, and what their headings mean (CiA 306-1 v1.3)."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from profiles.importer.report import ImportReport
+from profiles.importer.values import parse_number
+
+_MAX_LINES = 400_000
+#: Other characters that Python calls line ends stand within texts.
+_LINE = re.compile(r"\r\r\n|\r\n|\n|\r")
+
+OBJECT = re.compile(r"(?:0x)?([0-9a-f]{4})h?$")
+SUBOBJECT = re.compile(r"(?:0x)?([0-9a-f]{4})h?\s*_?sub\s*_?(?:0x)?([0-9a-f]{1,2})$")
+COMPACT = re.compile(r"(?:0x)?([0-9a-f]{4})(name|value|denotation)$")
+#: An editor's remark behind a value: text may hold both, numbers and words of the standard cannot.
+_REMARK = re.compile(r"\s*(?:;|//).*$")
+
+
+@dataclass(slots=True)
+class Section:
+    """A section's values by lower-case key, and the line it starts on."""
+
+    line: int
+    values: dict[str, str] = field(default_factory=dict)
+
+    def get(self, *names: str) -> str:
+        """The first of these values that is not empty: editors write keys without values."""
+        return next((self.values[n] for n in names if self.values.get(n)), "")
+
+    def word(self, *names: str) -> str:
+        """The same without a remark behind it, for numbers and words of the standard."""
+        return _REMARK.sub("", self.get(*names))
+
+
+def read_sections(text: str, name: str, report: ImportReport) -> dict[str, Section]:
+    """Sections by lower-case heading; of what comes twice the first counts."""
+    sections: dict[str, Section] = {}
+    current: Section | None = None
+    for number, raw in enumerate(_LINE.split(text)[:_MAX_LINES], start=1):
+        line = raw.strip().strip("\ufeff\0\x1a")
+        place = f"{name}:{number}"
+        if not line or line[0] in ";#" or line.startswith("//"):
+            continue
+        if line[0] == "[":
+            title = line[1:].partition("]")[0].strip().lower()
+            if "]" not in line:
+                report.repaired(place, f"the section heading {line[:40]!r} is not closed")
+            if title in sections:
+                report.noted(place, f"section [{title[:40]}] comes a second time")
+            current = sections.setdefault(title, Section(number))
+            continue
+        key, equals, value = line.partition("=")
+        if not equals:
+            report.left_out(place, f"{line[:60]!r} is neither a section nor a value")
+        elif current is None:
+            report.left_out(place, f"{key.strip()[:40]!r} stands before the first section")
+        else:
+            key = key.strip().lower().replace(" ", "")
+            if key in current.values and current.values[key] != value.strip():
+                report.noted(place, f"{key[:40]} is given twice, the first one counts")
+            current.values.setdefault(key, value.strip())
+    return sections
+
+
+def node_id_of(sections: dict[str, Section], name: str) -> int | None:
+    """The node-ID that a DCF was made for; the standard spells the heading with one m."""
+    for title in ("devicecomissioning", "devicecommissioning"):
+        if title in sections:
+            text = sections[title].word("nodeid")
+            number = parse_number(text, f"{name}: NodeID", ImportReport())
+            if isinstance(number, int) and 1 <= number <= 127:
+                return number
+    return None

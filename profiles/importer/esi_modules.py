@@ -1,0 +1,95 @@
+"""Devices of modules: the modules that stand in their slots as delivered (ETG.2000, ETG.5001)."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+from profiles.bring_up import InitCommand
+from profiles.importer.report import ImportReport
+from profiles.importer.values import whole_number
+from profiles.importer.xml_tree import attribute_of, child, children, flag_of, text_of
+
+_MOST_SLOTS = 64
+_MODULE_LIST = 0xF030
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """The device itself, or a module; how far its objects and PDOs lie behind those of slot 0."""
+
+    element: Element
+    index_shift: int = 0
+    pdo_shift: int = 0
+
+
+def parts_of(root: Element, device: Element) -> list[Part]:
+    """The device and the modules of its slots; of a device without slots and without objects the
+    first module that has some."""
+    parts = [Part(device)]
+    modules = children(child(child(root, "Descriptions"), "Modules"), "Module")
+    slots = child(device, "Slots")
+    by_ident = {_number(attribute_of(child(m, "Type"), "ModuleIdent")): m for m in modules}
+    for number, slot in enumerate(children(slots, "Slot")[:_MOST_SLOTS]):
+        module = by_ident.get(_delivered(slot, number))
+        if module is not None:
+            parts.append(
+                Part(
+                    module,
+                    number * _increment(slot, slots, "SlotIndexIncrement"),
+                    number * _increment(slot, slots, "SlotPdoIncrement"),
+                )
+            )
+    if len(parts) == 1 and not dictionaries_of(device):
+        parts += [Part(m) for m in modules if dictionaries_of(m)][:1]
+    return parts
+
+
+def module_list(root: Element, device: Element) -> InitCommand | None:
+    """The write of F030h that tells the device its modules; None where the file asks for none."""
+    slots = child(device, "Slots")
+    if slots is None or not flag_of(slots, "DownloadModuleIdentList"):
+        return None
+    idents = [
+        _number(attribute_of(child(part.element, "Type"), "ModuleIdent")) or 0
+        for part in parts_of(root, device)[1:]
+    ]
+    if not idents:
+        return None
+    data = struct.pack(f"<H{len(idents)}I", len(idents), *idents)
+    return InitCommand(
+        transition="PS",
+        index=_MODULE_LIST,
+        subindex=0,
+        data=data.hex().upper(),
+        complete_access=True,
+        comment="modules in the slots as delivered",
+    )
+
+
+def dictionaries_of(element: Element) -> list[Element]:
+    """The dictionaries with objects of a device or module."""
+    found = []
+    for profile in children(element, "Profile"):
+        dictionary = child(profile, "Dictionary")
+        if dictionary is not None and child(dictionary, "Objects") is not None:
+            found.append(dictionary)
+    return found
+
+
+def _delivered(slot: Element, number: int) -> int | None:
+    """The module that stands in a slot by default; in the first slot the first that may."""
+    idents = children(slot, "ModuleIdent")
+    marked = [each for each in idents if flag_of(each, "Default")]
+    needed = number == 0 or bool(_number(attribute_of(slot, "MinInstances")))
+    chosen = marked or (idents if needed else [])
+    return _number(text_of(chosen[0])) if chosen else None
+
+
+def _increment(slot: Element, slots: Element | None, name: str) -> int:
+    return _number(attribute_of(slot, name)) or _number(attribute_of(slots, name)) or 0
+
+
+def _number(text: str) -> int | None:
+    return whole_number(text, "module", ImportReport()) if text.strip() else None

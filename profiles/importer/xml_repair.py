@@ -1,0 +1,30 @@
+"""What makers' tools write that no XML parser takes, taken out of an ESI file. Pure."""
+
+from __future__ import annotations
+
+import re
+
+_BEGIN = re.compile(r"<(?:\w+:)?EtherCATInfo(?:List)?[\s>]", re.I)
+_END = re.compile(r"</(?:\w+:)?EtherCATInfo(?:List)?\s*>", re.I)
+_CONTROL = re.compile(
+    r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]"
+    r"|&#(?:0*(?:[0-8]|1[124-9]|2\d|3[01])|[xX]0*(?:[0-8bcefBCEF]|1[0-9a-fA-F]));"
+)
+_AMPERSAND = re.compile(r"&(?!(?:#\d+|#[xX][0-9a-fA-F]+|amp|lt|gt|quot|apos);)")
+_PREFIXED = re.compile(r"(\s)(?!xmlns:)[A-Za-z_][\w.-]*:([A-Za-z_][\w.-]*\s*=\s*[\"'])")
+
+
+def mended(text: str) -> str:
+    """The text without remarks around its root, control characters and bare ampersands.
+
+    A prefix that nobody declares is taken off its attribute. What is cut off stays so.
+    """
+    begin = _BEGIN.search(text)
+    if begin is not None:
+        text = text[begin.start() :]
+    ends = list(_END.finditer(text))
+    if ends:
+        text = text[: ends[-1].end()]
+    text = _AMPERSAND.sub("&amp;", _CONTROL.sub("", text))
+    root, bracket, rest = text.partition(">")
+    return _PREFIXED.sub(r"\1\2", root) + bracket + rest
