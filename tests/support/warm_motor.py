@@ -99,7 +99,7 @@ class WarmMotor:
         self, losses: float, air: float, torque: FloatArray, speed_ratio: FloatArray,
         ambient_c: float = 40.0,
     ) -> float | None:  # fmt: skip
-        """When the end winding exceeds the rated rise at 40 °C; a cycle short against all bodies."""
+        """When the end winding exceeds its temperature at rated load; the cycle is short."""
         copper = float(np.mean(self.current(torque) ** 2))
         iron = float(np.mean(np.abs(speed_ratio) ** 1.5))
         limit = RATED_RISE_K + 40.0 - ambient_c

@@ -48,7 +48,8 @@ def test_figures_of_a_trapezoid() -> None:
     found = effective_torque(signals, moments)
     assert found.value == pytest.approx(np.sqrt(squares), rel=2e-3)
     low, high = found.ci95
-    assert low is not None and high is not None
+    assert low is not None
+    assert high is not None
     assert low <= np.sqrt(squares) * 1.002
     assert high >= np.sqrt(squares) * 0.998
     assert mean_speed_rpm(signals, moments) == pytest.approx(1500.0 * 0.6 / PERIOD_S, rel=2e-3)
@@ -71,7 +72,8 @@ def test_slow_uneven_polling_finds_the_same_within_its_interval() -> None:
     truth = np.sqrt((0.2 * 210.0**2 + 0.2 * 190.0**2 + 0.4 * 10.0**2) / PERIOD_S)
     assert found.value == pytest.approx(truth, rel=0.05)
     low, high = found.ci95
-    assert low is not None and high is not None
+    assert low is not None
+    assert high is not None
     assert low < found.value < high
 
 

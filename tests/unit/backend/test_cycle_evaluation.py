@@ -64,7 +64,9 @@ def test_it_trips_after_minutes_that_follow_from_the_catalogue() -> None:
     result = found(200.0, thermal_time_min=20.0)
     assert result.heat is not None
     earliest, latest = result.heat.trip_s
-    assert earliest is not None and latest is not None and result.heat.about_s is not None
+    assert earliest is not None
+    assert latest is not None
+    assert result.heat.about_s is not None
     # One body and four times the losses: τ·ln(4/3) = 5.75 min; the winding is warm sooner.
     assert earliest < 5.75 * 60.0 < latest
     assert 0.5 * 60.0 < result.heat.about_s < 5.75 * 60.0
