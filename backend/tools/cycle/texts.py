@@ -77,7 +77,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "trips.between": (
         "It trips, or is too warm, after about {about} min at {ambient} °C ({low} to {high} min), "
         "from a motor as cold as that; sooner where it is warm already.",
-        "从与环境同温的冷态起，环境 {ambient} °C 时 约 {about} min（{low} 至 {high} min）"
+        "从与环境同温的冷态起，环境 {ambient} °C 时约 {about} min（{low} 至 {high} min）"
         "后跳闸或过热；"
         "若电机已热则更早。",
     ),

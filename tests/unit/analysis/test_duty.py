@@ -16,9 +16,12 @@ from backend.analysis.duty.load import (
     share_above,
     whole_periods,
 )
-from tests.support.warm_motor import WarmMotor
+from tests.support.warm_motor import RATED_RISE_K, WarmMotor
 
 PERIOD_S = 1.6
+LOSSES_W, RATED_RPM = 90.0, 3000.0
+#: Peak of the torque in %, temperature about the motor in °C.
+CASES = ((120.0, 40.0), (170.0, 40.0), (200.0, 40.0), (230.0, 25.0), (300.0, 40.0))
 
 
 def machine(
@@ -140,9 +143,9 @@ MOTORS = {
 def test_the_range_holds_for_motors_of_other_physics(name: str) -> None:
     """Four bodies, convection and iron by other laws: when they are too warm is in the range, and
     whoever is said to endure a cycle does."""
-    motor, losses = MOTORS[name], 90.0
-    air = motor.calibrated(losses)
-    tau = motor.time_constant_s(losses, air)
+    motor = MOTORS[name]
+    air = motor.calibrated(LOSSES_W)
+    tau = motor.time_constant_s(LOSSES_W, air)
     decided = 0
     for peak, ambient in (
         (120.0, 40.0),
@@ -153,11 +156,11 @@ def test_the_range_holds_for_motors_of_other_physics(name: str) -> None:
     ):
         signals = machine(16.0, 200.0, peak=peak)
         truth = motor.too_warm_s(
-            losses, air, signals.torque_percent / 100.0, signals.speed_rpm / 3000.0, ambient
+            LOSSES_W, air, signals.torque_percent / 100.0, signals.speed_rpm / RATED_RPM, ambient
         )
-        permitted = permitted_rise(ambient, 105.0)
+        permitted = permitted_rise(ambient, RATED_RISE_K)
         assert permitted is not None
-        found = heat_of(signals, 3000.0, permitted=permitted, time_constant_s=tau)
+        found = heat_of(signals, RATED_RPM, permitted=permitted, time_constant_s=tau)
         earliest, latest = found.trip_s
         low, high = found.rise
         if truth is None:
