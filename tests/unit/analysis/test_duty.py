@@ -183,3 +183,26 @@ def test_without_a_time_constant_the_verdict_stays() -> None:
         assert found.trip_s == (None, None)
         assert (found.rise[1] < 1.0) is endures
         assert (found.rise[0] > 1.0) is not endures
+
+
+def test_the_torque_at_standstill_narrows_the_range() -> None:
+    """Without iron losses the copper may have them, too: T₀² = 1 / (1 − share)."""
+    motor = MOTORS["ordinary"]
+    air = motor.calibrated(LOSSES_W)
+    tau = motor.time_constant_s(LOSSES_W, air)
+    cycle = machine(16.0, 200.0, peak=300.0)
+    truth = motor.too_warm_s(
+        LOSSES_W, air, cycle.torque_percent / 100.0, cycle.speed_rpm / RATED_RPM
+    )
+    wide = heat_of(cycle, RATED_RPM, permitted=1.0, time_constant_s=tau)
+    stated = (1.0 - motor.iron_share) ** -0.5
+    found = heat_of(cycle, RATED_RPM, permitted=1.0, time_constant_s=tau, standstill=stated)
+    assert truth is not None
+    (earliest, latest), (first, last) = found.trip_s, wide.trip_s
+    assert earliest is not None
+    assert latest is not None
+    assert first is not None
+    assert last is not None
+    assert earliest <= truth <= latest
+    assert first <= earliest
+    assert latest < 0.8 * last
