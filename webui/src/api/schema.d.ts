@@ -1261,6 +1261,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/jobs/safety-check": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Safety-Check
+         * @description Watch what the axis does when you trigger a safety function by hand: torque, stop and speed. It records and does not certify. The axis moves.
+         */
+        post: operations["start_safety-check"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/jobs/sequence": {
         parameters: {
             query?: never;
@@ -2539,6 +2559,28 @@ export interface paths {
         get: operations["download_measurement"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/measurements/{name}/signature": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Sign Measurement
+         * @description Sign the record of a safety function, once. It certifies nothing.
+         *
+         *     Who is logged in signs by that name; ``person`` counts where the page is used without accounts.
+         */
+        post: operations["sign_measurement"];
         delete?: never;
         options?: never;
         head?: never;
@@ -7447,7 +7489,7 @@ export interface components {
              * Result
              * @description of a tool: its result, which its field tool names
              */
-            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | components["schemas"]["PlainResult"] | null;
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | components["schemas"]["PlainResult"] | null;
             /**
              * Started
              * Format: date-time
@@ -8059,7 +8101,7 @@ export interface components {
              * Result
              * @description of a tool: its result, which its field tool names
              */
-            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | {
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | {
                 [key: string]: unknown;
             };
             /** Settings */
@@ -9872,6 +9914,241 @@ export interface components {
          */
         Role: "viewer" | "operator" | "administrator" | "guest";
         /**
+         * SafetyResult
+         * @description Times are in ms from the first sign on the bus, ways in revolutions of the motor.
+         *
+         *     No time includes what passed from the person's hand to that sign: contacts, the safety relay
+         *     and the drive's own input are not on the bus. ``torque`` is what the drive says of itself, in %
+         *     of the motor's rated torque. ``measured_at`` is ISO 8601, UTC.
+         */
+        SafetyResult: {
+            /** Device */
+            device: string;
+            /**
+             * Exceeded
+             * @default []
+             */
+            exceeded: ("torque_free" | "stop_time" | "stop_distance" | "speed")[];
+            /**
+             * Function
+             * @enum {string}
+             */
+            function: "sto" | "ss1" | "limit_positive" | "limit_negative" | "speed_limit";
+            /**
+             * Highest Rpm
+             * @default 0
+             */
+            highest_rpm: number;
+            /** Limited Rpm */
+            limited_rpm?: number | null;
+            /** Measured At */
+            measured_at: string;
+            /**
+             * Measurements
+             * @description names of the stored raw data
+             * @default []
+             */
+            measurements: string[];
+            /** Obstacle */
+            obstacle?: ("torque_in_noise" | "too_slow" | "samples_lost" | "stayed_enabled" | "quick_stop_cut") | null;
+            /** Person */
+            person: string;
+            /**
+             * Reports
+             * @description faults of the drive at the end; one that is no sign of the function stopped the axis instead of it
+             * @default []
+             */
+            reports: string[];
+            /** Sign */
+            sign?: ("state" | "speed") | null;
+            signature?: components["schemas"]["Signature"] | null;
+            /** Speed At Torque Free Rpm */
+            speed_at_torque_free_rpm?: number | null;
+            /**
+             * Speed Rpm
+             * @description when it was triggered
+             */
+            speed_rpm?: number | null;
+            /** Stop Ms */
+            stop_ms?: number | null;
+            /** Stop Rev */
+            stop_rev?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            tool: "safety-check";
+            /**
+             * Torque After Percent
+             * @description greatest magnitude after that, until the end
+             */
+            torque_after_percent?: number | null;
+            /** Torque Before Percent */
+            torque_before_percent?: number | null;
+            /** Torque Free Ci95 Ms */
+            torque_free_ci95_ms?: [
+                number,
+                number
+            ] | null;
+            /** Torque Free Ms */
+            torque_free_ms?: number | null;
+            /**
+             * Torque Noise Percent
+             * @description below it no torque can be distinguished
+             */
+            torque_noise_percent: number;
+            /**
+             * Trace Commanded Rpm
+             * @description [n]
+             * @default []
+             */
+            trace_commanded_rpm: number[];
+            /**
+             * Trace Ms
+             * @description [n] from the first sign
+             * @default []
+             */
+            trace_ms: number[];
+            /**
+             * Trace Rpm
+             * @description [n] by the position
+             * @default []
+             */
+            trace_rpm: number[];
+            /**
+             * Trace Torque Percent
+             * @description [n]
+             * @default []
+             */
+            trace_torque_percent: number[];
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            verdict: "not_triggered" | "torque_remains" | "still_turning" | "restarted" | "power_off_at_speed" | "no_reaction" | "beyond_limits" | "not_shown" | "within_limits" | "recorded";
+            /**
+             * Watched Ms
+             * @description from the first sign to the end
+             * @default 0
+             */
+            watched_ms: number;
+        };
+        /**
+         * SafetySettings
+         * @description One function at a time: after a person has stopped the axis, nothing moves it by itself.
+         *
+         *     Limits that are None are not judged, only recorded.
+         */
+        SafetySettings: {
+            /**
+             * Consent
+             * @description the user agreed that nothing in the drive ends a speed when this computer falls silent; needed where the drive has no watchdog (DS_C)
+             * @default false
+             */
+            consent: boolean;
+            /**
+             * Cycle Ms
+             * @description cycle of the exchange that is started where none runs, and ended afterwards
+             * @default 1
+             */
+            cycle_ms: number;
+            /**
+             * Device
+             * @description what you trigger it with, such as emergency stop S1 or guard switch B3
+             * @default
+             */
+            device: string;
+            /**
+             * Function
+             * @description the function that you trigger
+             * @default sto
+             * @enum {string}
+             */
+            function: "sto" | "ss1" | "limit_positive" | "limit_negative" | "speed_limit";
+            /**
+             * Limited Rpm
+             * @description the speed limit, in rpm; of the speed limit only
+             */
+            limited_rpm?: number | null;
+            /**
+             * Load Supported
+             * @description you state that the hanging load is supported, cannot fall and cannot be lifted off its support, and that nobody is below it
+             * @default false
+             */
+            load_supported: boolean;
+            /**
+             * Nothing Hangs
+             * @description you state that no load pulls at the axis, so that it stays without torque
+             * @default false
+             */
+            nothing_hangs: boolean;
+            /**
+             * Person
+             * @description who triggers it and watches the axis
+             * @default
+             */
+            person: string;
+            /**
+             * Rated Torque Nm
+             * @description overrides what the drive says
+             */
+            rated_torque_nm?: number | null;
+            /**
+             * Speed Limit
+             * @description highest speed, in rpm
+             */
+            speed_limit: number;
+            /**
+             * Speed Rpm
+             * @description speed at which it is triggered, in rpm
+             * @default 100
+             */
+            speed_rpm: number;
+            /**
+             * Stop Limit Ms
+             * @description longest time to standstill, in ms
+             */
+            stop_limit_ms?: number | null;
+            /**
+             * Stop Limit Rev
+             * @description longest way to standstill, in revolutions
+             */
+            stop_limit_rev?: number | null;
+            /**
+             * Time Limit S
+             * @description longest time of a motion, in s
+             * @default 60
+             */
+            time_limit_s: number;
+            /**
+             * Torque Free Limit Ms
+             * @description longest time until no torque is left, in ms
+             */
+            torque_free_limit_ms?: number | null;
+            /**
+             * Torque Limit
+             * @description highest torque, in % of rated
+             */
+            torque_limit: number;
+            /**
+             * Travel Limit
+             * @description longest way from the start, in revolutions
+             */
+            travel_limit: number;
+            /**
+             * Wait S
+             * @description time in which you trigger it, in s
+             * @default 10
+             */
+            wait_s: number;
+            /**
+             * Watch S
+             * @description time that is watched after that, in s
+             * @default 3
+             */
+            watch_s: number;
+        };
+        /**
          * SaveSetRequest
          * @description Store the present values of a drive.
          */
@@ -10570,6 +10847,41 @@ export interface components {
             name: string;
             /** Password */
             password: string;
+        };
+        /**
+         * Signature
+         * @description Who signed the record, when. ``intact``: the signed contents have the same checksum now.
+         */
+        Signature: {
+            /** Intact */
+            intact: boolean;
+            /**
+             * Notes
+             * @default
+             */
+            notes: string;
+            /** Person */
+            person: string;
+            /** Sha256 */
+            sha256: string;
+            /** Signed */
+            signed: string;
+        };
+        /**
+         * SignatureRequest
+         * @description Who signs a record where nobody is logged in by name, and what is to be known of it.
+         */
+        SignatureRequest: {
+            /**
+             * Notes
+             * @default
+             */
+            notes: string;
+            /**
+             * Person
+             * @default
+             */
+            person: string;
         };
         /**
          * SmallMoveRequest
@@ -12005,6 +12317,8 @@ export type ResonanceInfo = components['schemas']['ResonanceInfo'];
 export type RetentionBounds = components['schemas']['RetentionBounds'];
 export type Right = components['schemas']['Right'];
 export type Role = components['schemas']['Role'];
+export type SafetyResult = components['schemas']['SafetyResult'];
+export type SafetySettings = components['schemas']['SafetySettings'];
 export type SaveSetRequest = components['schemas']['SaveSetRequest'];
 export type ScaleInfo = components['schemas']['ScaleInfo'];
 export type ScalesInfo = components['schemas']['ScalesInfo'];
@@ -12030,6 +12344,8 @@ export type SerialPort = components['schemas']['SerialPort'];
 export type Session = components['schemas']['Session'];
 export type SessionInfo = components['schemas']['SessionInfo'];
 export type SetUp = components['schemas']['SetUp'];
+export type Signature = components['schemas']['Signature'];
+export type SignatureRequest = components['schemas']['SignatureRequest'];
 export type SmallMoveRequest = components['schemas']['SmallMoveRequest'];
 export type SmallMovesInfo = components['schemas']['SmallMovesInfo'];
 export type SnapshotHeader = components['schemas']['SnapshotHeader'];
@@ -22524,6 +22840,149 @@ export interface operations {
             };
         };
     };
+    "start_safety-check": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SafetySettings"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     start_sequence: {
         parameters: {
             query?: never;
@@ -32717,6 +33176,149 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    sign_measurement: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SignatureRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SafetyResult"];
+                };
             };
             /** @description Not a request of this interface */
             400: {
