@@ -107,6 +107,11 @@ COMMANDS = {
         "Watch what the axis does when you trigger a safety function by hand: torque, stop and "
         "speed. It records and does not certify. The axis moves.",
     ),
+    "cycle": (
+        "tools:cycle",
+        "Torque, heat and braking energy of the machine's own cycle, by reading or from a "
+        "recording. Nothing is written, nothing moves.",
+    ),
     "autotune": (
         "tune:autotune",
         "Measure, design and, with --apply or --keep, verify an axis's loop gains. The axis moves.",

@@ -166,6 +166,18 @@ async def exchanging(
             await session.stop()
 
 
+@asynccontextmanager
+async def reading(url: str | None, station: int, profile: str | None) -> AsyncIterator[Axis]:
+    """The drive for a tool that reads alone: no exchange, no grant, and nothing is written."""
+    from backend.commands.scales import take_taught
+
+    assert url is not None, "Where.asked says so"
+    async with drive_and_pending(url, station, profile) as (drive, _pending):
+        axis = Axis(drive)
+        await take_taught(axis)
+        yield axis
+
+
 class Where(NamedTuple):
     """A drive by bus URL and station, or by the name that a server gives it."""
 

@@ -7,6 +7,7 @@ import types
 import typing
 from collections.abc import Callable, Iterator
 from enum import StrEnum
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
@@ -36,6 +37,10 @@ def command_of(tool: AnyTool) -> Callable[..., None]:
         where = measure.Where(*(given[name] for name in _WHERE))
 
         async def here() -> dict[str, object]:
+            if not tool.motion:
+                async with measure.reading(where.url, where.station, where.profile) as axis:
+                    found = await tool.run(Run(axis, None, progress(), recording=Path), settings)
+                return dict(found.model_dump(mode="json"))
             async with measure.exchanging(
                 where.url, where.station, where.profile, settings.cycle_ms, settings.envelope,
                 settings.consent, closes_loops=tool.closes_loops,
@@ -138,3 +143,4 @@ friction = command_of(BY_KIND["friction"])
 brake_test = command_of(BY_KIND["brake-test"])
 first_power = command_of(BY_KIND["first-power"])
 safety_check = command_of(BY_KIND["safety-check"])
+cycle = command_of(BY_KIND["cycle"])

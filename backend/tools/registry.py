@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from backend.tools.brake.run import TOOL as BRAKE_TEST
+from backend.tools.cycle.run import TOOL as CYCLE
 from backend.tools.first_power.run import TOOL as FIRST_POWER
 from backend.tools.friction.run import TOOL as FRICTION
 from backend.tools.health.run import TOOL as HEALTH
@@ -19,5 +20,6 @@ TOOLS: tuple[AnyTool, ...] = (
     BRAKE_TEST,
     HEALTH,
     SAFETY_CHECK,
+    CYCLE,
 )
 BY_KIND: dict[str, AnyTool] = {tool.kind: tool for tool in TOOLS}

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from backend.tools.autotune.result import AutotuneAnswer
 from backend.tools.brake.result import BrakeResult
+from backend.tools.cycle.result import CycleResult
 from backend.tools.first_power.result import FirstPowerResult
 from backend.tools.friction.result import FrictionResult
 from backend.tools.health.result import HealthResult
@@ -27,6 +28,7 @@ ToolOutcome: TypeAlias = Annotated[
     | HealthResult
     | FirstPowerResult
     | SafetyResult
+    | CycleResult
     | SweepAnswer
     | AutotuneAnswer,
     Field(discriminator="tool"),

@@ -20,6 +20,8 @@ from backend.work.jobs import Progress
 from drivers.texts.message import Language, Text
 
 if TYPE_CHECKING:  # who only reads results or settings imports no analysis
+    from pathlib import Path
+
     import numpy as np
     import numpy.typing as npt
 
@@ -101,16 +103,24 @@ class ToolResult(BaseModel):
 class Run:
     """What a tool is given for one measurement.
 
-    ``session`` exchanges process data; ``keep`` stores raw data before they are evaluated;
-    ``repeats`` bounds what is measured again only to know it better.
+    ``exchange`` exchanges process data, None for a tool that moves nothing; ``keep`` stores raw
+    data before they are evaluated; ``repeats`` bounds what is measured again only to know it
+    better; ``recording`` finds the file of a recording by its name.
     """
 
     axis: Axis
-    session: CyclicSession
+    exchange: CyclicSession | None
     progress: Progress
     keep: Keep | None = None
     repeats: Repeats = field(default_factory=Repeats)
     begun_s: float = field(default_factory=time.monotonic)
+    recording: Callable[[str], Path] | None = None
+
+    @property
+    def session(self) -> CyclicSession:
+        """The exchange of a tool that moves the axis."""
+        assert self.exchange is not None, "a tool that moves has one"
+        return self.exchange
 
     @property
     def passed_s(self) -> float:
@@ -168,7 +178,7 @@ class Section:
     charts: tuple[Chart, ...] = ()
 
 
-S = TypeVar("S", bound=ToolSettings)
+S = TypeVar("S", bound=BaseModel)
 R = TypeVar("R", bound=ToolResult)
 
 
@@ -180,7 +190,9 @@ class Tool(Generic[S, R]):
     catalogue, since jobs and log lines name the tool to readers of both languages. ``texts`` hold
     at least "help" and "field.<name>" of every setting of its own. ``reevaluate`` makes the result
     again from arrays and meta data as ``run`` kept them and raises ValueError where they are not
-    of this tool. ``right`` is what a person needs to start it; ``motion``: it moves.
+    of this tool. ``right`` is what a person needs to start it. ``motion`` False: it reads alone, so
+    that no exchange is started for it, it holds no grant, and needs no control of the axis; its
+    settings have no envelope then.
     ``closes_loops`` False: it runs before anybody knows whether a loop may be closed, so that no
     speed is tried and no ramp is prepared before it.
     """

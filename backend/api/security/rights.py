@@ -151,7 +151,12 @@ _API: dict[str, Need] = {
     "POST /drives/{drive_id}/jobs/identify": _MOTION,
     "POST /drives/{drive_id}/jobs/sweep": _MEASURE,
     "POST /drives/{drive_id}/jobs/autotune": _MEASURE,
-    **{f"POST /drives/{{drive_id}}/jobs/{tool.kind}": Need(tool.right, "drive") for tool in TOOLS},
+    **{
+        f"POST /drives/{{drive_id}}/jobs/{tool.kind}": Need(
+            tool.right, "drive" if tool.motion else "none"
+        )
+        for tool in TOOLS
+    },
     "GET /tools": _LOOK,
     "POST /drives/{drive_id}/jobs/firmware": Need(Right.STATION, "drive", _FILE),
     "GET /drives/{drive_id}/io": _LOOK,

@@ -9,12 +9,14 @@ from datetime import UTC, datetime
 import numpy as np
 import numpy.typing as npt
 from fastapi import APIRouter
+from pydantic import BaseModel
 
 from backend.api import convert
 from backend.api.context import Controlled, TheBench, TheDrive
 from backend.api.health.kept import keep_health
 from backend.api.models import JobInfo
 from backend.api.report import routes as routes_report
+from backend.api.scope.recordings import TheRecordings
 from backend.api.tuning import design as routes_design
 from backend.api.tuning import measurements as routes_measurements
 from backend.api.tuning import response_import as routes_response_import
@@ -33,6 +35,7 @@ from backend.report.changes import Change
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.station.measuring import EXCHANGE_ENDS_S, exchange_for
+from backend.station.recording.service import Recordings
 from backend.tools.autotune import run as autotune
 from backend.tools.autotune.apply import take_back
 from backend.tools.health.settings import HealthSettings
@@ -242,16 +245,48 @@ async def start_tool(
     )
 
 
+async def _start_reading(
+    bench: Bench, connected: ConnectedDrive, recordings: Recordings, tool: AnyTool,
+    request: BaseModel,
+) -> JobInfo:  # fmt: skip
+    """Start a tool that moves nothing: no exchange, no grant, and no control of the axis."""
+    files: list[str] = []
+
+    def keep(
+        name: str, arrays: dict[str, npt.NDArray[np.generic]], meta: dict[str, object]
+    ) -> None:
+        files.append(bench.measurements.save(name, connected.drive, arrays, meta))
+
+    async def work(progress: Progress) -> JobResult:
+        given = Run(
+            connected.axis, None, progress, keep, recording=recordings.library.existing
+        )  # fmt: skip
+        result = dict((await tool.run(given, request)).model_dump(mode="json"))
+        await asyncio.to_thread(_conclude, bench.measurements, files, result)
+        return result | {"measurements": files}
+
+    title = text("work.of-drive", title=tool.title, drive=connected.drive.name)
+    job = bench.jobs.start(tool.kind, title, work, drive=connected.drive.id)
+    bench.journal.add(job.title_text, drive=connected.drive.id)
+    return convert.job(job)
+
+
 def _add(tool: AnyTool) -> None:
     """The route that starts this tool."""
+
+    async def start_reading(
+        bench: TheBench, connected: TheDrive, recordings: TheRecordings, request: BaseModel
+    ) -> JobInfo:
+        return await _start_reading(bench, connected, recordings, tool, request)
 
     async def start(bench: TheBench, connected: Controlled, request: ToolSettings) -> JobInfo:
         return await start_tool(bench, connected, tool, request)
 
     # The body is the tool's own settings, which the interface's description shows.
-    start.__annotations__["request"] = tool.settings
+    route = start if tool.motion else start_reading
+    route.__annotations__["request"] = tool.settings
     router.add_api_route(
-        f"/drives/{{drive_id}}/jobs/{tool.kind}", start, methods=["POST"], status_code=202,
+        f"/drives/{{drive_id}}/jobs/{tool.kind}", route, methods=["POST"], status_code=202,
         name=f"start_{tool.kind}", description=tool.text("help"),
     )  # fmt: skip
 

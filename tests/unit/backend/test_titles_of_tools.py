@@ -27,6 +27,7 @@ TITLES = {
     "brake-test": ("Brake test", "抱闸测试"),
     "health": ("Health check", "健康检查"),
     "safety-check": ("Safety acceptance record", "安全验收记录"),
+    "cycle": ("Load of the machine's cycle", "机器循环负载"),
 }
 
 
@@ -67,7 +68,8 @@ async def test_a_started_measurement_has_its_title_in_both_languages(
 ) -> None:
     english, chinese = TITLES[tool.kind]
     spoken = {"Accept-Language": "zh-CN"}
-    answer = await http.post(f"/drives/x/jobs/{tool.kind}", json=LIMITS, headers=spoken)
+    given = LIMITS if tool.motion else {}
+    answer = await http.post(f"/drives/x/jobs/{tool.kind}", json=given, headers=spoken)
     assert answer.status_code == 202, answer.text
     job = answer.json()
     assert chinese in job["title"]
@@ -78,6 +80,7 @@ async def test_a_started_measurement_has_its_title_in_both_languages(
     logged = (await http.get("/log", headers=spoken)).json()[0]
     assert logged["text"] == job["title"]
     assert x.drive.name in job["title"]
-    running = bench.jobs.moving("x")
+    running = bench.jobs.get(job["id"])
     assert running is not None
+    assert (bench.jobs.moving("x") is running) is tool.motion
     await bench.jobs.cancel(running)

@@ -25,7 +25,7 @@ from backend.api.app import make_app
 from backend.api.audit.audited import REPORTED_THERE
 from backend.api.security.rights import ROUTES
 from backend.axis.axis import Axis
-from backend.commands import measure, report
+from backend.commands import measure, report, session
 from backend.commands.remote import Remote
 from backend.station.bench import Bench
 from backend.tools.friction.result import Code
@@ -173,3 +173,39 @@ def test_every_finding_of_a_friction_map_has_words() -> None:
     assert {f"finding.{code}" for code in get_args(Code)} == {
         name for name in texts if name.startswith("finding.")
     }
+
+
+@pytest.mark.usefixtures("asked")
+def test_a_cycle_is_read_by_a_server_without_a_motion(tmp_path: Path) -> None:
+    """An axis at rest: nothing moved meanwhile, and that is what is said."""
+    file = tmp_path / "cycle.json"
+    code, out, err = run("cycle", *AT, "--duration-s", "2", "--out", str(file))
+    assert code == 0, err
+    assert "The axis neither moved nor carried torque meanwhile" in out
+    answer = json.loads(file.read_text())
+    assert (answer["tool"], answer["verdict"]) == ("cycle", "idle")
+    assert len(answer["measurements"]) == 1
+
+
+def test_a_cycle_is_read_on_a_bus_of_ones_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    link = DirectLink(make_device("mms7", ONE), load_profile("mms7"))
+    touched: list[object] = []
+
+    async def forbidden(*words: object) -> None:
+        touched.append(words)
+
+    for name in ("write", "configure", "start", "play", "drive_to"):
+        monkeypatch.setattr(link, name, forbidden)
+    monkeypatch.setattr(session, "link_for", lambda _url: link)
+    code, out, err = run(
+        "cycle", URL, "--station", "1", "--profile", "mms7", "--duration-s", "2", "--json"
+    )
+    assert code == 0, err
+    assert json.loads(out)["verdict"] == "idle"
+    assert touched == []
+
+
+def test_half_of_an_overload_is_refused() -> None:
+    done = CliRunner().invoke(cli.app, ["cycle", URL, "--overload-percent", "300"])
+    assert done.exit_code == 2
+    assert "give both overload_percent and overload_s" in re.sub(r"[\s│]+", " ", done.output)

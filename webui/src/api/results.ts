@@ -1,5 +1,6 @@
 import type {
   BrakeResult,
+  CycleResult,
   FirstPowerResult,
   FrictionResult,
   HealthResult,
@@ -12,6 +13,7 @@ import type {
 /** What a tool concluded: distinguished by its field `tool`. */
 type ToolOutcome =
   | BrakeResult
+  | CycleResult
   | FirstPowerResult
   | FrictionResult
   | HealthResult
@@ -50,4 +52,10 @@ export function asSafetyCheck(result: unknown): SafetyResult | null {
 export function asFirstPower(result: unknown): FirstPowerResult | null {
   const found = outcome(result)
   return found?.tool === 'first-power' ? found : null
+}
+
+/** The load of a cycle, or null where it is something else. */
+export function asCycle(result: unknown): CycleResult | null {
+  const found = outcome(result)
+  return found?.tool === 'cycle' ? found : null
 }

@@ -996,6 +996,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/jobs/cycle": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Cycle
+         * @description Torque, speed, heat and braking energy of the machine's own cycle, from reading the drive or from a recording. Nothing is written and nothing is moved.
+         */
+        post: operations["start_cycle"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/jobs/firmware": {
         parameters: {
             query?: never;
@@ -4611,6 +4631,229 @@ export interface components {
             y: number | null;
         };
         /**
+         * CycleHeat
+         * @description Ends of a range over motors that agree with the catalogue. Seconds count from a motor as
+         *     cold as its surroundings; null: never, or (as the earlier end) not known.
+         */
+        CycleHeat: {
+            /**
+             * About S
+             * @description of a motor in the middle of the range
+             */
+            about_s: number | null;
+            /** Ambient C */
+            ambient_c: number;
+            /**
+             * Rise Share
+             * @description highest rise, of the permitted rise
+             */
+            rise_share: [
+                number,
+                number
+            ];
+            /** Time Constant Min */
+            time_constant_min: number | null;
+            /** Trip S */
+            trip_s: [
+                number | null,
+                number | null
+            ];
+        };
+        /**
+         * CycleOverload
+         * @description The I²t budget of a stated overload; ``trip_s`` is null where it is never exceeded.
+         */
+        CycleOverload: {
+            /** Percent */
+            percent: number;
+            /** Seconds */
+            seconds: number;
+            /** Trip S */
+            trip_s: number | null;
+            /** Used Share */
+            used_share: number;
+        };
+        /**
+         * CyclePower
+         * @description Mechanical, at the shaft: what comes back to the drive is less, by the losses of both.
+         */
+        CyclePower: {
+            /**
+             * Braking J
+             * @description in one period, or in the recording where none is known
+             */
+            braking_j: number;
+            /** Braking Mean W */
+            braking_mean_w: number;
+            /** Highest Braking W */
+            highest_braking_w: number;
+            /** Highest W */
+            highest_w: number;
+            /** Mean W */
+            mean_w: number;
+        };
+        /**
+         * CycleResult
+         * @description ``drive_load_percent`` is what the drive shows of its load, by a rule of its own.
+         */
+        CycleResult: {
+            /**
+             * Above Rated Share
+             * @description share of the time above rated torque
+             */
+            above_rated_share: number;
+            /**
+             * Cloud Speed Rpm
+             * @description [n], rising
+             */
+            cloud_speed_rpm: number[];
+            /**
+             * Cloud Torque Percent
+             * @description [n]
+             */
+            cloud_torque_percent: number[];
+            /**
+             * Dc Voltage V
+             * @description lowest and highest that was read
+             */
+            dc_voltage_v: [
+                number,
+                number
+            ] | null;
+            /** Drive Load Percent */
+            drive_load_percent: number | null;
+            /** Duration S */
+            duration_s: number;
+            /**
+             * Findings
+             * @default []
+             */
+            findings: components["schemas"]["backend__tools__cycle__result__Finding"][];
+            heat: components["schemas"]["CycleHeat"] | null;
+            /** Highest Speed Rpm */
+            highest_speed_rpm: number;
+            /** Longest Gap S */
+            longest_gap_s: number;
+            /** Mean Speed Rpm */
+            mean_speed_rpm: number;
+            /**
+             * Measurements
+             * @description names of the stored raw data
+             * @default []
+             */
+            measurements: string[];
+            overload: components["schemas"]["CycleOverload"] | null;
+            /** Peak Limit Percent */
+            peak_limit_percent: number | null;
+            /**
+             * Peak Limit Stated
+             * @description false: it is the drive's own torque limit
+             */
+            peak_limit_stated: boolean;
+            /** Peak Percent */
+            peak_percent: number;
+            /** Period S */
+            period_s: number | null;
+            /** Periods */
+            periods: number;
+            power: components["schemas"]["CyclePower"] | null;
+            /** Rated Speed Rpm */
+            rated_speed_rpm: number | null;
+            /** Rated Torque Nm */
+            rated_torque_nm: number | null;
+            /** Recording */
+            recording: string | null;
+            /** Rms Ci95 Percent */
+            rms_ci95_percent: [
+                number | null,
+                number | null
+            ];
+            /** Rms Percent */
+            rms_percent: number;
+            /** Sample Rate Hz */
+            sample_rate_hz: number;
+            /** Samples */
+            samples: number;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            tool: "cycle";
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            verdict: "endures" | "overloads" | "undecided" | "idle";
+        };
+        /**
+         * CycleSettings
+         * @description How long to read, or which recording; and what catalogues state of motor and drive.
+         */
+        CycleSettings: {
+            /**
+             * Ambient C
+             * @description temperature about the motor, in °C
+             * @default 40
+             */
+            ambient_c: number;
+            /**
+             * Duration S
+             * @description how long the drive is read, in s
+             * @default 60
+             */
+            duration_s: number;
+            /**
+             * Motor Rated Nm
+             * @description rated torque in N·m, if not the drive's
+             */
+            motor_rated_nm?: number | null;
+            /**
+             * Motor Rated Rpm
+             * @description rated speed in rpm, if not the drive's
+             */
+            motor_rated_rpm?: number | null;
+            /**
+             * Overload Percent
+             * @description overload that the catalogue permits, in % of rated torque; with --overload-s
+             */
+            overload_percent?: number | null;
+            /**
+             * Overload S
+             * @description for how long it permits it, in s
+             */
+            overload_s?: number | null;
+            /**
+             * Peak Percent
+             * @description peak torque of the motor, in % of rated; the drive's limit without it
+             */
+            peak_percent?: number | null;
+            /**
+             * Period S
+             * @description time of one machine cycle in s; found where not given
+             */
+            period_s?: number | null;
+            /**
+             * Recording
+             * @description a recording that is evaluated instead of reading the drive
+             */
+            recording?: string | null;
+            /**
+             * Rise K
+             * @description rise of the winding at rated torque in K; needed where it is not 40 °C
+             */
+            rise_k?: number | null;
+            /**
+             * Standstill Percent
+             * @description torque that the motor carries for long at standstill, in % of rated
+             */
+            standstill_percent?: number | null;
+            /**
+             * Thermal Time Min
+             * @description thermal time constant of the motor by its catalogue, in min
+             */
+            thermal_time_min?: number | null;
+        };
+        /**
          * CyclicInfo
          * @description The running cyclic exchange of a bus.
          */
@@ -4667,27 +4910,6 @@ export interface components {
             product_code: number | null;
             /** Revision */
             revision: number | null;
-        };
-        /**
-         * DetectedInfo
-         * @description Median motion on lines that were left empty, as a share of that on the lines around.
-         */
-        DetectedInfo: {
-            /**
-             * Even
-             * @description on even lines, without noise
-             */
-            even: number;
-            /**
-             * Noise
-             * @description scatter of the mean over the periods
-             */
-            noise: number;
-            /**
-             * Odd
-             * @description on odd lines, without noise
-             */
-            odd: number;
         };
         /**
          * Diff
@@ -5266,25 +5488,6 @@ export interface components {
             torque_hz: number | null;
         };
         /**
-         * Finding
-         * @description What the map says, or cannot say, as a code with the figure that it rests on.
-         */
-        Finding: {
-            /**
-             * Code
-             * @enum {string}
-             */
-            code: "mapped" | "standstill_not_measured" | "stribeck_not_seen" | "stribeck_not_reached" | "few_speeds" | "ripple_not_asked" | "ripple_needs_revolution" | "ripple_not_seen" | "uneven_speeds" | "fastest_by_travel" | "slowest_by_time" | "model_misfit";
-            /**
-             * Unit
-             * @default
-             * @enum {string}
-             */
-            unit: "" | "rpm" | "rev" | "s" | "%";
-            /** Value */
-            value?: number | null;
-        };
-        /**
          * FirstPowerResult
          * @description ``measured_at`` is ISO 8601, UTC. ``covers_pole_pairs``: fewer could hide two exchanged
          *     phases within this travel. ``guide`` is the drive's own procedure for the commutation angle.
@@ -5614,7 +5817,7 @@ export interface components {
             /** Curve Speed Rpm */
             curve_speed_rpm: number[];
             /** Findings */
-            findings: components["schemas"]["Finding"][];
+            findings: components["schemas"]["backend__tools__friction__result__Finding"][];
             /**
              * Harmonics
              * @description largest first
@@ -7286,7 +7489,7 @@ export interface components {
              * Result
              * @description of a tool: its result, which its field tool names
              */
-            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | components["schemas"]["PlainResult"] | null;
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | components["schemas"]["PlainResult"] | null;
             /**
              * Started
              * Format: date-time
@@ -7898,7 +8101,7 @@ export interface components {
              * Result
              * @description of a tool: its result, which its field tool names
              */
-            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | {
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | {
                 [key: string]: unknown;
             };
             /** Settings */
@@ -11168,8 +11371,6 @@ export interface components {
             current_bandwidth_hz: number | null;
             /** Delay S */
             delay_s: number | null;
-            /** @description None where not only odd lines were excited */
-            detected: components["schemas"]["DetectedInfo"] | null;
             direct: components["schemas"]["DirectResponse"];
             /** Distortion */
             distortion: (number | null)[];
@@ -11296,12 +11497,6 @@ export interface components {
              * @enum {string}
              */
             loop: "auto" | "none" | "speed" | "position";
-            /**
-             * Odd Lines
-             * @description of mechanics by a multisine: odd lines alone, which tell noise, even and odd distortion apart
-             * @default false
-             */
-            odd_lines: boolean;
             /**
              * Rated Torque Nm
              * @description overrides what the drive says
@@ -11819,6 +12014,43 @@ export interface components {
             problem?: components["schemas"]["Problem"] | null;
             reading: components["schemas"]["ParameterValue"];
         };
+        /**
+         * Finding
+         * @description What limits the answer, or what to do about it.
+         */
+        backend__tools__cycle__result__Finding: {
+            /**
+             * Code
+             * @enum {string}
+             */
+            code: "no_period" | "few_periods" | "slow_sampling" | "gaps" | "peak_beyond" | "peak_reached" | "peak_unknown" | "speed_beyond_rated" | "rated_speed_unknown" | "rated_torque_unknown" | "time_constant_unknown" | "overload_unknown" | "overload_exceeded" | "ambient_needs_rise";
+            /**
+             * Unit
+             * @default
+             */
+            unit: string;
+            /** Value */
+            value?: number | null;
+        };
+        /**
+         * Finding
+         * @description What the map says, or cannot say, as a code with the figure that it rests on.
+         */
+        backend__tools__friction__result__Finding: {
+            /**
+             * Code
+             * @enum {string}
+             */
+            code: "mapped" | "standstill_not_measured" | "stribeck_not_seen" | "stribeck_not_reached" | "few_speeds" | "ripple_not_asked" | "ripple_needs_revolution" | "ripple_not_seen" | "uneven_speeds" | "fastest_by_travel" | "slowest_by_time" | "model_misfit";
+            /**
+             * Unit
+             * @default
+             * @enum {string}
+             */
+            unit: "" | "rpm" | "rev" | "s" | "%";
+            /** Value */
+            value?: number | null;
+        };
     };
     responses: never;
     parameters: never;
@@ -11872,10 +12104,14 @@ export type Code = components['schemas']['Code'];
 export type ConnectRequest = components['schemas']['ConnectRequest'];
 export type CountersRequest = components['schemas']['CountersRequest'];
 export type CursorMoved = components['schemas']['CursorMoved'];
+export type CycleHeat = components['schemas']['CycleHeat'];
+export type CycleOverload = components['schemas']['CycleOverload'];
+export type CyclePower = components['schemas']['CyclePower'];
+export type CycleResult = components['schemas']['CycleResult'];
+export type CycleSettings = components['schemas']['CycleSettings'];
 export type CyclicInfo = components['schemas']['CyclicInfo'];
 export type CyclicRequest = components['schemas']['CyclicRequest'];
 export type DescribedDevice = components['schemas']['DescribedDevice'];
-export type DetectedInfo = components['schemas']['DetectedInfo'];
 export type Diff = components['schemas']['Diff'];
 export type DiffRow = components['schemas']['DiffRow'];
 export type DirectResponse = components['schemas']['DirectResponse'];
@@ -11899,7 +12135,6 @@ export type FaultHistory = components['schemas']['FaultHistory'];
 export type FaultHistoryInfo = components['schemas']['FaultHistoryInfo'];
 export type FiguresInfo = components['schemas']['FiguresInfo'];
 export type FiltersInfo = components['schemas']['FiltersInfo'];
-export type Finding = components['schemas']['Finding'];
 export type FirstPowerResult = components['schemas']['FirstPowerResult'];
 export type FirstPowerSettings = components['schemas']['FirstPowerSettings'];
 export type Fix = components['schemas']['Fix'];
@@ -12155,6 +12390,8 @@ export type WatchUpdate = components['schemas']['WatchUpdate'];
 export type WatchValues = components['schemas']['WatchValues'];
 export type Where = components['schemas']['Where'];
 export type WriteResult = components['schemas']['WriteResult'];
+export type BackendToolsCycleResultFinding = components['schemas']['backend__tools__cycle__result__Finding'];
+export type BackendToolsFrictionResultFinding = components['schemas']['backend__tools__friction__result__Finding'];
 export type $defs = Record<string, never>;
 export interface operations {
     accounts: {
@@ -20608,6 +20845,149 @@ export interface operations {
         requestBody: {
             content: {
                 "application/json": components["schemas"]["BrakeSettings"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_cycle: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CycleSettings"];
             };
         };
         responses: {

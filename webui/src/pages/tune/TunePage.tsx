@@ -15,6 +15,7 @@ import { useMeasurements } from '../response/useMeasurements'
 import { useToolJob } from '../response/useToolJob'
 import { AutotunePanel } from './AutotunePanel'
 import { CandidatesPanel } from './CandidatesPanel'
+import { CyclePanel } from './CyclePanel'
 import { Fold } from './Fold'
 import { BrakePanel } from './BrakePanel'
 import { FirstPowerPanel } from './FirstPowerPanel'
@@ -60,10 +61,12 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
   const firstJob = useToolJob(drive, 'first-power').job
   const healthJob = useToolJob(drive, 'health').job
   const safetyJob = useToolJob(drive, 'safety-check').job
+  const cycleJob = useToolJob(drive, 'cycle').job
   useJobEnd(inertiaJob?.id ?? null, () => void measured.refresh())
   useJobEnd(frictionJob?.id ?? null, () => void measured.refresh())
   useJobEnd(brakeJob?.id ?? null, () => void measured.refresh())
   useJobEnd(firstJob?.id ?? null, () => void measured.refresh())
+  useJobEnd(cycleJob?.id ?? null, () => void measured.refresh())
   useJobEnd(stepJob?.id ?? null, () => void measured.refresh())
   useJobEnd(tuneJob?.id ?? null, () => {
     void measured.refresh()
@@ -115,6 +118,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
     [brakeJob, 'more'],
     [healthJob, 'more'],
     [safetyJob, 'more'],
+    [cycleJob, 'more'],
   ]
   const now: Section[] = possible
     ? present(done, {
@@ -234,14 +238,17 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
         <Fold {...step('report')}>
           <ReportPanel drive={drive} of={reports} />
         </Fold>
-        {possible && (
-          <Fold of={of} name="more" title={t('fold.more')} help={t('fold.moreHelp')}>
-            <FrictionPanel {...measure} />
-            <BrakePanel {...measure} />
-            <HealthPanel {...measure} />
-            <SafetyPanel {...measure} />
-          </Fold>
-        )}
+        <Fold of={of} name="more" title={t('fold.more')} help={t('fold.moreHelp')}>
+          <CyclePanel drive={drive} open={open} />
+          {possible && (
+            <>
+              <FrictionPanel {...measure} />
+              <BrakePanel {...measure} />
+              <HealthPanel {...measure} />
+              <SafetyPanel {...measure} />
+            </>
+          )}
+        </Fold>
       </div>
     </div>
   )

@@ -1,0 +1,194 @@
+"""How warm a motor becomes under a repeated load, and when it is too warm. Pure.
+
+A catalogue states of a motor's heat its rated torque (warm for long at 40 °C, IEC 60034-1) and one
+time constant. How the rest is divided it does not: how much of the rise lies between winding and
+housing, how fast the winding follows, which part of the losses depends on the speed, how far
+current exceeds torque at high torque. So the answer is a range over motors that all agree with the
+catalogue: two bodies (winding, housing), each of those quantities at its ends.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import lfilter
+
+from backend.analysis.duty.load import Signals
+
+FloatArray = npt.NDArray[np.float64]
+#: The ambient temperature for which rated torque holds (IEC 60034-1), in °C.
+RATED_AMBIENT_C = 40.0
+#: Share of the rated rise between winding and housing.
+_WINDING = (0.15, 0.3, 0.5)
+#: Time constant of the winding against the housing, in s, and as a share of the motor's.
+_WINDING_S, _WINDING_SHARE = (10.0, 60.0), (0.02, 0.1)
+#: Share of the rated losses that depends on the speed alone, and the power of the speed. Where the
+#: torque at standstill is stated, the share is known to this much of it.
+_SPEED_SHARE, _SPEED_POWER, _STATED = (0.0, 0.35), (1.0, 2.0), 0.15
+#: Current above torque at three times the rated torque, per unit of torque above the rated one.
+_SATURATION = (0.0, 0.07)
+#: Copper has 0.39 %/K at 20 °C: of the hot resistance, per rated rise of 60 to 125 K.
+_COPPER = (0.0, 0.35)
+#: A catalogue's time constant is that of a motor on some flange; this far it is believed.
+_TIME_CONSTANT = (0.75, 1.3)
+#: Searched for a moment up to this many time constants.
+_LONGEST = 12.0
+_MOMENTS = 400
+
+
+@dataclass(frozen=True)
+class Heat:
+    """Ends of the range. ``rise`` is the highest rise as a share of the permitted one; ``trip_s``
+    from a motor as cold as its surroundings, None where it is never too warm; ``about_s`` is that
+    of the motor in the middle of the range."""
+
+    rise: tuple[float, float]
+    trip_s: tuple[float | None, float | None]
+    about_s: float | None
+
+
+@dataclass(frozen=True)
+class _Losses:
+    """Of one kind of motor, in units of the rated losses: in the winding [n], and elsewhere."""
+
+    share: float
+    winding: FloatArray
+    elsewhere: float
+
+
+def permitted_rise(ambient_c: float, rated_rise_k: float | None) -> float | None:
+    """Rise that is permitted at this ambient temperature, as a share of the rated one.
+
+    None where that needs the rated rise and nobody has stated it.
+    """
+    if ambient_c == RATED_AMBIENT_C:
+        return 1.0
+    if rated_rise_k is None:
+        return None
+    return (RATED_AMBIENT_C + rated_rise_k - ambient_c) / rated_rise_k
+
+
+def heat_of(
+    signals: Signals, rated_rpm: float | None, *, permitted: float, time_constant_s: float | None,
+    scale: tuple[float, float] = (1.0, 1.0), standstill: float | None = None,
+) -> Heat:  # fmt: skip
+    """The range of the rise, and of the moment at which it exceeds what is permitted.
+
+    ``scale`` are the ends of the effective torque's interval, as shares of it. ``standstill`` is
+    the torque that the motor carries for long without turning, per unit of the rated torque: the
+    squares of both differ by the losses of the speed.
+    """
+    even = signals.evenly(20_000)
+    rises: list[float] = []
+    trips: list[float | None] = []
+    shares = _SPEED_SHARE
+    if standstill is not None:
+        share = 1.0 - 1.0 / max(standstill, 1.0) ** 2
+        shares = ((1.0 - _STATED) * share, (1.0 + _STATED) * share)
+    for losses in _losses(even, rated_rpm, shares, tuple(zip(_SATURATION, scale, strict=True))):
+        for winding, tau_w in itertools.product(_WINDING, _winding_taus(time_constant_s)):
+            thermal = _Bodies(losses, winding, tau_w, even.spacing_s)
+            rises.append(thermal.highest() / permitted)
+            if time_constant_s is None:
+                continue
+            for factor, copper in itertools.product(_TIME_CONSTANT, _COPPER):
+                trips.append(thermal.too_warm_s(permitted, factor * time_constant_s, copper))
+    known = [each for each in trips if each is not None]
+    latest = None if not known or len(known) < len(trips) else max(known)
+    about = None
+    if time_constant_s is not None:
+        middle = (0.5 * sum(shares), 0.5 * sum(_SATURATION))
+        losses = _one(even, rated_rpm, middle[0], 1.5, middle[1])
+        tau_w = float(np.sqrt(np.prod(_WINDING_SHARE))) * time_constant_s
+        motor = _Bodies(losses, _WINDING[1], tau_w, even.spacing_s)
+        about = motor.too_warm_s(permitted, time_constant_s, 0.5 * sum(_COPPER))
+    return Heat((min(rises), max(rises)), (min(known, default=None), latest), about)
+
+
+def _winding_taus(time_constant_s: float | None) -> tuple[float, ...]:
+    if time_constant_s is None:
+        return _WINDING_S
+    return tuple(share * time_constant_s for share in _WINDING_SHARE)
+
+
+def _losses(
+    even: Signals, rated_rpm: float | None, shares: tuple[float, float],
+    currents: Iterable[tuple[float, float]],
+) -> Iterator[_Losses]:  # fmt: skip
+    for (saturation, factor), share, power in itertools.product(
+        currents, shares, _SPEED_POWER if rated_rpm is not None else (0.0, np.inf)
+    ):
+        yield _one(even, rated_rpm, share, power, saturation, factor)
+
+
+def _one(
+    even: Signals, rated_rpm: float | None, share: float, power: float, saturation: float,
+    factor: float = 1.0,
+) -> _Losses:  # fmt: skip
+    """Losses of one kind of motor. Without a rated speed nothing is known of the speed's part:
+    ``power`` 0 takes it as that of the rated speed, infinity as none, others as half."""
+    torque = np.abs(even.torque_percent) / 100.0
+    current = factor * torque * (1.0 + saturation * np.maximum(torque - 1.0, 0.0))
+    if rated_rpm is None:
+        fast = {0.0: 1.0, np.inf: 0.0}.get(power, 0.5)
+    else:
+        fast = float(np.mean((np.abs(even.speed_rpm) / rated_rpm) ** power))
+    return _Losses(share, (1.0 - share) * current**2, share * fast)
+
+
+class _Bodies:
+    """Winding and housing, with resistances such that the rated load ends at a rise of one."""
+
+    def __init__(self, losses: _Losses, winding: float, tau_w: float, spacing_s: float) -> None:
+        whole = winding * (1.0 - losses.share) + (1.0 - winding)
+        self._to_housing, self._to_air = winding / whole, (1.0 - winding) / whole
+        self._tau_w = tau_w
+        self._copper = float(np.mean(losses.winding))
+        self._elsewhere = losses.elsewhere
+        self._swing = self._to_housing * self._swing_of(losses.winding, spacing_s)
+
+    def _swing_of(self, losses: FloatArray, spacing_s: float) -> float:
+        """What the winding rises above its mean within the repeated load, per unit of loss."""
+        decay = float(np.exp(-spacing_s / self._tau_w))
+        about = np.concatenate([losses, losses]) - self._copper
+        answer = lfilter([1.0 - decay], [1.0, -decay], about)
+        return float(max(np.max(answer[losses.size :]), 0.0))
+
+    def highest(self) -> float:
+        """Rise at last, with the resistance of the permitted temperature."""
+        copper, air = self._copper, self._to_air
+        return self._to_housing * copper + air * (copper + self._elsewhere) + self._swing
+
+    def too_warm_s(self, permitted: float, tau_s: float, copper: float) -> float | None:
+        """When the winding has risen by ``permitted``; None if never.
+
+        ``copper`` is how much the resistance rises per rated rise, of that at the limit.
+        """
+        if self.highest() < permitted:
+            return None
+        r_w, r_h = self._to_housing, self._to_air
+        c_w, c_h = self._tau_w / r_w, tau_s / r_h
+        matrix = np.array([
+            [(-1.0 / r_w + self._copper * copper) / c_w, 1.0 / (r_w * c_w)],
+            [1.0 / (r_w * c_h), (-1.0 / r_w - 1.0 / r_h) / c_h],
+        ])  # fmt: skip
+        given = np.array([self._copper * (1.0 - copper * permitted) / c_w, self._elsewhere / c_h])
+        values, vectors = np.linalg.eig(matrix)
+        still = np.linalg.solve(vectors, given)
+        moments = np.geomspace(1e-3 * self._tau_w, _LONGEST * tau_s, _MOMENTS)
+        # ∫ e^{λt} dt of each eigenvector; λ is never exactly zero with losses of finite precision.
+        grown = np.expm1(np.clip(np.outer(moments, values.real), None, 50.0)) / values.real
+        winding = grown @ (vectors[0].real * still.real)
+        winding = winding + self._swing * -np.expm1(-moments / self._tau_w)
+        over = np.flatnonzero(winding >= permitted)
+        if not over.size:
+            return None
+        first = int(over[0])
+        if first == 0:
+            return float(moments[0])
+        ends = winding[first - 1 : first + 1]
+        return float(np.interp(permitted, ends, moments[first - 1 : first + 1]))

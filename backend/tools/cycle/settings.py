@@ -1,0 +1,61 @@
+"""What the load of a cycle may be asked with. Nothing moves: there is no envelope."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+
+class CycleSettings(BaseModel):
+    """How long to read, or which recording; and what catalogues state of motor and drive."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    duration_s: float = Field(
+        default=60.0, ge=2, le=3600, description="how long the drive is read, in s"
+    )
+    recording: str | None = Field(
+        default=None, description="a recording that is evaluated instead of reading the drive"
+    )
+    period_s: float | None = Field(
+        default=None, gt=0, description="time of one machine cycle in s; found where not given"
+    )
+    motor_rated_nm: float | None = Field(
+        default=None, gt=0, description="rated torque in N·m, if not the drive's"
+    )
+    motor_rated_rpm: float | None = Field(
+        default=None, gt=0, description="rated speed in rpm, if not the drive's"
+    )
+    peak_percent: float | None = Field(
+        default=None, gt=0, le=1000,
+        description="peak torque of the motor, in % of rated; the drive's limit without it",
+    )  # fmt: skip
+    overload_percent: float | None = Field(
+        default=None, gt=100, le=1000,
+        description="overload that the catalogue permits, in % of rated torque; with --overload-s",
+    )  # fmt: skip
+    overload_s: float | None = Field(
+        default=None, gt=0, description="for how long it permits it, in s"
+    )
+    thermal_time_min: float | None = Field(
+        default=None, gt=0, le=600,
+        description="thermal time constant of the motor by its catalogue, in min",
+    )  # fmt: skip
+    standstill_percent: float | None = Field(
+        default=None, ge=100, le=300,
+        description="torque that the motor carries for long at standstill, in % of rated",
+    )  # fmt: skip
+    ambient_c: float = Field(
+        default=40.0, ge=-20, le=90, description="temperature about the motor, in °C"
+    )
+    rise_k: float | None = Field(
+        default=None, ge=30, le=160,
+        description="rise of the winding at rated torque in K; needed where it is not 40 °C",
+    )  # fmt: skip
+
+    @model_validator(mode="after")
+    def _whole(self) -> CycleSettings:
+        if (self.overload_percent is None) != (self.overload_s is None):
+            raise ValueError("give both overload_percent and overload_s, or none of them")
+        if self.rise_k is not None and self.ambient_c >= 40.0 + self.rise_k:
+            raise ValueError("ambient_c is as warm as the winding may become")
+        return self

@@ -1,0 +1,167 @@
+"""The load of a cycle that somebody else moves, read without writing; and from a recording.
+
+What the cycle takes follows from the speed, another signal than the torque: J·α + Coulomb +
+viscous friction of a rigid axis.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from backend.axis.axis import Envelope
+from backend.recording.writer import RecordingWriter
+from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.cycle.result import CycleResult
+from backend.tools.cycle.run import TOOL
+from backend.tools.cycle.settings import CycleSettings
+from backend.tools.inertia.moves import speed_move
+from backend.tools.tool import Run
+from drivers.errors import NotAllowed
+from drivers.link import ScopeBlock
+from drivers.virtual.mechanics import MechanicsSpec
+from tests.virtual.tools.direct import DirectBench, direct
+from tests.virtual.tools.rig import settings_of, silent
+
+FloatArray = npt.NDArray[np.float64]
+RATED_NM, INERTIA, COULOMB, VISCOUS = 1.27, 4e-4, 0.05, 3e-4
+SPEED_RPM, RAMP_S, HOLD_S, STAND_S = 900.0, 0.2, 0.15, 0.25
+#: Of the controller, not of the tool.
+ROOM = Envelope(travel_rev=8.0, speed_rpm=1500.0, torque_percent=150.0, time_s=60.0)
+PERIOD_S = 2 * (2 * RAMP_S + HOLD_S + STAND_S)
+RPM = 2 * math.pi / 60.0
+
+
+def rigid() -> MechanicsSpec:
+    return MechanicsSpec.model_validate({
+        "motor": {"inertia_kgm2": INERTIA, "rated_torque_nm": RATED_NM, "rated_speed_rpm": 3000},
+        "friction": {"viscous_nms": VISCOUS, "coulomb_nm": COULOMB},
+    })  # fmt: skip
+
+
+def speeds() -> FloatArray:
+    """One period to and fro in rpm, 1 kHz; ramps are raised cosines, which the loop follows."""
+    up = 0.5 - 0.5 * np.cos(np.pi * np.arange(round(RAMP_S * 1000)) / (RAMP_S * 1000))
+    one = np.concatenate(
+        [up, np.ones(round(HOLD_S * 1000)), up[::-1], np.zeros(round(STAND_S * 1000))]
+    )
+    return SPEED_RPM * np.concatenate([one, -one])
+
+
+def torques_nm(time_s: FloatArray, speed_rpm: FloatArray) -> FloatArray:
+    """J·α + Coulomb + viscous friction of the speeds that the axis really had."""
+    even = np.convolve(speed_rpm * RPM, np.ones(5) / 5.0, mode="same")
+    standing = np.abs(even) < 1.0
+    friction = np.where(standing, 0.0, COULOMB * np.sign(even) + VISCOUS * even)
+    return np.asarray(INERTIA * np.gradient(even, time_s) + friction)
+
+
+async def machine(bench: DirectBench, cycles: int) -> None:
+    """The controller: it moves the axis and knows nothing of who reads."""
+    facts = await read_facts(bench.axis)
+    await speed_move(
+        bench.axis, bench.session, np.tile(speeds(), cycles), ROOM, facts, lambda _x: None
+    )
+
+
+async def test_the_cycle_of_a_machine_is_read_while_another_moves_it() -> None:
+    kept: dict[str, Any] = {}
+
+    def keep(name: str, arrays: dict[str, Any], meta: dict[str, object]) -> None:
+        kept.update(name=name, arrays=arrays, meta=meta)
+
+    asked = CycleSettings(duration_s=7.5, motor_rated_nm=RATED_NM, thermal_time_min=15.0)
+    async with direct(rigid(), drive="m6l") as bench:
+        moving = asyncio.create_task(machine(bench, 8))
+        await asyncio.sleep(1.5)
+        found = await TOOL.run(Run(bench.axis, None, silent(), keep), asked)
+        await moving
+    assert found.period_s == pytest.approx(PERIOD_S, rel=0.01)
+    assert found.periods >= 4
+    time, speed = kept["arrays"]["time_s"], kept["arrays"]["speed_rpm"]
+    whole = (time > 0.01) & (time <= found.periods * found.period_s)
+    torque = torques_nm(time, speed)[whole]
+    truth = 100.0 * float(np.sqrt(np.mean(torque**2))) / RATED_NM
+    assert found.rms_percent == pytest.approx(truth, rel=0.02)
+    low, high = found.rms_ci95_percent
+    assert low is not None
+    assert high is not None
+    assert low < high
+    assert found.highest_speed_rpm == pytest.approx(SPEED_RPM, rel=0.05)
+    assert found.power is not None
+    power = torque * speed[whole] * RPM
+    braking = -float(np.sum(power[power < 0.0])) * 1e-3 / found.periods
+    assert found.power.braking_j == pytest.approx(braking, rel=0.05)
+    assert found.verdict in ("endures", "undecided")
+    again = TOOL.reevaluate(kept["arrays"], kept["meta"])
+    assert again == found
+
+
+async def test_nothing_is_written_and_an_idle_axis_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Polled, as beside a controller on another bus: no exchange of process data runs."""
+    async with direct(rigid(), drive="mms7") as bench:
+        await bench.session.stop()
+        bench.axis.session = None
+        before = await settings_of(bench.axis.drive)
+        touched: list[object] = []
+
+        async def forbidden(*words: object) -> None:
+            touched.append(words)
+
+        for name in ("write", "configure", "start", "play", "drive_to", "reset_fault"):
+            monkeypatch.setattr(bench.link, name, forbidden)
+        found = await TOOL.run(Run(bench.axis, None, silent()), CycleSettings(duration_s=2.0))
+        monkeypatch.undo()
+        assert touched == []
+        assert await settings_of(bench.axis.drive) == before
+    assert isinstance(found, CycleResult)
+    assert found.verdict == "idle"
+    assert found.samples > 100
+
+
+async def recorded(bench: DirectBench, path: Path, drive: str, *roles: str) -> None:
+    """A second at +150 % and 600 rpm, a second at −150 %, for ten periods, at 500 Hz."""
+    axis, units = bench.axis, await bench.axis.units()
+    keys = tuple(axis.drive.require(role) for role in roles)
+    raws = {"torque_actual": units.torque_raw(150.0), "velocity_actual": units.velocity_raw(600.0)}
+    channels = [
+        {"drive": drive, "drive_name": "X", "key": key, "name": key, "unit": ""} for key in keys
+    ]
+    header = {
+        "clock": {"sample_s": 0.0, "epoch_s": 1.7e9},
+        "streams": [{"synchronous": True, "channels": channels}],
+    }
+    writer = RecordingWriter(path, header, lambda error: pytest.fail(str(error)))
+    time = np.arange(0.0, 20.0, 0.002)
+    sign = np.where(time % 2.0 < 1.0, 1.0, -1.0)
+    values = [
+        float(str(axis.drive.parameter(key).to_value(raws[role])))
+        for role, key in zip(roles, keys, strict=True)
+    ]
+    writer.put(0, ScopeBlock(1, 0.0, 0.002, keys, np.outer(sign, values), 0))
+    writer.close({"reason": "stopped"})
+
+
+async def test_a_recording_is_evaluated_as_the_drive_is(tmp_path: Path) -> None:
+    async with direct(rigid(), drive="m6l") as bench:
+        path = tmp_path / "press 4.sdrec"
+        await recorded(bench, path, "x", "torque_actual", "velocity_actual")
+        asked = CycleSettings(recording="press 4.sdrec", motor_rated_nm=RATED_NM)
+        run = Run(bench.axis, None, silent(), recording=lambda name: tmp_path / name)
+        found = await TOOL.run(run, asked)
+        assert found.recording == "press 4.sdrec"
+        assert found.period_s == pytest.approx(2.0, rel=0.01)
+        assert found.rms_percent == pytest.approx(150.0, rel=0.01)
+        assert found.verdict == "overloads"
+        lacking = tmp_path / "other.sdrec"
+        await recorded(bench, lacking, "x", "torque_actual")
+        with pytest.raises(NotAllowed, match="606C"):
+            await TOOL.run(run, asked.model_copy(update={"recording": "other.sdrec"}))
