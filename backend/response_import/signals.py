@@ -261,8 +261,10 @@ def _clock(
     # Times scatter to and fro; a lost sample moves all that follow.
     lost, (jitter, pattern) = _lost(off), _scatter(off)
     wrong = lost if lost.size else np.flatnonzero(uneven)
-    if np.any(uneven) and float(np.max(drift)) > _JITTER and (
-        lost.size or jitter > _SCATTER or pattern > _PATTERN
+    if (
+        np.any(uneven)
+        and float(np.max(drift)) > _JITTER
+        and (lost.size or jitter > _SCATTER or pattern > _PATTERN)
     ):
         at = int(wrong[0])
         row = int(rows[at + 1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -177,7 +178,7 @@ class _Check:
         quiet = self._trace.torque_percent[: enabled[0]] if enabled.size else np.empty(0)
         scatter = float(np.std(quiet)) if quiet.size > _FILTER else 0.0
         offset = abs(float(np.mean(quiet))) if quiet.size > _FILTER else 0.0
-        return max(offset + _DEVIATIONS * scatter / np.sqrt(_FILTER / 1.5), _LEAST_PERCENT)
+        return max(offset + _DEVIATIONS * scatter / math.sqrt(_FILTER / 1.5), _LEAST_PERCENT)
 
     def _steady(self) -> BoolArray:
         """Where the commanded speed has been constant, and not zero, for some time."""
