@@ -155,14 +155,13 @@ async def sign_measurement(
     except ValueError as error:
         raise NotAllowed("safety-check.nothing-to-sign", value=name, name=name) from error
     result = reevaluate(found.arrays, {**found.meta, "signature": signature})
-    result = result.model_copy(update={"measurements": (name,)})
     await asyncio.to_thread(
         bench.measurements.sign, name, signature, result.model_dump(mode="json")
     )
     line = text("journal.record-signed", drive=found.head.drive, name=name, person=person,
                 sha256=str(signature["sha256"]))  # fmt: skip
     bench.journal.add(line)
-    return result
+    return result.model_copy(update={"measurements": (name,)})
 
 
 @router.delete("/measurements/{name}", status_code=204)

@@ -6,10 +6,13 @@ from datetime import UTC, datetime, timedelta
 from types import SimpleNamespace
 from typing import Any
 
+import httpx
 import numpy as np
 import pytest
 
+from backend.api.app import make_app
 from backend.report.gather import choose
+from backend.station.bench import Bench
 from backend.tools.safety_check.evaluate import Trace, evaluate, reevaluate, signed
 from backend.tools.safety_check.result import SafetyResult
 from backend.tools.safety_check.run import TOOL
@@ -162,3 +165,25 @@ def test_the_report_takes_the_newest_record_of_each_function() -> None:
         for function, hour in (("sto", 1), ("sto", 3), ("ss1", 2))
     }  # fmt: skip
     assert choose(heads, begun + timedelta(hours=2, minutes=30)) == [("ss12", ""), ("sto3", "")]
+
+
+async def test_a_stored_record_is_signed_once_and_still_agrees(bench: Bench) -> None:
+    made = trace()
+    meta = {"tool": "safety-check", "settings": ASKED.model_dump(mode="json"), **made.facts()}
+    drive = next(iter(bench.connected_drives.values())).drive
+    name = bench.measurements.save("safety-check", drive, made.arrays(), meta)
+    first = evaluate(made, ASKED)
+    bench.measurements.conclude(name, first.model_dump(mode="json"))
+    app = make_app(bench, hosts=frozenset({"test"}))
+    transport, path = httpx.ASGITransport(app), f"/measurements/{name}"
+    async with httpx.AsyncClient(transport=transport, base_url="http://test/api/v1") as http:
+        nobody = await http.post(f"{path}/signature", json={})
+        assert nobody.json()["code"] == "safety-check.signer-needs-name"
+        signed_now = await http.post(f"{path}/signature", json={"person": "Ben"})
+        assert signed_now.json()["signature"]["intact"]
+        again = await http.post(f"{path}/signature", json={"person": "Eve"})
+        assert again.json()["code"] == "safety-check.nothing-to-sign"
+        kept = (await http.get(path)).json()
+    assert kept["agrees"]
+    assert kept["result"]["signature"]["person"] == "Ben"
+    assert kept["result"]["verdict"] == first.verdict

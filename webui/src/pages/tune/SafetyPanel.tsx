@@ -192,7 +192,9 @@ function Sign({
     sign.run(async () => {
       const params = { path: { name } }
       const body = { person, notes }
-      onSigned(await ask(api.POST('/api/v1/measurements/{name}/signature', { params, body })))
+      const answer = api.POST('/api/v1/measurements/{name}/signature', { params, body })
+      const made = asSafetyCheck(await ask(answer))
+      if (made) onSigned(made)
     })
   return (
     <>
