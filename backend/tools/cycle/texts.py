@@ -23,6 +23,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "evaluate": ("Evaluate the recording", "计算该录制"),
     "source": ("Source", "来源"),
     "source.drive": ("the drive, now", "驱动器（现在）"),
+    "field.recording": ("Recording", "录制"),
     "field.duration_s": ("Time of reading (s)", "读取时间 (s)"),
     "field.period_s": (
         "Time of one cycle (s), found where empty",

@@ -85,6 +85,7 @@ async def test_the_cycle_of_a_machine_is_read_while_another_moves_it() -> None:
     assert found.period_s == pytest.approx(PERIOD_S, rel=0.01)
     assert found.periods >= 4
     time, speed = kept["arrays"]["time_s"], kept["arrays"]["speed_rpm"]
+    assert found.period_s is not None
     whole = (time > 0.01) & (time <= found.periods * found.period_s)
     torque = torques_nm(time, speed)[whole]
     truth = 100.0 * float(np.sqrt(np.mean(torque**2))) / RATED_NM

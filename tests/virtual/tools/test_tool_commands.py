@@ -198,8 +198,9 @@ def test_a_cycle_is_read_on_a_bus_of_ones_own(monkeypatch: pytest.MonkeyPatch) -
         monkeypatch.setattr(link, name, forbidden)
     monkeypatch.setattr(session, "link_for", lambda _url: link)
     code, out, err = run(
-        "cycle", URL, "--station", "1", "--profile", "mms7", "--duration-s", "2", "--json"
-    )
+        "cycle", "ethercat://eth7", "--station", "1", "--profile", "mms7", "--duration-s", "2",
+        "--json",
+    )  # fmt: skip
     assert code == 0, err
     assert json.loads(out)["verdict"] == "idle"
     assert touched == []
