@@ -42,7 +42,7 @@ _PUBLIC, _KNOWN, _STOP = Need("public"), Need("known"), Need("stop")
 _LOOK = Need(Right.LOOK)
 _FILES, _FILES_UPLOAD = Need(Right.FILES), Need(Right.FILES, body_bytes=_FILE)
 _PARAMETERS = Need(Right.PARAMETERS, "drive")
-_MEASURE, _MOTION = Need(Right.MEASURE, "drive"), Need(Right.MOTION, "drive")
+_MOTION = Need(Right.MOTION, "drive")
 _STATION, _STATION_DRIVE = Need(Right.STATION), Need(Right.STATION, "drive")
 _STATION_BUS = Need(Right.STATION, "bus")
 _INVITE, _ADMINISTER = Need(Right.INVITE), Need(Right.ADMINISTER)
@@ -149,8 +149,6 @@ _API: dict[str, Need] = {
     "POST /drives/{drive_id}/jobs/generate": _MOTION,
     "POST /drives/{drive_id}/jobs/home": _MOTION,
     "POST /drives/{drive_id}/jobs/identify": _MOTION,
-    "POST /drives/{drive_id}/jobs/sweep": _MEASURE,
-    "POST /drives/{drive_id}/jobs/autotune": _MEASURE,
     **{
         f"POST /drives/{{drive_id}}/jobs/{tool.kind}": Need(
             tool.right, "drive" if tool.motion else "none"

@@ -29,7 +29,7 @@ from backend.report.plot import Area, Curve, Label, Line, Plot, draw
 from backend.report.plot import Path as Stroke
 from backend.report.store import ReportStore
 from backend.report.texts import TEXTS
-from backend.report.views import SweepView
+from backend.tools.sweep.result import SweepAnswer
 from drivers.errors import NotAllowed
 from tests.support import measurements as known
 
@@ -161,7 +161,7 @@ def test_verdict_of_a_loop(
     facts: Facts, margins: dict[str, float | bool | None], tone: str, word: str
 ) -> None:
     """Limits are those that docs/tuning.md tells."""
-    loop = next(m for m in facts.measured if isinstance(m.view, SweepView))
+    loop = next(m for m in facts.measured if isinstance(m.view, SweepAnswer))
     changed = replace(loop, view=loop.view.model_copy(update={"margins": margins}))
     document = compose(replace(facts, measured=(changed,)), "en")
     note = next(b for b in document.blocks if isinstance(b, Note) and "speed loop" in b.text)

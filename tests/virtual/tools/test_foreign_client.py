@@ -15,7 +15,8 @@ from types import ModuleType
 
 import pytest
 
-from backend.tools.autotune.run import AutotuneSettings, as_json, autotune
+from backend.tools.autotune.run import AutotuneSettings, autotune
+from backend.tools.autotune.tool import answer_of
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE, mechanics, silent
 
@@ -59,7 +60,7 @@ def _job(result: object) -> str:
 async def test_results_are_read_by_generated_types(client: ModuleType) -> None:
     async with direct(mechanics((1e-4, 60.0, 0.006)), 5e-4) as b:
         found = await autotune(b.axis, b.session, AutotuneSettings(WIDE), silent())
-    answer = as_json(found)
+    answer = answer_of(found).model_dump(mode="json")
 
     def read(result: object, kind: str) -> object:
         job = client.JobInfo.model_validate_json(_job(result))
