@@ -15,6 +15,7 @@ import pytest
 from pypdf import PdfReader
 from typer.testing import CliRunner
 
+from backend import report
 from backend.cli import app
 from backend.drive.drive import Drive
 from backend.library.measurements import MeasurementStore
@@ -244,6 +245,17 @@ def test_both_languages_say_the_same() -> None:
         assert chinese, name
         assert sorted(places.findall(english)) == sorted(places.findall(chinese)), name
         assert english != chinese, name
+
+
+def test_every_text_of_the_report_is_used() -> None:
+    folder = Path(report.__file__).parent
+    source = "".join(file.read_text("utf-8") for file in folder.glob("*.py"))
+    put_together = ("kind.", "tone.")
+    unused = [
+        name for name in TEXTS
+        if not name.startswith(put_together) and len(re.findall(rf"['\"]{name}['\"]", source)) < 2
+    ]  # fmt: skip
+    assert not unused
 
 
 # --- HTML ------------------------------------------------------------------------------
