@@ -239,6 +239,7 @@ _API: dict[str, Need] = {
     "POST /recordings/{name}/stop": _FILES,
     "POST /recordings/{name}/trigger": _FILES,
     "GET /recordings/{name}/file": _LOOK,
+    "GET /recordings/{name}/samples": _LOOK,
     "GET /recordings/{name}/exports/{kind}": _LOOK,
     "POST /recordings/{name}/exports/{kind}": _FILES,
     "GET /reports": _LOOK,
