@@ -18,8 +18,20 @@ import pytest
 ROOT = Path(__file__).parents[2]
 #: Attributes that hold text for people, on whatever object they are.
 _TEXTS = frozenset(
-    {"message", "reason", "trouble", "problem", "remedy", "advice", "strerror", "note", "halted",
-     "detail", "title", "words"}  # fmt: skip
+    {
+        "message",
+        "reason",
+        "trouble",
+        "problem",
+        "remedy",
+        "advice",
+        "strerror",
+        "note",
+        "halted",
+        "detail",
+        "title",
+        "words",
+    }  # fmt: skip
 )
 #: Names that hold such a text by their name alone.
 _NAMES = frozenset({"reason", "trouble", "problem", "why"})
