@@ -31,7 +31,7 @@ _TEXTS = frozenset(
         "detail",
         "title",
         "words",
-    }  # fmt: skip
+    }
 )
 #: Names that hold such a text by their name alone.
 _NAMES = frozenset({"reason", "trouble", "problem", "why"})
