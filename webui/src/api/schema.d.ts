@@ -4950,6 +4950,27 @@ export interface components {
             revision: number | null;
         };
         /**
+         * DetectedInfo
+         * @description Median motion on lines that were left empty, as a share of that on the lines around.
+         */
+        DetectedInfo: {
+            /**
+             * Even
+             * @description on even lines, without noise
+             */
+            even: number;
+            /**
+             * Noise
+             * @description scatter of the mean over the periods
+             */
+            noise: number;
+            /**
+             * Odd
+             * @description on odd lines, without noise
+             */
+            odd: number;
+        };
+        /**
          * Diff
          * @description A parameter set against a drive.
          */
@@ -11456,6 +11477,8 @@ export interface components {
             current_bandwidth_hz: number | null;
             /** Delay S */
             delay_s: number | null;
+            /** @description None where not only odd lines were excited */
+            detected: components["schemas"]["DetectedInfo"] | null;
             direct: components["schemas"]["DirectResponse"];
             /** Distortion */
             distortion: (number | null)[];
@@ -11589,6 +11612,12 @@ export interface components {
              * @enum {string}
              */
             loop: "auto" | "none" | "speed" | "position";
+            /**
+             * Odd Lines
+             * @description of mechanics by a multisine: odd lines alone, which tell noise, even and odd distortion apart
+             * @default false
+             */
+            odd_lines: boolean;
             /**
              * Rated Torque Nm
              * @description overrides what the drive says
@@ -12205,6 +12234,7 @@ export type CycleSettings = components['schemas']['CycleSettings'];
 export type CyclicInfo = components['schemas']['CyclicInfo'];
 export type CyclicRequest = components['schemas']['CyclicRequest'];
 export type DescribedDevice = components['schemas']['DescribedDevice'];
+export type DetectedInfo = components['schemas']['DetectedInfo'];
 export type Diff = components['schemas']['Diff'];
 export type DiffRow = components['schemas']['DiffRow'];
 export type DirectResponse = components['schemas']['DirectResponse'];
