@@ -67,7 +67,7 @@ COMMANDS = {
     ),
     "braking": ("functions:braking", "Energy of braking, and the resistor that it takes."),
     "sweep": (
-        "measure:sweep",
+        "tools:sweep",
         "Measure a frequency response and write it as JSON. The axis moves.",
     ),
     "response": (

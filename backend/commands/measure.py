@@ -1,11 +1,10 @@
-"""``servodeck sweep``, and what all measurements without the page have in common."""
+"""What all measurements without the page have in common."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -14,11 +13,11 @@ import typer
 from backend.api.station.models import DriveSummary
 from backend.axis.axis import Axis, Envelope
 from backend.axis.cyclic import CyclicSession
-from backend.commands.options import Json, Server, server_for
+from backend.commands.options import server_for
 from backend.commands.printing import print_text
 from backend.commands.remote import Remote, remote
 from backend.commands.restoring import restore_first
-from backend.commands.session import drive_and_pending, progress, run_in_order
+from backend.commands.session import drive_and_pending, run_in_order
 from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
 
@@ -28,106 +27,7 @@ Station = Annotated[int, typer.Option(help="station address on the bus")]
 Profile = Annotated[str | None, typer.Option(help="drive family; recognised where possible")]
 AxisName = Annotated[str | None, typer.Option("--axis", help="the server's name of the drive")]
 Out = Annotated[Path | None, typer.Option(help="JSON file to write")]
-Cycle = Annotated[float, typer.Option(help="cycle time in ms")]
-Travel = Annotated[float, typer.Option(help="longest way from the start, in revolutions")]
-Speed = Annotated[float, typer.Option(help="highest speed, in rpm")]
-Torque = Annotated[float, typer.Option(help="highest torque, in % of rated")]
-Rated = Annotated[float | None, typer.Option(help="rated torque in Nm, if not the drive's")]
-Consent = Annotated[
-    bool,
-    typer.Option(
-        "--consent",
-        help="measure although nothing in the drive ends a speed when this computer falls silent "
-        "(DS_C): its travel limits are active and a hand is on the emergency stop",
-    ),
-]
-
-
-class KindName(StrEnum):
-    """What is measured."""
-
-    mechanics = "mechanics"
-    speed_loop = "speed_loop"
-    position_loop = "position_loop"
-
-
-class LoopName(StrEnum):
-    """Which loop is closed meanwhile."""
-
-    auto = "auto"
-    none = "none"
-    speed = "speed"
-    position = "position"
-
-
-class WaveformName(StrEnum):
-    """What the axis is moved with."""
-
-    multisine = "multisine"
-    chirp = "chirp"
-    prbs = "prbs"
-    stepped = "stepped"
-
-
-def sweep(
-    url: Url = None,
-    station: Station = 1,
-    profile: Profile = None,
-    server: Server = None,
-    axis: AxisName = None,
-    kind: KindName = KindName.mechanics,
-    loop: LoopName = LoopName.auto,
-    cycle_ms: Cycle = 1.0,
-    travel_rev: Travel = 3.0,
-    speed_rpm: Speed = 1200.0,
-    torque_percent: Torque = 80.0,
-    f_min_hz: Annotated[float, typer.Option(help="lowest line")] = 5.0,
-    f_max_hz: Annotated[float | None, typer.Option(help="highest line")] = None,
-    share: Annotated[float, typer.Option(help="excitation's share of the torque")] = 0.35,
-    realisations: Annotated[int, typer.Option(help="pairs of realisations")] = 2,
-    excitation: Annotated[WaveformName, typer.Option(help="signal")] = WaveformName.multisine,
-    odd_lines: Annotated[
-        bool,
-        typer.Option(
-            "--odd-lines", help="excite odd lines alone; tells noise, even and odd distortion apart"
-        ),
-    ] = False,
-    rated_torque_nm: Rated = None,
-    consent: Consent = False,
-    out: Out = None,
-    as_json: Json = False,
-) -> None:
-    """Measure a frequency response and write it as JSON. The axis moves."""
-    limits = {
-        "travel_limit": travel_rev, "speed_limit": speed_rpm, "torque_limit": torque_percent,
-        "time_limit_s": 60.0, "consent": consent, "cycle_ms": cycle_ms,
-    }  # fmt: skip
-    more: dict[str, object] = {
-        "kind": kind.value, "loop": loop.value, "f_min_hz": f_min_hz, "f_max_hz": f_max_hz,
-        "share": share, "realisations": realisations, "rated_torque_nm": rated_torque_nm,
-        "excitation": excitation.value, "odd_lines": odd_lines,
-    }  # fmt: skip
-
-    async def here() -> dict[str, object]:
-        # The analysis takes seconds to import; no other command shall wait for it.
-        from backend.tools.sweep import evaluation as sweep_evaluation
-        from backend.tools.sweep import run as sweep_tool
-
-        settings = sweep_evaluation.SweepSettings(
-            Envelope(travel_rev, speed_rpm, torque_percent, 60.0), kind.value, loop.value,
-            f_min_hz, f_max_hz, share, realisations, rated_torque_nm=rated_torque_nm,
-            excitation=excitation.value, odd_lines=odd_lines,
-        )  # fmt: skip
-        async with exchanging(url, station, profile, cycle_ms, settings.envelope, consent) as (
-            found,
-            session,
-        ):
-            return sweep_evaluation.as_json(
-                await sweep_tool.sweep(found, session, settings, progress())
-            )
-
-    where = Where(url, station, profile, server, axis)
-    measure(where, "sweep", here, limits | more, out, _reported, as_json=as_json)
+There = Callable[[Remote, DriveSummary, Answer], Awaitable[None]]
 
 
 @asynccontextmanager
@@ -221,8 +121,11 @@ class Where(NamedTuple):
 def measure(
     where: Where, kind: str, here: Callable[[], Awaitable[Answer]], request: Answer,
     out: Path | None, reported: Callable[[Answer], list[str]], *, as_json: bool,
+    there: There | None = None,
 ) -> None:  # fmt: skip
     """Measure by a server or ``here``, write and show the result.
+
+    ``there`` is what is done on the server with the result.
 
     Ctrl+C ends the motion first: see `run_in_order`.
     """
@@ -235,6 +138,8 @@ def measure(
             async with remote(server) as at:
                 drive = await where.drive(at)
                 answer = await at.result(f"/drives/{drive.id}/jobs/{kind}", request)
+                if there is not None:
+                    await there(at, drive, answer)
         show(answer, out, reported, as_json=as_json)
 
     run_in_order(work)
@@ -253,12 +158,3 @@ def show(
         print(line)
     if out is not None:
         print_text("printed.written", file=str(out))
-
-
-def _reported(answer: Answer) -> list[str]:
-    rows, warnings = answer["resonances"], answer["warnings"]
-    lines = [
-        f"{row['kind']:14} {row['frequency_hz']:8.1f} Hz  damping {row['damping']:.3f}"
-        for row in (rows if isinstance(rows, list) else [])
-    ]
-    return lines + [f"note: {w}" for w in (warnings if isinstance(warnings, list) else [])]

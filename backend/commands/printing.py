@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
+from unicodedata import east_asian_width
 
 from drivers.texts.message import Param, language, text
 
@@ -20,3 +22,22 @@ def print_text(code: str, /, **params: Param) -> None:
 def note(code: str, /, **params: Param) -> None:
     """Print a message of the catalogue beside the output of the command."""
     print(words_of(code, **params), file=sys.stderr)
+
+
+def table(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows in columns: names at the left of the first one, figures at the right of all others."""
+    widths = [max(map(_columns, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for first, *rest in rows:
+        cells = [first + " " * (widths[0] - _columns(first))]
+        cells += [
+            " " * (width - _columns(each)) + each
+            for each, width in zip(rest, widths[1:], strict=True)
+        ]
+        lines.append("  ".join(cells).rstrip())
+    return lines
+
+
+def _columns(shown: str) -> int:
+    """Columns of a terminal that a text takes: Chinese characters are wide."""
+    return sum(2 if east_asian_width(sign) in "WF" else 1 for sign in shown)

@@ -1,11 +1,12 @@
-"""Commands of the tools that have a descriptor: on a bus of one's own, or by a running server."""
+"""Commands of the tools: on a bus of one's own, or by a running server."""
 
 from __future__ import annotations
 
 import inspect
 import types
 import typing
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator, Mapping
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -14,8 +15,13 @@ import typer
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
+from backend.api.station.models import DriveSummary
+from backend.axis.axis import Axis
 from backend.commands import measure
+from backend.commands.measure import Answer
 from backend.commands.options import Json, Server
+from backend.commands.printing import table
+from backend.commands.remote import Remote
 from backend.commands.session import progress
 from backend.tools.registry import BY_KIND
 from backend.tools.tool import AnyTool, Option, Row, Run, ToolResult
@@ -28,12 +34,28 @@ _WHERE: dict[str, tuple[Any, object]] = {
 _OUTPUT: dict[str, tuple[Any, object]] = {"out": (measure.Out, None), "as_json": (Json, False)}
 
 
-def command_of(tool: AnyTool) -> Callable[..., None]:
+@dataclass(frozen=True)
+class Beside:
+    """What the command of a tool has beside what follows from its descriptor.
+
+    ``options`` are further ones, or take the place of a setting's. ``settled`` makes the settings
+    of what was given. ``here`` and ``there`` are done with the result, on a bus of one's own or on
+    the server; ``lines`` say so.
+    """
+
+    options: Mapping[str, tuple[Any, object]]
+    settled: Callable[[dict[str, Any]], dict[str, Any]]
+    here: Callable[[Axis, Any, dict[str, Any]], Awaitable[None]]
+    there: Callable[[Remote, DriveSummary, Answer, dict[str, Any]], Awaitable[None]]
+    lines: Callable[[Any, dict[str, Any]], list[str]]
+
+
+def command_of(tool: AnyTool, beside: Beside | None = None) -> Callable[..., None]:
     """The command of a tool: where the drive is, an option for each setting, and the output."""
-    own = {**_WHERE, **dict(_options(tool)), **_OUTPUT}
+    own = {**_WHERE, **dict(_options(tool)), **(beside.options if beside else {}), **_OUTPUT}
 
     def command(**given: Any) -> None:
-        settings = _settings(tool, given)
+        settings = _settings(tool, beside.settled(given) if beside else given)
         where = measure.Where(*(given[name] for name in _WHERE))
 
         async def here() -> dict[str, object]:
@@ -46,12 +68,21 @@ def command_of(tool: AnyTool) -> Callable[..., None]:
                 settings.consent, closes_loops=tool.closes_loops,
             ) as (axis, session):  # fmt: skip
                 found = await tool.run(Run(axis, session, progress()), settings)
+                if beside is not None:
+                    await beside.here(axis, found, given)
             return dict(found.model_dump(mode="json"))
 
+        async def there(at: Remote, drive: DriveSummary, answer: Answer) -> None:
+            if beside is not None:
+                await beside.there(at, drive, answer, given)
+
+        def lines(answer: Answer) -> list[str]:
+            found = tool.result.model_validate(answer)
+            return lines_of(tool, found) + (beside.lines(found, given) if beside else [])
+
         measure.measure(
-            where, tool.kind, here, settings.model_dump(mode="json"), given["out"],
-            lambda answer: lines_of(tool, tool.result.model_validate(answer)),
-            as_json=given["as_json"],
+            where, tool.kind, here, settings.model_dump(mode="json"), given["out"], lines,
+            as_json=given["as_json"], there=there,
         )  # fmt: skip
 
     command.__name__, command.__doc__ = tool.kind, tool.text("help")
@@ -71,9 +102,12 @@ def lines_of(tool: AnyTool, result: ToolResult) -> list[str]:
     """What a person is shown of a result."""
     section = tool.report(result.in_language(language()))
     lines = [tool.text(note.name, language(), note.values) for note in section.notes]
-    return lines + [
+    lines += [
         f"{tool.text(row.name, language(), row.values)}: {_shown(row)}" for row in section.rows
     ]
+    for grid in section.grids:
+        lines += ["", *table(tool.cells(grid, language()))]
+    return lines
 
 
 def _shown(row: Row) -> str:
@@ -105,11 +139,16 @@ def _kind(tool: AnyTool, name: str, field: FieldInfo, *, pair: bool) -> Any:
     kind = field.annotation
     if pair:
         return float | None
-    if typing.get_origin(kind) is Literal:
-        values = typing.get_args(kind)
-        return StrEnum(f"{tool.kind}_{name}", {value: value for value in values})
+    choice = next((each for each in (kind, *typing.get_args(kind)) if _is_choice(each)), None)
+    if choice is not None:
+        values = StrEnum(f"{tool.kind}_{name}", {value: value for value in typing.get_args(choice)})
+        return values if choice is kind else values | None
     assert typing.get_origin(kind) in (None, types.UnionType), f"{tool.kind}: {name} has no option"
     return kind
+
+
+def _is_choice(kind: Any) -> bool:
+    return typing.get_origin(kind) is Literal
 
 
 def _settings(tool: AnyTool, given: dict[str, Any]) -> Any:
@@ -138,6 +177,7 @@ def _settings(tool: AnyTool, given: dict[str, Any]) -> Any:
 
 
 inertia = command_of(BY_KIND["inertia"])
+sweep = command_of(BY_KIND["sweep"])
 step = command_of(BY_KIND["step"])
 friction = command_of(BY_KIND["friction"])
 brake_test = command_of(BY_KIND["brake-test"])

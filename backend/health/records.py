@@ -23,12 +23,6 @@ from drivers.errors import NotAllowed
 _OF_NO_EFFECT = frozenset({"rounds", "consent"})
 
 
-class BaselineMissing(NotAllowed):
-    """The axis has no baseline."""
-
-    kind = "not-found"
-
-
 @dataclass(frozen=True)
 class AxisOf:
     """Which axis: its key (see `backend.store.health_tables`) and what its drive reported."""

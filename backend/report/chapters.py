@@ -8,19 +8,14 @@ from dataclasses import dataclass
 from backend.report.document import Block, Figure, Heading, Note, Table
 from backend.report.facts import Measured
 from backend.report.loop_bands import bands
-from backend.report.numbers import (
-    fixed,
-    hertz,
-    margin,
-    milliseconds,
-    moment,
-    significant,
-)
 from backend.report.plot import Curve, Plot
 from backend.report.texts import Words
-from backend.report.tools import kind_title, tool_blocks
-from backend.report.views import SweepView
+from backend.report.tools import grid_table, kind_title, note_of, tool_blocks
+from backend.tools.measuring.numbers import fixed, milliseconds, moment, significant
 from backend.tools.step.result import StepAnswer
+from backend.tools.sweep.result import SweepAnswer
+from backend.tools.sweep.run import TOOL as SWEEP
+from backend.tools.sweep.texts import margins_grid, resonances_grid
 
 #: Reported apart in print and by the colour-blind: dark blue, orange.
 _NOW, _EARLIER, _DEMAND = "#1a5c94", "#c2571a", "#5b6770"
@@ -36,10 +31,10 @@ def chapter(measured: Measured, words: Words) -> list[Block]:
     view = measured.view
     if isinstance(view, StepAnswer):
         blocks += _step(measured, view, words)
-    elif isinstance(view, SweepView):
+    elif isinstance(view, SweepAnswer):
         blocks += _sweep(measured, view, words)
     else:
-        blocks += tool_blocks(measured.kind, view, words)
+        blocks += tool_blocks(view, words)
     return [*blocks, *_origin(measured, words)]
 
 
@@ -69,23 +64,33 @@ def _plain(value: object) -> str:
 # --- frequency response ----------------------------------------------------------------
 
 
-def _sweep(measured: Measured, view: SweepView, words: Words) -> list[Block]:
+def _sweep(measured: Measured, view: SweepAnswer, words: Words) -> list[Block]:
     earlier = measured.earlier.view if measured.earlier else None
-    other = earlier if isinstance(earlier, SweepView) else None
+    other = earlier if isinstance(earlier, SweepAnswer) else None
     blocks: list[Block] = [_bode(view, other, words)]
-    if view.kind == "mechanics":
-        blocks += _resonances(view, words)
-    if view.margins and view.kind != "mechanics":
-        blocks.append(_margins(view, other, words))
+    if view.kind != "mechanics":
+        if view.margins:
+            blocks.append(_margins(view, other, words))
+    elif view.trusted and view.resonances:
+        blocks.append(grid_table(SWEEP, resonances_grid(view), words))
+    else:
+        blocks.append(note_of(SWEEP, SWEEP.report(view).notes[0], words))
     if measured.verdict is not None:
         blocks += bands(measured.verdict, words)
     if view.saturated_share > 0.0:
         share = fixed(view.saturated_share * 100, 1, "%")
         blocks.append(Note(words("warn.saturated", share=share), "warn"))
-    return [*blocks, *(Note(each, "warn") for each in view.cautions(words.language))]
+    cautions = view.in_language(words.language).warnings
+    return [*blocks, *(Note(each, "warn") for each in cautions)]
 
 
-def _bode(view: SweepView, other: SweepView | None, words: Words) -> Figure:
+def _margins(view: SweepAnswer, other: SweepAnswer | None, words: Words) -> Table:
+    if other is None:
+        return grid_table(SWEEP, margins_grid(view), words)
+    return grid_table(SWEEP, margins_grid(other, view, heads=("before", "after")), words)
+
+
+def _bode(view: SweepAnswer, other: SweepAnswer | None, words: Words) -> Figure:
     low, high = view.valid_band_hz
     first, last = view.frequency_hz[0], view.frequency_hz[-1]
     shown = (max(first, low * 0.8), min(last, high * 1.25))
@@ -124,7 +129,7 @@ def _bode(view: SweepView, other: SweepView | None, words: Words) -> Figure:
 class _Look:
     """A response and how its curves are drawn."""
 
-    view: SweepView
+    view: SweepAnswer
     label: str
     color: str
     dashed: bool
@@ -138,41 +143,11 @@ def _curve(of: _Look, values: Sequence[float], std: Sequence[float | None]) -> C
     return Curve(of.label, of.color, of.view.frequency_hz, kept, spread, of.dashed)
 
 
-def _whole_turns(view: SweepView) -> list[float]:
+def _whole_turns(view: SweepAnswer) -> list[float]:
     """An unwrapped phase moved by whole turns so that it begins within ±180°."""
     first = sorted(view.phase_deg[: max(1, len(view.phase_deg) // 20)])
     turns = round(first[len(first) // 2] / _TURN)
     return [value - _TURN * turns for value in view.phase_deg]
-
-
-def _resonances(view: SweepView, words: Words) -> list[Block]:
-    if not view.trusted:
-        return [Note(words("untrusted"), "warn")]
-    if not view.resonances:
-        return [Note(words("no_resonance"))]
-    head = (words("kind"), words("frequency"), words("damping"), words("height"))
-    rows = tuple(
-        (words(r.kind), hertz(r.frequency_hz), fixed(r.damping * 100, 1, "%"),
-         fixed(r.height_db, 1, "dB"))
-        for r in view.resonances
-    )  # fmt: skip
-    return [Table(head, rows, (False, True, True, True))]
-
-
-def _margins(view: SweepView, other: SweepView | None, words: Words) -> Table:
-    def column(of: SweepView) -> list[str]:
-        m = of.margins
-        return [
-            hertz(margin(m, "bandwidth_hz")), hertz(margin(m, "bandwidth_90deg_hz")),
-            hertz(margin(m, "crossover_hz")), fixed(margin(m, "phase_margin_deg"), 1, "°"),
-            fixed(margin(m, "gain_margin_db"), 1, "dB"), fixed(margin(m, "ms"), 2),
-        ]  # fmt: skip
-
-    names = [
-        words(name)
-        for name in ("bandwidth", "bandwidth90", "crossover", "phase_margin", "gain_margin", "ms")
-    ]
-    return _compared(names, column(view), column(other) if other else None, words)
 
 
 def _compared(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from backend.report.chapters import chapter
 from backend.report.condition import condition
 from backend.report.document import (
@@ -18,17 +16,19 @@ from backend.report.document import (
 )
 from backend.report.facts import Facts, Measured
 from backend.report.handed_over import handed_over
-from backend.report.numbers import NONE, fixed, hertz, margin, milliseconds, moment, significant
 from backend.report.texts import Words
-from backend.report.tools import kind_title, tool_verdict
-from backend.report.views import SweepView
-from backend.tools.autotune.result import VerdictInfo
+from backend.report.tools import kind_title, note_of, tool_verdict
+from backend.tools.measuring.numbers import (
+    NONE,
+    fixed,
+    milliseconds,
+    moment,
+    significant,
+)
 from backend.tools.step.result import StepAnswer
-from backend.tools.tool import ToolResult
-
-#: docs/tuning.md: 45° or more is calm, 8 dB or more, Ms below 2; and what is no longer sound.
-_SOUND = (45.0, 8.0, 2.0)
-_POOR = (30.0, 6.0, 2.5)
+from backend.tools.sweep.result import SweepAnswer
+from backend.tools.sweep.run import TOOL as SWEEP
+from backend.tools.sweep.texts import tuned_verdict
 
 
 def compose(facts: Facts, language: Language) -> Document:
@@ -97,41 +97,16 @@ def _verdicts(facts: Facts, words: Words) -> list[Block]:
 
 
 def _is_loop(measured: Measured) -> bool:
-    return isinstance(measured.view, SweepView) and measured.view.kind != "mechanics"
+    return isinstance(measured.view, SweepAnswer) and measured.view.kind != "mechanics"
 
 
 def _verdict(measured: Measured, words: Words) -> Note:
-    view, kind = measured.view, kind_title(measured.kind, words)
-    if isinstance(view, StepAnswer):
-        return _step_verdict(view, kind, words)
-    if isinstance(view, ToolResult):
-        return tool_verdict(measured.kind, view, words)
-    if view.kind == "mechanics":
-        peaks = [hertz(r.frequency_hz) for r in view.resonances if r.kind == "resonance"]
-        if not view.trusted:
-            return Note(f"{kind}: {words('untrusted')}", "warn")
-        reported = f"{words('resonances')} {', '.join(peaks)}" if peaks else words("no_resonance")
-        return Note(f"{kind}: {reported}", "good")
-    if measured.verdict is not None:
-        return _tuned_verdict(measured.verdict, view, kind, words)
-    return _loop_verdict(view, kind, words)
-
-
-def _tuned_verdict(verdict: VerdictInfo, view: SweepView, kind: str, words: Words) -> Note:
-    """Of what was measured and what is predicted above it, the worse one."""
-    if not verdict.stable or verdict.contradicted:
-        return Note(words("loop.unstable", kind=kind), "fault")
-    worst = verdict.stated
-    loop = _Loop(worst.phase_margin_deg, worst.gain_margin_db, worst.ms)
-    tone, name = _judged(loop)
-    if verdict.coverage == "predicted" and tone == "good":
-        tone, name = "warn", "incomplete"
-    text = words(
-        "loop.verdict.bands", kind=kind, verdict=words(name), pm=fixed(loop.phase_deg, 0, "°"),
-        gm=fixed(loop.gain_db, 1, "dB"), ms=fixed(loop.ms, 2),
-        bw=hertz(margin(view.margins, "bandwidth_hz")),
-    )  # fmt: skip
-    return Note(text, tone)
+    if isinstance(measured.view, StepAnswer):
+        return _step_verdict(measured.view, kind_title(measured.kind, words), words)
+    if isinstance(measured.view, SweepAnswer) and measured.verdict is not None:
+        note = note_of(SWEEP, tuned_verdict(measured.view, measured.verdict), words)
+        return Note(f"{kind_title(measured.kind, words)}: {note.text}", note.tone)
+    return tool_verdict(measured.kind, measured.view, words)
 
 
 def _step_verdict(view: StepAnswer, kind: str, words: Words) -> Note:
@@ -145,54 +120,6 @@ def _step_verdict(view: StepAnswer, kind: str, words: Words) -> Note:
         return Note(words("move.verdict", kind=kind, following=peak, settling=settling), tone)
     over = fixed(view.step.overshoot_percent if view.step else None, 1, "%")
     return Note(words("step.verdict", kind=kind, overshoot=over, settling=settling), tone)
-
-
-@dataclass(frozen=True)
-class _Loop:
-    phase_deg: float | None
-    gain_db: float | None
-    ms: float | None
-
-    def within(self, limits: tuple[float, float, float]) -> bool:
-        """What was not seen within the measured band breaks no limit, and keeps none either."""
-        phase, gain, ms = limits
-        return (
-            (self.phase_deg is None or self.phase_deg >= phase)
-            and (self.gain_db is None or self.gain_db >= gain)
-            and (self.ms is None or self.ms <= ms)
-        )
-
-    @property
-    def complete(self) -> bool:
-        """Whether every figure was seen; a missing one never counts as passed."""
-        return None not in (self.phase_deg, self.gain_db, self.ms)
-
-
-def _judged(loop: _Loop) -> tuple[Tone, str]:
-    """Tone and word for a loop; where a figure is missing it is not called sound."""
-    tone: Tone = "good" if loop.within(_SOUND) else "warn" if loop.within(_POOR) else "fault"
-    if tone == "good" and not loop.complete:
-        return "warn", "incomplete"
-    return tone, {"good": "sound", "warn": "close"}.get(tone, "poor")
-
-
-def _loop_verdict(view: SweepView, kind: str, words: Words) -> Note:
-    found = view.margins
-    if found.get("stable") is False:
-        return Note(words("loop.unstable", kind=kind), "fault")
-    loop = _Loop(
-        margin(found, "phase_margin_deg"), margin(found, "gain_margin_db"), margin(found, "ms")
-    )
-    if loop.phase_deg is None and loop.gain_db is None and loop.ms is None:
-        return Note(words("loop.unknown", kind=kind), "warn")
-    tone, verdict = _judged(loop)
-    text = words(
-        "loop.verdict", kind=kind, verdict=words(verdict), pm=fixed(loop.phase_deg, 0, "°"),
-        gm=fixed(loop.gain_db, 1, "dB"), ms=fixed(loop.ms, 2),
-        bw=hertz(margin(found, "bandwidth_hz")), low=hertz(margin(found, "from_hz")),
-        high=hertz(margin(found, "to_hz")),
-    )  # fmt: skip
-    return Note(text, tone)
 
 
 # --- warnings and settings -------------------------------------------------------------

@@ -5,8 +5,8 @@ from __future__ import annotations
 from backend.health.records import Baseline, Condition
 from backend.health.words import message_of
 from backend.report.document import Block, Note, Table
-from backend.report.numbers import moment
 from backend.report.texts import Words
+from backend.tools.measuring.numbers import moment
 
 
 def condition(found: Condition, baseline: Baseline, words: Words) -> list[Block]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from backend.health.records import Condition
-from backend.report.views import AnyView
 from backend.tools.autotune.result import VerdictInfo
+from backend.tools.tool import ToolResult
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Measured:
     program: str
     differences: tuple[str, ...]
     settings: Mapping[str, object]
-    view: AnyView
+    view: ToolResult
     earlier: Measured | None = None
     verdict: VerdictInfo | None = None
     """On a tuned loop, over all frequencies; None where no tuning verified it."""

@@ -13,7 +13,7 @@ from backend.handover.record import HandedOver
 from backend.library.measurements import BadMeasurement, Head, MeasurementStore, profile_version
 from backend.report.changes import Change, net
 from backend.report.facts import ChangedSetting, Facts, HandedOverFile, Identity, Measured
-from backend.report.views import verdict_of, view_of
+from backend.report.tools import result_of, verdict_of
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.station.evaluation import evaluate
@@ -118,7 +118,7 @@ def _measured(store: MeasurementStore, file: str) -> Measured:
     return Measured(
         file, kind_of(loaded.head), loaded.head.saved, str(loaded.meta.get("program", "")),
         made.differences, settings if isinstance(settings, dict) else {},
-        view_of(loaded.meta.get("tool"), made.result),
+        result_of(loaded.meta.get("tool"), made.result),
         verdict=verdict_of(loaded.meta.get("verdict")),
     )  # fmt: skip
 

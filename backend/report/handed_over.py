@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from backend.report.document import Block, Heading, Note, Table
 from backend.report.facts import HandedOverFile
-from backend.report.numbers import moment
 from backend.report.texts import Words
+from backend.tools.measuring.numbers import moment
 
 
 def handed_over(made: Sequence[HandedOverFile], words: Words) -> list[Block]:

@@ -1,15 +1,19 @@
-"""What a report shows of tools that have a descriptor, from the section that each of them makes."""
+"""What a report shows of tools, from the section that each of them makes."""
 
 from __future__ import annotations
 
 from itertools import cycle
 
+from pydantic import ValidationError
+
+from backend.library.measurements import BadMeasurement
 from backend.report.document import Block, Figure, Note, Table
-from backend.report.numbers import NONE, significant
 from backend.report.plot import Curve, Plot
 from backend.report.texts import Words
+from backend.tools.autotune.result import VerdictInfo
+from backend.tools.measuring.numbers import NONE, significant
 from backend.tools.registry import BY_KIND
-from backend.tools.tool import AnyTool, Chart, Interval, Section, ToolResult
+from backend.tools.tool import AnyTool, Chart, Grid, Interval, Section, ToolResult
 from backend.tools.tool import Note as ToolNote
 
 _COLORS = ("#1a5c94", "#c2571a")
@@ -21,32 +25,75 @@ def kind_title(kind: str, words: Words) -> str:
     return words(f"kind.{kind}") if tool is None else tool.text("title", words.language)
 
 
-def tool_blocks(kind: str, result: ToolResult, words: Words) -> list[Block]:
-    """Notes, parameters with their intervals, and charts."""
-    tool = BY_KIND[kind]
+def result_of(tool: object, result: dict[str, object]) -> ToolResult:
+    """The result of a tool, by the name that its measurements carry.
+
+    Raises:
+        BadMeasurement: it is not what that tool concludes.
+    """
+    known = BY_KIND.get(str(tool))
+    if known is None:
+        raise BadMeasurement("report.report-cannot-show-measures", value=str(tool), tool=str(tool))
+    try:
+        found: ToolResult = known.result.model_validate(result)
+    except ValidationError as error:
+        raise BadMeasurement(
+            "report.result-not-complete", tool=str(tool), cause=str(error)
+        ) from error
+    return found
+
+
+def verdict_of(kept: object) -> VerdictInfo | None:
+    """The verdict that an automatic tuning left beside its measurement; None where there is none.
+
+    Raises:
+        BadMeasurement: it is not what a tuning concludes.
+    """
+    if kept is None:
+        return None
+    try:
+        return VerdictInfo.model_validate(kept)
+    except ValidationError as error:
+        raise BadMeasurement(
+            "report.result-not-complete", tool="autotune", cause=str(error)
+        ) from error
+
+
+def tool_blocks(result: ToolResult, words: Words) -> list[Block]:
+    """Notes, parameters with their intervals, tables and charts."""
+    tool = BY_KIND[result.tool]
     section: Section = tool.report(result.in_language(words.language))
-    head = (words("quantity"), words("value"), words("interval"))
-    rows = tuple(
-        (tool.text(row.name, words.language, row.values), significant(row.value, row.unit, 3),
-         _interval(row.ci95))
-        for row in section.rows
-    )  # fmt: skip
-    blocks: list[Block] = [_note(tool, each, words) for each in section.notes]
-    blocks.append(Table(head, rows, (False, True, True)))
+    blocks: list[Block] = [note_of(tool, each, words) for each in section.notes]
+    if section.rows:
+        head = (words("quantity"), words("value"), words("interval"))
+        rows = tuple(
+            (tool.text(row.name, words.language, row.values), significant(row.value, row.unit, 3),
+             _interval(row.ci95))
+            for row in section.rows
+        )  # fmt: skip
+        blocks.append(Table(head, rows, (False, True, True)))
+    blocks += [grid_table(tool, each, words) for each in section.grids]
     for chart in section.charts:
         title = tool.text(chart.name, words.language)
         blocks.append(Figure((_plot(tool, chart, words),), title))
     return blocks
 
 
+def grid_table(tool: AnyTool, grid: Grid, words: Words) -> Table:
+    """A table of a tool in words."""
+    head, *rows = tool.cells(grid, words.language)
+    return Table(head, tuple(rows), (False, *(True,) * (len(head) - 1)))
+
+
 def tool_verdict(kind: str, result: ToolResult, words: Words) -> Note:
-    """The first note of the section, with the tool's title."""
-    tool = BY_KIND[kind]
-    first = _note(tool, tool.report(result.in_language(words.language)).notes[0], words)
-    return Note(f"{tool.text('title', words.language)}: {first.text}", first.tone)
+    """The first note of the section, with what was measured."""
+    tool = BY_KIND[result.tool]
+    first = note_of(tool, tool.report(result.in_language(words.language)).notes[0], words)
+    return Note(f"{kind_title(kind, words)}: {first.text}", first.tone)
 
 
-def _note(tool: AnyTool, note: ToolNote, words: Words) -> Note:
+def note_of(tool: AnyTool, note: ToolNote, words: Words) -> Note:
+    """A finding of a tool in words."""
     return Note(tool.text(note.name, words.language, note.values), note.tone)
 
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from backend.library.measurements import BadMeasurement, Measurement
 from backend.response_import import stored as response_import
 from backend.tools.registry import BY_KIND
-from backend.tools.sweep import evaluation as sweep_evaluation
 from drivers.texts.message import reason_of
 
 #: Numbers nearer than this share are the same: another computer sums in another order.
@@ -56,11 +55,8 @@ def recompute(measurement: Measurement) -> dict[str, object]:
         tool = BY_KIND.get(str(meta.get("tool")))
         if tool is not None:
             return dict(tool.reevaluate(arrays, meta).model_dump(mode="json"))
-        match meta.get("tool"):
-            case "sweep":
-                return sweep_evaluation.as_json(sweep_evaluation.reevaluate(arrays, meta))
-            case "response-import":
-                return response_import.reevaluate(arrays, meta)
+        if meta.get("tool") == "response-import":
+            return response_import.reevaluate(arrays, meta)
     except (
         ValueError, KeyError, TypeError, IndexError, AttributeError, ArithmeticError, MemoryError,
     ) as error:  # fmt: skip

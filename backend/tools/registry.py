@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from backend.tools.autotune.tool import TOOL as AUTOTUNE
 from backend.tools.brake.run import TOOL as BRAKE_TEST
 from backend.tools.cycle.run import TOOL as CYCLE
 from backend.tools.first_power.run import TOOL as FIRST_POWER
@@ -10,16 +11,19 @@ from backend.tools.health.run import TOOL as HEALTH
 from backend.tools.inertia.run import TOOL as INERTIA
 from backend.tools.safety_check.run import TOOL as SAFETY_CHECK
 from backend.tools.step.run import TOOL as STEP
+from backend.tools.sweep.run import TOOL as SWEEP
 from backend.tools.tool import AnyTool
 
 TOOLS: tuple[AnyTool, ...] = (
     FIRST_POWER,
     INERTIA,
+    SWEEP,
     STEP,
     FRICTION,
     BRAKE_TEST,
     HEALTH,
     SAFETY_CHECK,
     CYCLE,
+    AUTOTUNE,
 )
 BY_KIND: dict[str, AnyTool] = {tool.kind: tool for tool in TOOLS}

@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
 from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -92,6 +93,7 @@ class ToolResult(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
+    tool: str
     measurements: tuple[str, ...] = Field(default=(), description="names of the stored raw data")
 
     def in_language(self, language: Language) -> Self:  # noqa: ARG002
@@ -145,8 +147,20 @@ class Note:
     """A verdict or finding; ``name`` is a text of the tool."""
 
     name: str
-    tone: Literal["good", "warn", "plain"] = "plain"
+    tone: Literal["good", "warn", "fault", "plain"] = "plain"
     values: Mapping[str, str] = field(default_factory=dict)
+
+
+Cell = Note | str
+"""A text of the tool, or a figure with its unit as it is shown."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A table of figures, with names in its first column; ``heads`` are texts of the tool."""
+
+    heads: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -174,12 +188,26 @@ class Section:
     """What a report and the command line show of a result; the first note is the verdict."""
 
     notes: tuple[Note, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[Row, ...] = ()
     charts: tuple[Chart, ...] = ()
+    grids: tuple[Grid, ...] = ()
+
+
+@dataclass(frozen=True)
+class Written:
+    """Raw values that a tool wrote and left in force: before, after, and when."""
+
+    time: datetime
+    before: Mapping[str, int]
+    after: Mapping[str, int]
 
 
 S = TypeVar("S", bound=BaseModel)
 R = TypeVar("R", bound=ToolResult)
+
+
+def _nothing_written(_result: ToolResult) -> Written | None:
+    return None
 
 
 @dataclass(frozen=True)
@@ -190,9 +218,10 @@ class Tool(Generic[S, R]):
     catalogue, since jobs and log lines name the tool to readers of both languages. ``texts`` hold
     at least "help" and "field.<name>" of every setting of its own. ``reevaluate`` makes the result
     again from arrays and meta data as ``run`` kept them and raises ValueError where they are not
-    of this tool. ``right`` is what a person needs to start it. ``motion`` False: it reads alone, so
-    that no exchange is started for it, it holds no grant, and needs no control of the axis; its
-    settings have no envelope then.
+    of this tool. ``parts`` are the results inside a result, by the kind of the raw data that they
+    were concluded from. ``written``: what it left in the drive. ``right`` is what a person needs to
+    start it. ``motion`` False: it reads alone, so that no exchange is started for it, it holds no
+    grant, and needs no control of the axis; its settings have no envelope then.
     ``closes_loops`` False: it runs before anybody knows whether a loop may be closed, so that no
     speed is tried and no ramp is prepared before it.
     """
@@ -205,6 +234,8 @@ class Tool(Generic[S, R]):
     reevaluate: Callable[[Arrays, Meta], R]
     report: Callable[[R], Section]
     texts: Texts
+    parts: Callable[[R], Mapping[str, ToolResult | None]] | None = None
+    written: Callable[[R], Written | None] = _nothing_written
     right: Right = Right.MEASURE
     motion: bool = True
     closes_loops: bool = True
@@ -218,6 +249,15 @@ class Tool(Generic[S, R]):
             return self.title.words(language)
         found = self.texts[name][1 if language == "zh" else 0]
         return found.format(**values) if values else found
+
+    def cells(self, grid: Grid, language: Language) -> list[tuple[str, ...]]:
+        """The head and the rows of a table in words."""
+
+        def shown(cell: Cell) -> str:
+            return cell if isinstance(cell, str) else self.text(cell.name, language, cell.values)
+
+        head = tuple(self.text(name, language) for name in grid.heads)
+        return [head, *(tuple(shown(cell) for cell in row) for row in grid.rows)]
 
 
 AnyTool = Tool[Any, Any]

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from pydantic import BaseModel, Field
+
+from drivers.texts.message import Language, Text
 
 
 class MessageInfo(BaseModel):
@@ -14,3 +18,13 @@ class MessageInfo(BaseModel):
 
     code: str
     params: dict[str, str | int | float | MessageInfo | None] = Field(default_factory=dict)
+
+
+def wire_messages(texts: Iterable[Text]) -> tuple[MessageInfo, ...]:
+    """Messages as results carry them."""
+    return tuple(MessageInfo.model_validate(each.to_wire()) for each in texts)
+
+
+def words_of(messages: Iterable[MessageInfo], language: Language) -> tuple[str, ...]:
+    """The sentences of messages in a language."""
+    return tuple(Text.from_wire(each.model_dump()).words(language) for each in messages)

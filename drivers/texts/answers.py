@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from drivers.texts.message import Language, Text, prose
+from drivers.texts.message import Language, Text
 
 _ONE, _SEVERAL = "_message", "_messages"
 
@@ -32,15 +32,6 @@ def sentence(name: str, message: Text | None) -> dict[str, object]:
         name: "" if message is None else message.words(),
         f"{name}{_ONE}": None if message is None else message.to_wire(),
     }
-
-
-def messages_in(answer: Mapping[str, object], name: str, stem: str | None = None) -> list[Text]:
-    """The messages of a list in an answer; sentences of an older version are words as they are."""
-    found = answer.get(f"{stem or name}{_SEVERAL}")
-    if isinstance(found, (list, tuple)):
-        return [Text.from_wire(each) for each in found if isinstance(each, Mapping)]
-    words = answer.get(name)
-    return [prose(str(each)) for each in words] if isinstance(words, (list, tuple)) else []
 
 
 def in_language(answer: Mapping[str, object], language: Language) -> dict[str, object]:

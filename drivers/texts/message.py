@@ -66,6 +66,8 @@ def language_of(tag: str | None) -> Language:
 RENAMED = {
     "autotune.no-candidate-kept-promise": "autotune.no-candidate-verified",
     "autotune.promise-not-kept": "autotune.prediction-not-confirmed",
+    "api-tuning.frequency-response": "sweep.title",
+    "api-tuning.tune": "autotune.title",
 }
 
 

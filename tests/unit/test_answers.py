@@ -6,7 +6,7 @@ import json
 
 from backend.tools.inertia.result import InertiaAnswer, InertiaIntervals
 from backend.tools.spoken import result_in_language
-from drivers.texts.answers import in_language, messages_in, sentence, sentences
+from drivers.texts.answers import in_language, sentence, sentences
 from drivers.texts.message import joined, text
 
 LOW = text("sweep.coherence-low")
@@ -17,7 +17,6 @@ NOTHING = (None, None)
 def test_sentences_stand_beside_their_messages_and_survive_a_file() -> None:
     answer = json.loads(json.dumps(sentences("warnings", [LOW, LEFT_OUT], "warning")))
     assert answer["warnings"][1] == "3 periods had lost samples and were left out"
-    assert messages_in(answer, "warnings", "warning") == [LOW, LEFT_OUT]
     chinese = in_language(answer, "zh")
     assert chinese["warnings"] == [
         "相干性偏低：请增大激励，或检查间隙和摩擦",
@@ -37,8 +36,6 @@ def test_a_message_within_a_list_of_answers_and_one_alone() -> None:
 def test_a_file_of_an_older_version_is_shown_as_it_stands() -> None:
     answer = {"warnings": ["coherence is low"], "notes": [], "unit": "1"}
     assert in_language(answer, "zh") == answer
-    (words,) = messages_in(answer, "warnings", "warning")
-    assert (words.code, words.words("zh")) == ("", "coherence is low")
 
 
 def inertia(**other: object) -> InertiaAnswer:

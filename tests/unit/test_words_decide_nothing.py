@@ -18,7 +18,20 @@ import pytest
 ROOT = Path(__file__).parents[2]
 #: Attributes that hold text for people, on whatever object they are.
 _TEXTS = frozenset(
-    {"message", "reason", "trouble", "problem", "remedy", "advice", "strerror", "note", "halted"}
+    {
+        "message",
+        "reason",
+        "trouble",
+        "problem",
+        "remedy",
+        "advice",
+        "strerror",
+        "note",
+        "halted",
+        "detail",
+        "title",
+        "words",
+    }
 )
 #: Names that hold such a text by their name alone.
 _NAMES = frozenset({"reason", "trouble", "problem", "why"})
@@ -60,6 +73,14 @@ ALLOWED: dict[tuple[str, str], str] = {
         "backend/recording/library.py",
         "fitting = [s for s in found if all(word in s.words() for word in words)]",
     ): "a person searches recordings by the words in their descriptions",
+    (
+        "backend/audit/trail.py",
+        "for word in self.words.split():",
+    ): "a person searches the audit by words",
+    (
+        "backend/library/rows.py",
+        "for word in query.words.lower().split():",
+    ): "a person searches the library by words",
     (
         "backend/commands/virtual.py",
         'error.text = prose(error.message.removeprefix(f"bench file {file}: "))',
@@ -238,6 +259,8 @@ def test_no_control_flow_reads_the_words_of_a_message() -> None:
         'ended = "torque" in found.text.words()',
         'ended = halt.text.words("zh").startswith("转矩")',
         'if warning.words() == "coherence is low":\n        pass',
+        'ended = self.words if self.words != "open" else "ended"',
+        'ended = reported.detail.startswith("there is no drive")',
     ],
 )
 def test_reading_words_is_found(line: str) -> None:

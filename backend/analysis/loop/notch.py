@@ -220,8 +220,8 @@ def decode_hz_width_db(
 class LevelCalibration:
     """Measured meaning of width and depth levels: the manual prints no formula (R6L).
 
-    ``width_ratio`` maps a level to f_b/f_c, ``depth_db`` a level to depth; both from
-    :func:`fit_notch` on responses with and without the notch. Levels in between are interpolated.
+    ``width_ratio`` maps a level to f_b/f_c, ``depth_db`` a level to depth; both from responses
+    with and without the notch. Levels in between are interpolated.
     """
 
     width_ratio: tuple[tuple[int, float], ...]
@@ -277,26 +277,3 @@ def _nearest_level(
     levels = np.arange(low, high + 1)
     known = np.interp(levels, [p[0] for p in ordered], [p[1] for p in ordered])
     return int(levels[np.argmin(np.abs(known - wanted))])
-
-
-def fit_notch(frequency_hz: FloatArray, ratio: ComplexArray) -> Notch:
-    """Notch that explains a measured ratio of two responses, with and without it.
-
-    A starting grid of centres and widths; the depth follows. Magnitudes only, since a change of
-    delay must not count as a notch.
-    """
-    from scipy.optimize import least_squares
-
-    f = np.asarray(frequency_hz, dtype=np.float64)
-    db = 20 * np.log10(np.maximum(np.abs(ratio), 1e-6))
-    centre = float(f[int(np.argmin(db))])
-    depth = float(np.min(db))
-
-    def error(x: FloatArray) -> FloatArray:
-        shape = Notch(float(np.exp(x[0])), float(np.exp(x[1])), -float(np.exp(x[2])))
-        return np.asarray(20 * np.log10(np.abs(shape.response(f))) - db)
-
-    starts = [[np.log(centre), np.log(centre * q), np.log(max(-depth, 0.5))] for q in (0.1, 0.4, 1)]
-    fits = [least_squares(error, x0, loss="soft_l1") for x0 in starts]
-    best = min(fits, key=lambda fit: float(fit.cost))
-    return Notch(float(np.exp(best.x[0])), float(np.exp(best.x[1])), -float(np.exp(best.x[2])))

@@ -11,7 +11,6 @@ from backend.people.identity import acting_person
 from backend.station.bench import Bench
 from backend.tools.health.result import HealthResult
 from backend.tools.health.settings import HealthSettings
-from backend.work.jobs import JobResult
 
 
 def records_of(bench: Bench) -> HealthRecords:
@@ -20,14 +19,13 @@ def records_of(bench: Bench) -> HealthRecords:
 
 
 async def keep_health(
-    bench: Bench, drive: Drive, settings: HealthSettings, result: JobResult, files: Sequence[str]
+    bench: Bench, drive: Drive, settings: HealthSettings, found: HealthResult, files: Sequence[str]
 ) -> None:
     """Store the rounds of a health check with the SHA-256 of its raw data.
 
     Raises:
         DatabaseFailed: they are not stored; the raw data are.
     """
-    found = HealthResult.model_validate(result)
     axis = axis_of(drive, bench.records.station)
 
     def store() -> None:

@@ -142,6 +142,27 @@ class RecordingDetail(Message):
     parameters: dict[str, list[RecordedParameter]]
 
 
+class RecordedTrace(Message):
+    """Samples [n] of one signal; ``t_s`` counts from the first sample of the recording."""
+
+    drive: str
+    key: str
+    name: str
+    unit: str
+    t_s: list[float]
+    values: list[float | None] = Field(description="null where the bus had none")
+
+
+class RecordedSamples(Message):
+    """Samples of a stretch of a recording, every one as it was recorded."""
+
+    start: datetime = Field(description="time of the first sample of the recording")
+    from_s: float
+    until_s: float = Field(description="this moment is the next stretch's")
+    more: bool = Field(description="there are samples after this stretch")
+    traces: list[RecordedTrace]
+
+
 class BundleInfo(Message):
     """A support bundle."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -22,6 +23,8 @@ from backend.api.scope.recording_models import (
     RecordedAxis,
     RecordedChannel,
     RecordedParameter,
+    RecordedSamples,
+    RecordedTrace,
     RecordingDetail,
     RecordingEvent,
     RecordingInfo,
@@ -31,8 +34,9 @@ from backend.api.scope.recording_models import (
 )
 from backend.audit.asked import note_before
 from backend.people.identity import acting_person
+from backend.recording.chunks import Samples
 from backend.recording.library import Retention, Stored
-from backend.recording.reader import RecordingReader
+from backend.recording.reader import Channel, RecordingReader
 from backend.station.recording.capture import AFTER_S, BEFORE_S, FaultCapture
 from backend.station.recording.recorder import Recorder, Settings, Trigger
 from backend.station.recording.service import Recordings
@@ -258,6 +262,50 @@ def _detail(path: Path, info: RecordingInfo) -> RecordingDetail:
             for axis in reader.header.get("axes", [])
         }
     return RecordingDetail(info=info, events=events, parameters=parameters)
+
+
+@router.get("/recordings/{name}/samples")
+async def get_samples(
+    recordings: TheRecordings,
+    name: str,
+    from_s: Annotated[float, Query(ge=0.0, description="since the first sample")] = 0.0,
+    duration_s: Annotated[float, Query(gt=0.0, le=60.0)] = 10.0,
+) -> RecordedSamples:
+    """A stretch of a stored recording as numbers, for programs; whole ones are exported."""
+    path = _existing(recordings, name)
+    recordings.require_ended(name)
+    return await asyncio.to_thread(_samples, path, from_s, from_s + duration_s)
+
+
+def _samples(path: Path, from_s: float, until_s: float) -> RecordedSamples:
+    with RecordingReader(path) as reader:
+        refs = reader.index()
+        first = min((ref.t0_s for ref in refs), default=reader.clock.sample_s)
+        wanted = [r for r in refs if r.last_s - first >= from_s and r.t0_s - first < until_s]
+        blocks = [reader.block(ref) for ref in wanted]
+        traces = [_trace(channel, blocks, first, from_s, until_s) for channel in reader.channels]
+        return RecordedSamples(
+            start=convert.moment(reader.clock.epoch(first)), from_s=from_s, until_s=until_s,
+            more=any(ref.last_s - first >= until_s for ref in refs), traces=traces,
+        )  # fmt: skip
+
+
+def _trace(
+    channel: Channel, blocks: list[Samples], first_s: float, from_s: float, until_s: float
+) -> RecordedTrace:
+    """One signal in the unit that the scope shows, samples outside of the stretch left out."""
+    times: list[float] = []
+    values: list[float | None] = []
+    for block in (each for each in blocks if each.stream == channel.stream):
+        t_s = block.times_s - first_s
+        inside = (t_s >= from_s) & (t_s < until_s)
+        shown = block.values[inside, channel.column] * channel.shown_factor
+        times += t_s[inside].tolist()
+        values += [value if math.isfinite(value) else None for value in shown.tolist()]
+    return RecordedTrace(
+        drive=channel.drive, key=channel.key, name=channel.name, unit=channel.shown_unit,
+        t_s=times, values=values,
+    )  # fmt: skip
 
 
 @router.patch("/recordings/{name}")

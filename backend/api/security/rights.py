@@ -149,8 +149,6 @@ _API: dict[str, Need] = {
     "POST /drives/{drive_id}/jobs/generate": _MOTION,
     "POST /drives/{drive_id}/jobs/home": _MOTION,
     "POST /drives/{drive_id}/jobs/identify": _MOTION,
-    "POST /drives/{drive_id}/jobs/sweep": _MEASURE,
-    "POST /drives/{drive_id}/jobs/autotune": _MEASURE,
     **{
         f"POST /drives/{{drive_id}}/jobs/{tool.kind}": Need(
             tool.right, "drive" if tool.motion else "none"
@@ -241,6 +239,7 @@ _API: dict[str, Need] = {
     "POST /recordings/{name}/stop": _FILES,
     "POST /recordings/{name}/trigger": _FILES,
     "GET /recordings/{name}/file": _LOOK,
+    "GET /recordings/{name}/samples": _LOOK,
     "GET /recordings/{name}/exports/{kind}": _LOOK,
     "POST /recordings/{name}/exports/{kind}": _FILES,
     "GET /reports": _LOOK,

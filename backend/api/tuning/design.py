@@ -46,6 +46,7 @@ from backend.tools.measuring.temporary import put_back, write_settings
 from backend.tools.notch import filters as notch
 from backend.tools.notch.meaning import meaning_of
 from backend.tools.sweep import evaluation as sweep_evaluation
+from backend.tools.sweep.stored import reevaluated
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import joined, reason_of, text
 
@@ -210,7 +211,7 @@ def _evaluated(file: Path, _changed_ns: int) -> sweep_evaluation.SweepResult:
     if measurement.meta.get("tool") != "sweep":
         raise BadMeasurement("api-tuning.not-frequency-response", value=file.name)
     try:
-        return sweep_evaluation.reevaluate(measurement.arrays, measurement.meta)
+        return reevaluated(measurement.arrays, measurement.meta)
     except ValueError as error:
         raise BadMeasurement(
             "api-tuning.cannot-be-evaluated", value=file.name, cause=reason_of(error)

@@ -9,12 +9,7 @@ from pydantic import Field
 
 from backend.api.models import Message
 from backend.tools.results import ToolOutcome
-from backend.tools.tool import ToolSettings
 from backend.tools.wire_message import MessageInfo
-
-
-class TuneLimits(ToolSettings):
-    """The motion envelope of a tool that has no descriptor yet."""
 
 
 class ToolInfo(Message):
@@ -23,28 +18,6 @@ class ToolInfo(Message):
     kind: str
     texts: dict[str, list[str]] = Field(description="English, Chinese")
     settings: dict[str, object] = Field(description="JSON schema of what starting it takes")
-
-
-class SweepRequest(TuneLimits):
-    """Frequency response."""
-
-    kind: Literal["mechanics", "speed_loop", "position_loop"] = "mechanics"
-    loop: Literal["auto", "none", "speed", "position"] = "auto"
-    f_min_hz: float = Field(default=5.0, ge=3)
-    f_max_hz: float | None = Field(default=None, gt=0)
-    share: float = Field(default=0.35, gt=0, le=0.9, description="of the permitted torque")
-    realisations: int = Field(default=2, ge=1, le=8)
-    base_motion: bool = True
-    excitation: Literal["multisine", "chirp", "prbs", "stepped"] = Field(
-        default="multisine",
-        description="a stepped sine is one tone after another, beside a closed loop, in one pair "
-        "of realisations; the others excite the whole band at once",
-    )
-    odd_lines: bool = Field(
-        default=False,
-        description="of mechanics by a multisine: odd lines alone, which tell noise, even and odd "
-        "distortion apart",
-    )
 
 
 class ExcitationInfo(Message):
@@ -60,18 +33,6 @@ class ExcitationInfo(Message):
     duration_s: float = Field(description="of all realisations together")
     realisations: int
     inertia_kgm2: float = Field(description="that was assumed")
-
-
-class AutotuneRequest(TuneLimits):
-    """All steps in one job."""
-
-    mark: Literal["robust", "balanced", "fast"] = "balanced"
-    load: Literal["stiff", "medium", "compliant"] | None = None
-    loop: Literal["auto", "none", "speed", "position"] = "auto"
-    scheme: Literal["free", "limited", "taught"] = "free"
-    ends_rev: tuple[float, float] | None = None
-    apply: bool = True
-    motor_inertia_kgm2: float | None = Field(default=None, gt=0)
 
 
 class NotchShape(Message):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -94,23 +94,6 @@ class Again:
         if self.outcome == "other":
             return text("autotune.again-other", gain_ratio=self.gain_ratio)
         return _OUTCOMES[self.outcome]
-
-
-def as_json(again: Again) -> dict[str, object]:
-    """For files and pages."""
-
-    def listed(values: FloatArray | None) -> list[float] | None:
-        return None if values is None else values.tolist()
-
-    return {
-        "predicted": asdict(again.predicted),
-        "measured": asdict(again.measured),
-        "outcome": again.outcome,
-        "gain_ratio": again.gain_ratio,
-        "frequency_hz": listed(again.frequency_hz),
-        "closed_db": listed(again.closed_db),
-        "closed_deg": listed(again.closed_deg),
-    }
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -172,8 +172,3 @@ async def plan(
     if axis.drive.profile.notch is not None:
         raw |= await notch_tool.plan_notches(axis.drive, candidate.notches, meaning_of(axis.drive))
     return raw
-
-
-def candidate_json(candidate: Candidate) -> dict[str, object]:
-    """One row of the table."""
-    return asdict(candidate)

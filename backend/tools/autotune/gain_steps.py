@@ -169,11 +169,6 @@ def _grows(torque: npt.NDArray[np.float64], before: npt.NDArray[np.float64], fac
     return bool(np.any((bands[-1] > least) & (bands[-1] > threshold.GROWS**2 * bands[0])))
 
 
-def oscillation_percent(step: StepResult, settings: StepSettings) -> float:
-    """Root mean square of the torque in the second half of the commanded speed, without trend."""
-    return float(np.std(_steady(step, settings)))
-
-
 def _steady(step: StepResult, settings: StepSettings) -> npt.NDArray[np.float64]:
     """Torque while the speed is held, without its trend."""
     time = step.time_s

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from typing import Literal
+from datetime import datetime
+from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -11,7 +11,8 @@ from backend.tools.inertia.result import InertiaAnswer
 from backend.tools.step.result import StepAnswer
 from backend.tools.sweep.result import SweepAnswer
 from backend.tools.tool import ToolResult
-from backend.tools.wire_message import MessageInfo
+from backend.tools.wire_message import MessageInfo, words_of
+from drivers.texts.message import Language
 
 
 class _Part(BaseModel):
@@ -175,17 +176,26 @@ class AutotuneAnswer(ToolResult):
     step: StepAnswer | None
     before: dict[str, int]
     after: dict[str, int] = Field(default_factory=dict, description="raw values afterwards")
+    written: datetime | None = Field(
+        default=None, description="when what is in force was written; its verification came after"
+    )
     tried: tuple[str, ...] = Field(description="in English")
     tried_messages: tuple[MessageInfo, ...]
     notes: tuple[str, ...] = Field(description="in English")
     note_messages: tuple[MessageInfo, ...]
     cautious: bool
 
-
-def finite(value: object) -> object:
-    """The same value with None for every number in it that JSON does not know."""
-    if isinstance(value, dict):
-        return {name: finite(each) for name, each in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [finite(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    def in_language(self, language: Language) -> Self:
+        """With all its sentences in this language."""
+        verified = self.verified
+        if verified is not None:
+            sweep = verified.sweep.in_language(language)
+            verified = verified.model_copy(update={"sweep": sweep})
+        changed: dict[str, object] = {
+            "inertia": self.inertia.in_language(language),
+            "mechanics": self.mechanics.in_language(language),
+            "verified": verified,
+            "tried": words_of(self.tried_messages, language),
+            "notes": words_of(self.note_messages, language),
+        }
+        return self.model_copy(update=changed)

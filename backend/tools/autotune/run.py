@@ -8,7 +8,7 @@ as they were before.
 from __future__ import annotations
 
 import asyncio
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 from backend.analysis.loop.design import Candidate
@@ -18,21 +18,17 @@ from backend.axis.axis import Axis, Envelope
 from backend.axis.cyclic import CyclicSession
 from backend.tools.autotune import gains as gain_tool
 from backend.tools.autotune.again import Again, Designing, Figures, expected, first_that_holds
-from backend.tools.autotune.again import as_json as again_json
 from backend.tools.autotune.apply import part
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts
 from backend.tools.autotune.candidates import (
     Design,
-    candidate_json,
     cautious_design,
     design_for,
     plant_of,
 )
 from backend.tools.autotune.notches import Learning, learn_notches, learning_s
 from backend.tools.autotune.present import Trials
-from backend.tools.autotune.result import AutotuneAnswer, finite
 from backend.tools.autotune.time_budget import NOT_AGAIN, TimeLeft
-from backend.tools.autotune.verdict import as_json as verdict_json
 from backend.tools.autotune.verify import Check, Keep, Verified, otherwise, unseen
 from backend.tools.inertia import evaluation as inertia_evaluation
 from backend.tools.inertia import run as inertia_tool
@@ -49,7 +45,6 @@ from backend.tools.thresholds import autotune_run as threshold
 from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import EnvelopeExceeded, NotAllowed
-from drivers.texts.answers import sentences
 from drivers.texts.message import Text, joined, text
 
 #: Said where no margins could be verified.
@@ -396,34 +391,3 @@ def _order(found: AutotuneResult, mark: Mark) -> list[Candidate]:
     chosen = [next((c for c in found.candidates if m in c.marks), None) for m in wanted]
     rows = [c for c in (*chosen, *found.candidates[-1:]) if c is not None]
     return list(dict.fromkeys(rows))
-
-
-def as_json(result: AutotuneResult) -> dict[str, object]:
-    """For files and pages, in the form of `AutotuneAnswer`."""
-    verified = result.verified
-    found = {
-        "inertia": inertia_evaluation.answer_of(result.inertia).model_dump(mode="json"),
-        "mechanics": sweep_evaluation.as_json(result.mechanics),
-        "load": result.load,
-        "candidates": [candidate_json(c) for c in result.candidates],
-        "applied": candidate_json(result.applied) if result.applied else None,
-        "verified": None
-        if verified is None
-        else {
-            "verdict": verdict_json(verified.verdict) if verified.verdict else None,
-            "gain_steps": asdict(verified.shown) if verified.shown else None,
-            "sweep": sweep_evaluation.as_json(verified.sweep),
-            "predicted_bandwidth_hz": verified.predicted_bandwidth_hz,
-            "measured_bandwidth_hz": verified.measured_bandwidth_hz,
-            "expected": asdict(result.expected) if result.expected else None,
-        },
-        "again": again_json(result.again) if result.again else None,
-        "step": step_evaluation.answer_of(result.step).model_dump(mode="json")
-        if result.step
-        else None,
-        "before": result.before,
-        **sentences("tried", result.tried),
-        **sentences("notes", result.notes, "note"),
-        "cautious": result.cautious,
-    }
-    return AutotuneAnswer.model_validate(finite(found)).model_dump(mode="json")

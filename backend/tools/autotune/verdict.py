@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-
 import numpy as np
 
 from backend.analysis.loop.design import Candidate
@@ -163,8 +161,3 @@ def in_words(missed: tuple[Missed, ...]) -> list[Text]:
 def misses(verdict: LoopVerdict, promised: Goals) -> tuple[Missed, ...]:
     """What a verdict misses of the goals, with what a margin may be off by."""
     return verdict.missed(promised, MARGIN_DEG, MARGIN_DB, MS_RATIO)
-
-
-def as_json(verdict: LoopVerdict) -> dict[str, object]:
-    """For files and pages."""
-    return asdict(verdict)

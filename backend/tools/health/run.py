@@ -143,4 +143,6 @@ TOOL = Tool(
     reevaluate=reevaluate,
     report=report,
     texts=TEXTS,
+    # What was concluded from its measurements is not the conclusion of the whole.
+    parts=lambda result: {"health": result},
 )

@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from backend.analysis.loop.margins import bandwidth, closed_from_open, margins, open_from_closed
 from backend.analysis.mechanics.fit_problem import KnownInertia
@@ -32,17 +31,14 @@ from backend.analysis.response.sampling import (
     lag_response,
     sampled_command,
 )
-from backend.analysis.signals import excitation as signals
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
 from backend.tools.measuring.recording import Recording
 from backend.tools.measuring.waveform import Waveform
-from backend.tools.sweep.result import SweepAnswer
 from backend.tools.sweep.speed_injection import speed_gain
 from backend.tools.thresholds import sweep_evaluation as threshold
-from drivers.texts.answers import sentences
 from drivers.texts.message import Text, Unsuitable, text
 
 Records = tuple[tuple[excite.Sequence, Recording], ...]
@@ -424,107 +420,3 @@ def _evaluate_loop(
 
 def _motion_s(records: Records) -> float:
     return float(sum(s.excitation.duration_s for s, _ in records))
-
-
-def reevaluate(arrays: dict[str, npt.NDArray[np.generic]], meta: dict[str, object]) -> SweepResult:
-    """The answer again, from kept raw data.
-
-    Raises:
-        ValueError: not the raw data of a sweep.
-    """
-    try:
-        return _reevaluate(arrays, meta)
-    except (KeyError, TypeError) as error:
-        raise ValueError(f"not the raw data of a sweep: {error!r}") from error
-
-
-def _reevaluate(arrays: dict[str, npt.NDArray[np.generic]], meta: dict[str, object]) -> SweepResult:
-    rate = float(str(meta["sample_rate_hz"]))
-    given, as_reported, structure = meta["settings"], meta["facts"], meta["excitation"]
-    if (
-        not isinstance(given, dict)
-        or not isinstance(as_reported, dict)
-        or not isinstance(structure, list)
-    ):
-        raise TypeError("settings, facts or excitation")
-    settings = SweepSettings(**{**given, "envelope": Envelope(**given["envelope"])})
-    records = []
-    for number, part in enumerate(structure):
-        tones = tuple(signals.Segment(**tone) for tone in part.get("segments", ()))
-        plain = {name: value for name, value in part.items() if name != "segments"}
-        excitation = signals.Excitation(
-            samples=np.asarray(arrays[f"{number}/excitation"], np.float64),
-            sample_rate_hz=rate,
-            lines=np.asarray(arrays[f"{number}/lines"], np.int64),
-            segments=tones,
-            **plain,
-        )
-        columns = {
-            name: np.asarray(arrays[f"{number}/{name}"], np.float64)
-            for name in ("position_rad", "velocity_rad_s", "torque_nm", "sent", "offset")
-        }
-        valid = np.asarray(arrays[f"{number}/valid"], np.bool_)
-        records.append((excite.Sequence(excitation), Recording(rate, **columns, valid=valid)))
-    loop = str(meta["loop"])
-    closed: Literal["none", "speed", "position"] = (
-        "none" if loop == "none" else "position" if loop == "position" else "speed"
-    )
-    integral = meta.get("integral_hz")
-    return evaluate(
-        tuple(records), rate, AxisFacts(**as_reported), settings, closed, bool(meta["dc"]),
-        bool(meta.get("by_speed", False)), None if integral is None else float(str(integral)),
-    )  # fmt: skip
-
-
-def as_json(result: SweepResult) -> dict[str, object]:
-    """The form that ``servodeck sweep --out`` writes, that of `SweepAnswer`."""
-    frf = result.frf
-    found = {
-        "kind": result.kind,
-        "loop": result.loop,
-        "sample_rate_hz": frf.sample_rate_hz,
-        "valid_band_hz": list(frf.valid_band_hz),
-        "frequency_hz": frf.frequency_hz.tolist(),
-        "magnitude_db": frf.magnitude_db.tolist(),
-        "phase_deg": frf.phase_deg.tolist(),
-        "coherence": frf.coherence.tolist(),
-        "std_db": _numbers(frf.std_db),
-        "std_deg": _numbers(frf.std_deg),
-        "resonances": [
-            {
-                "kind": r.kind, "frequency_hz": r.frequency_hz, "damping": r.damping,
-                "height_db": r.height_db, "frequency_ci95_hz": r.frequency_ci95_hz,
-                "damping_ci95": r.damping_ci95,
-            }
-            for r in result.resonances
-        ],
-        "margins": result.margins,
-        "unit": result.unit,
-        "trusted": result.trusted,
-        "delay_s": result.delay_s,
-        "motion_s": result.motion_s,
-        "saturated_share": result.saturated_share,
-        "current_bandwidth_hz": result.current_bandwidth_hz,
-        "speed_filter_hz": result.speed_filter_hz,
-        "coulomb_nm": frf.coulomb_nm,
-        "noise": _numbers(frf.noise),
-        "distortion": _numbers(frf.distortion),
-        "detected": asdict(result.detected) if result.detected is not None else None,
-        "periods_used": frf.periods_used,
-        "periods_dropped": frf.periods_dropped,
-        "direct": {
-            "valid_band_hz": list(result.direct.valid_band_hz),
-            "magnitude_db": result.direct.magnitude_db.tolist(),
-            "phase_deg": result.direct.phase_deg.tolist(),
-            "std_db": _numbers(result.direct.std_db),
-            "std_deg": _numbers(result.direct.std_deg),
-        },
-        "model": asdict(result.model) if result.model is not None else None,
-        **sentences("warnings", result.warnings, "warning"),
-    }  # fmt: skip
-    return SweepAnswer.model_validate(found).model_dump(mode="json")
-
-
-def _numbers(values: FloatArray) -> list[float | None]:
-    """JSON knows no NaN."""
-    return [float(v) if np.isfinite(v) else None for v in values]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from backend.tools.tool import ToolResult
-from backend.tools.wire_message import MessageInfo
+from backend.tools.wire_message import MessageInfo, words_of
+from drivers.texts.message import Language
 
 
 class _Part(BaseModel):
@@ -97,3 +98,7 @@ class SweepAnswer(ToolResult):
     model: ModelInfo | None
     warnings: tuple[str, ...] = Field(description="in English")
     warning_messages: tuple[MessageInfo, ...]
+
+    def in_language(self, language: Language) -> Self:
+        """With ``warnings`` in this language."""
+        return self.model_copy(update={"warnings": words_of(self.warning_messages, language)})

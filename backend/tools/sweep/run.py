@@ -8,11 +8,7 @@ speed (CSV) or position loop (CSP), as a vertical or limited axis needs. *speed_
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
-
-import numpy as np
-import numpy.typing as npt
+from dataclasses import dataclass, replace
 
 from backend.axis.axis import Axis
 from backend.axis.cyclic import CyclicSession
@@ -35,13 +31,16 @@ from backend.tools.sweep.plan import (
     setup_of,
 )
 from backend.tools.sweep.play import MODE_OF, Records, scaled_by_speed
+from backend.tools.sweep.result import SweepAnswer
+from backend.tools.sweep.settings import SweepRequest
+from backend.tools.sweep.stored import answer_of, raw_of, reevaluate
+from backend.tools.sweep.texts import TEXTS, report
+from backend.tools.tool import Keep, Run, Tool
 from backend.work.jobs import Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed, exceeded
 from drivers.halt import HaltCause
 from drivers.texts.message import reason_of, text
-
-Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 
 
 async def sweep(
@@ -118,7 +117,7 @@ async def sweep(
     async def back() -> None:
         await go_back(axis, session, home, settings.envelope, facts)
         if keep is not None:
-            keep(f"sweep-{settings.kind}", *_raw(records, setup, settings, session))
+            keep(f"sweep-{settings.kind}", *raw_of(records, setup, settings, dc=_dc(session)))
 
     try:
         return await meanwhile(evaluated, back())
@@ -191,37 +190,20 @@ def _dc(session: CyclicSession) -> bool:
     return session.synchronous
 
 
-def _raw(
-    records: Records,
-    setup: Setup,
-    settings: SweepSettings,
-    session: CyclicSession,
-) -> tuple[dict[str, npt.NDArray[np.generic]], dict[str, object]]:
-    """Arrays and facts from which `reevaluate` makes the same answer again."""
-    arrays: dict[str, npt.NDArray[np.generic]] = {}
-    structure = []
-    for number, (sequence, recording) in enumerate(records):
-        arrays[f"{number}/excitation"] = sequence.excitation.samples
-        arrays[f"{number}/lines"] = sequence.excitation.lines
-        for name, values in recording.arrays().items():
-            arrays[f"{number}/{name}"] = values
-        e = sequence.excitation
-        structure.append(
-            {
-                "kind": e.kind, "first_sample": e.first_sample,
-                "period_samples": e.period_samples, "periods": e.periods,
-                "transient_periods": e.transient_periods, "base_line": e.base_line,
-                "realisation": e.realisation, "segments": [asdict(tone) for tone in e.segments],
-            }
-        )  # fmt: skip
-    return arrays, {
-        "tool": "sweep",
-        "sample_rate_hz": setup.rate,
-        "loop": setup.loop,
-        "by_speed": setup.by_speed,
-        "integral_hz": setup.integral_hz,
-        "dc": _dc(session),
-        "facts": asdict(setup.facts),
-        "settings": asdict(settings),
-        "excitation": structure,
-    }
+async def run(run: Run, request: SweepRequest) -> SweepAnswer:
+    """As `sweep`, for the descriptor."""
+    return answer_of(
+        await sweep(run.axis, run.session, request.inner, run.progress, run.keep, run.repeats)
+    )
+
+
+TOOL = Tool(
+    kind="sweep",
+    title=text("sweep.title"),
+    settings=SweepRequest,
+    result=SweepAnswer,
+    run=run,
+    reevaluate=reevaluate,
+    report=report,
+    texts=TEXTS,
+)

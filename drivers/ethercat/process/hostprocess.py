@@ -41,7 +41,7 @@ class HostProcess:
     ) -> None:
         self._options = tuple(options)
         self.restarts = 0
-        self.words = "not opened"
+        self.words, self._opened = "not opened", False
         self.granted: tuple[str, ...] = ()
         self.ring: Ring | None = None
         self._interface = interface
@@ -161,7 +161,7 @@ class HostProcess:
                 interface=self._interface,
                 timeout_s=timeout_s,
             ) from None
-        self.words = "open"
+        self.words, self._opened = "open", True
 
     async def _launch(self) -> socket.socket:
         """Start the child; our end of its control channel. Raises OSError, with nothing left."""
@@ -230,14 +230,14 @@ class HostProcess:
                 ready.set_result(None)
         elif message["event"] == "failed":
             error = protocol.error_from_wire(message["error"])
-            self.words = error.message
+            self.words, self._opened = error.message, False
             if ready is not None and not ready.done():
                 ready.set_exception(error)
         else:
             self._received(message)
 
     def _gone(self, why: str) -> None:
-        self.words = why
+        self.words, self._opened = why, False
         lost = LinkLost(why, remedy="ethercat.started-again-by-itself")
         if self._ready is not None and not self._ready.done():
             self._ready.set_exception(lost)
@@ -307,7 +307,7 @@ class HostProcess:
             except TimeoutError:
                 process.kill()
                 await process.wait()
-        self._gone(self.words if self.words != "open" else "the EtherCAT process was ended")
+        self._gone("the EtherCAT process was ended" if self._opened else self.words)
         if self._ready is not None and self._ready.done() and not self._ready.cancelled():
             self._ready.exception()
         self._ready = None

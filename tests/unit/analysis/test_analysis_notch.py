@@ -17,7 +17,6 @@ from backend.analysis.loop.notch import (
     encode_hz_levels,
     encode_hz_width,
     encode_hz_width_db,
-    fit_notch,
     realised,
 )
 
@@ -133,17 +132,6 @@ def test_no_level_is_taken_whose_effect_was_not_measured():
     assert encode_hz_levels(narrow, hz, level, depth, known) == (500, 10, 8)
     assert encode_hz_levels(wide, hz, level, depth, known) == (500, 16, 8)
     assert encode_hz_levels(Notch(500.0, 300.0, -1.0), hz, level, depth, known)[2] == 70
-
-
-def test_a_notch_is_found_again_in_a_ratio_of_responses():
-    truth = Notch(433.0, 120.0, -18.0)
-    f = np.geomspace(20.0, 1500.0, 150)
-    rng = np.random.default_rng(1)
-    noisy = truth.response(f) * np.exp(-1j * f * 1e-4) * (1 + 0.01 * rng.normal(size=f.size))
-    found = fit_notch(f, noisy)
-    assert found.center_hz == pytest.approx(433.0, rel=0.01)
-    assert found.width_hz == pytest.approx(120.0, rel=0.05)
-    assert found.depth_db == pytest.approx(-18.0, abs=0.7)
 
 
 @pytest.mark.parametrize("bad", [(0.0, 10.0, -3.0), (10.0, -1.0, -3.0), (10.0, 10.0, 3.0)])

@@ -15,6 +15,7 @@ import pytest
 from pypdf import PdfReader
 from typer.testing import CliRunner
 
+from backend import report
 from backend.cli import app
 from backend.drive.drive import Drive
 from backend.library.measurements import MeasurementStore
@@ -29,7 +30,7 @@ from backend.report.plot import Area, Curve, Label, Line, Plot, draw
 from backend.report.plot import Path as Stroke
 from backend.report.store import ReportStore
 from backend.report.texts import TEXTS
-from backend.report.views import SweepView
+from backend.tools.sweep.result import SweepAnswer
 from drivers.errors import NotAllowed
 from tests.support import measurements as known
 
@@ -161,7 +162,7 @@ def test_verdict_of_a_loop(
     facts: Facts, margins: dict[str, float | bool | None], tone: str, word: str
 ) -> None:
     """Limits are those that docs/tuning.md tells."""
-    loop = next(m for m in facts.measured if isinstance(m.view, SweepView))
+    loop = next(m for m in facts.measured if isinstance(m.view, SweepAnswer))
     changed = replace(loop, view=loop.view.model_copy(update={"margins": margins}))
     document = compose(replace(facts, measured=(changed,)), "en")
     note = next(b for b in document.blocks if isinstance(b, Note) and "speed loop" in b.text)
@@ -244,6 +245,17 @@ def test_both_languages_say_the_same() -> None:
         assert chinese, name
         assert sorted(places.findall(english)) == sorted(places.findall(chinese)), name
         assert english != chinese, name
+
+
+def test_every_text_of_the_report_is_used() -> None:
+    folder = Path(report.__file__).parent
+    source = "".join(file.read_text("utf-8") for file in folder.glob("*.py"))
+    put_together = ("kind.", "tone.")
+    unused = [
+        name for name in TEXTS
+        if not name.startswith(put_together) and len(re.findall(rf"['\"]{name}['\"]", source)) < 2
+    ]  # fmt: skip
+    assert not unused
 
 
 # --- HTML ------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from backend.report.document import Block, Note, Table
 from backend.report.facts import Measured
 from backend.report.gather import measured_from
 from backend.report.texts import Words
-from backend.report.views import verdict_of
+from backend.report.tools import verdict_of
 from tests.support import measurements as known
 
 GOALS = {"gain_margin_db": 9.5, "phase_margin_deg": 46.0, "ms": 1.7}

@@ -24,6 +24,7 @@ OUTCOME: TypeAdapter[Any] = TypeAdapter(ToolOutcome)
 MADE: dict[str, Callable[[], Any]] = {
     "step": known.step,
     "inertia": known.inertia,
+    "sweep": known.speed_loop,
 }
 
 
@@ -54,6 +55,9 @@ def test_command_line_and_report_say_it_in_both_languages(drive: Drive, kind: st
         section = tool.report(result.in_language(language))
         said = [tool.text(each.name, language, each.values) for each in section.notes]
         said += [tool.text(each.name, language, each.values) for each in section.rows]
+        said += [
+            cell for grid in section.grids for row in tool.cells(grid, language) for cell in row
+        ]
         for chart in section.charts:
             names = (chart.name, chart.x_name, chart.y_name, *(line.name for line in chart.lines))
             said += [tool.text(name, language) for name in names]

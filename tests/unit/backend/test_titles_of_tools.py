@@ -22,6 +22,8 @@ LIMITS = {"travel_limit": 0.1, "speed_limit": 100, "torque_limit": 5, "consent":
 TITLES = {
     "first-power": ("First power", "首次通电"),
     "inertia": ("Inertia and friction", "惯量与摩擦"),
+    "sweep": ("Frequency response", "频率响应"),
+    "autotune": ("Tune", "整定"),
     "step": ("Step response", "阶跃响应"),
     "friction": ("Friction map", "摩擦图谱"),
     "brake-test": ("Brake test", "抱闸测试"),

@@ -11,8 +11,9 @@ from backend.library.measurements import pack, unpack
 from backend.station.evaluation import recompute
 from backend.tools.autotune.run import AutotuneSettings, autotune
 from backend.tools.measuring.temporary import put_back
-from backend.tools.sweep.evaluation import SweepSettings, as_json
+from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.run import sweep
+from backend.tools.sweep.stored import answer_of
 from drivers.virtual.wires.netns import Namespace
 from tests.virtual.tools.rig import WIDE, bench, errors, mechanics, silent
 
@@ -44,7 +45,7 @@ async def test_mechanics_without_a_loop_at_1_khz(namespace: Namespace) -> None:
         from datetime import UTC, datetime
 
         file = pack(kind, b.axis.drive, arrays, meta, datetime.now(UTC))
-        assert recompute(unpack(file)) == as_json(found)
+        assert recompute(unpack(file)) == answer_of(found).model_dump(mode="json")
 
 
 async def test_mechanics_beside_the_speed_loop_at_4_khz(namespace: Namespace) -> None:

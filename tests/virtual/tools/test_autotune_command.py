@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import re
 import signal
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,15 +19,34 @@ from backend import cli
 from backend.api.app import make_app
 from backend.axis.axis import Axis
 from backend.axis.cyclic import CyclicSession
-from backend.commands import tune
+from backend.commands import measure, tools
 from backend.commands.remote import Remote
+from backend.drive.drive import Drive
+from backend.library.measurements import unpack
 from backend.station.bench import Bench
-from backend.tools.autotune import run as tool
+from backend.station.evaluation import recompute
+from backend.tools.autotune import tool
+from backend.tools.autotune.result import (
+    AutotuneAnswer,
+    CandidateInfo,
+    FiltersInfo,
+    GainsInfo,
+    GoalsInfo,
+    MarginsInfo,
+    NotchInfo,
+    VerifiedInfo,
+)
+from backend.tools.autotune.run import AutotuneSettings
+from backend.tools.inertia.result import InertiaAnswer
 from backend.tools.measuring.temporary import write_settings
+from backend.tools.sweep.result import SweepAnswer
+from backend.tools.wire_message import wire_messages
 from backend.work.jobs import Progress
 from drivers.cia402 import State
+from drivers.texts.message import prose, text
 from drivers.virtual.firmware.factory import make_device
 from profiles.loader import load_profile
+from tests.support import measurements as known
 from tests.virtual.tools.direct import DirectLink, direct
 from tests.virtual.tools.rig import mechanics
 
@@ -50,10 +70,12 @@ class Alone:
         self.before: dict[str, int] = {}
         self.after: dict[str, int] = {}
         self.state: State | None = None
-        monkeypatch.setattr(tune, "exchanging", self.exchanging)
+        monkeypatch.setattr(measure, "exchanging", self.exchanging)
 
     @asynccontextmanager
-    async def exchanging(self, *_where: object) -> AsyncIterator[tuple[Axis, CyclicSession]]:
+    async def exchanging(
+        self, *_where: object, **_how: object
+    ) -> AsyncIterator[tuple[Axis, CyclicSession]]:
         async with direct(ONE) as bench:
             drive = bench.axis.drive
             self.before = {key: await drive.raw(key) for key in GAINS}
@@ -73,7 +95,7 @@ def test_a_kept_design_is_verified_and_in_force(
     answer = json.loads(file.read_text())
     for mark in ("robust", "balanced", "fast"):
         assert re.search(rf"^\S*{mark}\S* .* Hz .* Hz", reported, re.MULTILINE), reported
-    shown = re.search(r"^bandwidth +([\d.]+) +([\d.]+) Hz$", reported, re.MULTILINE)
+    shown = re.search(r"^Bandwidth +([\d.]+) Hz +([\d.]+) Hz$", reported, re.MULTILINE)
     assert shown, reported
     verified = answer["verified"]
     assert float(shown[1]) == pytest.approx(verified["predicted_bandwidth_hz"], abs=0.01)
@@ -102,7 +124,7 @@ def test_ctrl_c_and_a_termination_leave_everything_as_it_was(
         shown = Progress(changed)
         return shown
 
-    monkeypatch.setattr(tune, "progress", ending)
+    monkeypatch.setattr(tools, "progress", ending)
     code, reported = run(URL, "--apply")
     assert code == 130
     assert "as before" in reported
@@ -111,16 +133,45 @@ def test_ctrl_c_and_a_termination_leave_everything_as_it_was(
     assert signal.getsignal(signal.SIGTERM) == before
 
 
-DESIGN = {
-    "marks": ["balanced"], "notches": [{"center_hz": 156.0}], "bandwidth_hz": 92.0,
-    "gains": {"speed_bandwidth_hz": 220.0},
-    "promised": {"phase_margin_deg": 48.0, "gain_margin_db": 9.0, "ms": 1.8},
-    "settling_s": 0.02, "overshoot_percent": 25.0,
-}  # fmt: skip
-VERIFIED = {
-    "sweep": {"margins": {"phase_margin_deg": 56.6, "gain_margin_db": None, "ms": 1.12}},
-    "predicted_bandwidth_hz": 92.0, "measured_bandwidth_hz": 91.5,
-}  # fmt: skip
+NOTHING = MarginsInfo(
+    crossover_hz=None, phase_margin_deg=None, phase_margin_hz=None, gain_margin_db=None,
+    gain_margin_hz=None, ms=None, ms_hz=None, stable=True,
+)  # fmt: skip
+DESIGN = CandidateInfo(
+    marks=("balanced",), notches=(NotchInfo(center_hz=156.0, width_hz=30.0, depth_db=-12.0),),
+    gains=GainsInfo(speed_nms=0.2, integral_hz=22.0, position_1_s=140.0, speed_bandwidth_hz=220.0),
+    bandwidth_hz=92.0, position_bandwidth_hz=None, nominal=NOTHING,
+    promised=GoalsInfo(phase_margin_deg=48.0, gain_margin_db=9.0, ms=1.8),
+    phase_cost_deg=4.0, settling_s=0.02, overshoot_percent=25.0,
+    filters=FiltersInfo(speed_hz=None, torque_hz=None),
+)  # fmt: skip
+
+
+def answer(
+    drive: Drive, before: dict[str, int], after: Mapping[str, int] | None = None
+) -> AutotuneAnswer:
+    """A design that was applied and verified, on measurements whose results are known."""
+    loop, moves = (
+        recompute(unpack(known.file_of(drive, made, datetime.now(UTC))))
+        for made in (known.speed_loop(), known.inertia())
+    )
+    sweep = SweepAnswer.model_validate(loop)
+    margins: dict[str, float | bool | None] = {
+        "phase_margin_deg": 56.6, "gain_margin_db": None, "ms": 1.12,
+    }  # fmt: skip
+    verified = VerifiedInfo(
+        verdict=None, gain_steps=None, sweep=sweep.model_copy(update={"margins": margins}),
+        predicted_bandwidth_hz=92.0, measured_bandwidth_hz=91.5, expected=None,
+    )  # fmt: skip
+    return AutotuneAnswer(
+        inertia=InertiaAnswer.model_validate(moves), mechanics=sweep, load="stiff",
+        candidates=(DESIGN,), applied=DESIGN, verified=verified, again=None, step=None,
+        before=before, after=dict(after or {}), tried=("300 Hz: too fast",), tried_messages=TRIED,
+        notes=(), note_messages=(), cautious=False,
+    )  # fmt: skip
+
+
+TRIED = wire_messages([text("autotune.candidate", bandwidth_hz=300.0, why=prose("too fast"))])
 
 
 @pytest.mark.parametrize("keep", [False, True])
@@ -129,19 +180,18 @@ def test_by_a_server_a_design_is_taken_back_or_kept(
 ) -> None:
     """The way to the server and back; the tuning itself is that of the test above."""
     seen: dict[str, dict[str, int]] = {}
-    asked: list[tool.AutotuneSettings] = []
+    asked: list[AutotuneSettings] = []
 
     async def tuned(
-        axis: Axis, _session: object, settings: tool.AutotuneSettings, *_: object
+        axis: Axis, _session: object, settings: AutotuneSettings, *_: object
     ) -> SimpleNamespace:
         asked.append(settings)
         before = await write_settings(axis, {"2005:03": 2200, "2001:06": 1500})
         seen["meanwhile"] = {key: await axis.drive.raw(key) for key in GAINS}
-        return SimpleNamespace(before=before, written=None)
+        return SimpleNamespace(before=before, drive=axis.drive)
 
-    def as_json(found: SimpleNamespace) -> dict[str, object]:
-        return {"candidates": [DESIGN], "applied": DESIGN, "verified": VERIFIED,
-                "before": found.before, "tried": ["300 Hz: too fast"], "notes": []}  # fmt: skip
+    def answer_of(found: SimpleNamespace, after: Mapping[str, int]) -> AutotuneAnswer:
+        return answer(found.drive, found.before, after)
 
     @asynccontextmanager
     async def remote(address: str) -> AsyncIterator[Remote]:
@@ -157,8 +207,8 @@ def test_by_a_server_a_design_is_taken_back_or_kept(
         await bench.close()
 
     monkeypatch.setattr(tool, "autotune", tuned)
-    monkeypatch.setattr(tool, "as_json", as_json)
-    monkeypatch.setattr(tune, "remote", remote)
+    monkeypatch.setattr(tool, "answer_of", answer_of)
+    monkeypatch.setattr(measure, "remote", remote)
     how = "--keep" if keep else "--apply"
     code, reported = run(
         "--server", "http://test", "--axis", "Spindle", how, "--mark", "fast", "--load", "stiff",
@@ -169,10 +219,10 @@ def test_by_a_server_a_design_is_taken_back_or_kept(
     assert (settings.mark, settings.load, settings.apply) == ("fast", "stiff", True)
     assert (settings.envelope.travel_rev, settings.envelope.torque_percent) == (2.0, 50.0)
     assert re.search(r"^balanced +220\.0 Hz +92\.0 Hz .*156 Hz$", reported, re.MULTILINE), reported
-    assert re.search(r"^phase margin, at least +48\.00 +56\.60 °$", reported, re.MULTILINE), (
+    assert re.search(r"^phase margin, at least +48\.00° +56\.60°$", reported, re.MULTILINE), (
         reported
     )
-    assert re.search(r"^gain margin, at least +9\.00 +– dB$", reported, re.MULTILINE), reported
+    assert re.search(r"^gain margin, at least +9\.00 dB +—$", reported, re.MULTILINE), reported
     assert "not kept: 300 Hz: too fast" in reported
     assert seen["meanwhile"] != seen["before"]
     assert seen["after"] == seen["meanwhile" if keep else "before"]
@@ -189,7 +239,7 @@ def test_a_drive_that_the_server_does_not_have(
         async with httpx.AsyncClient(transport=transport, base_url=f"{address}/api/v1") as http:
             yield Remote(address, http)
 
-    monkeypatch.setattr(tune, "remote", remote)
+    monkeypatch.setattr(measure, "remote", remote)
     code, reported = run("--server", "http://test", "--axis", "Table")
     assert code == 1
     assert "http://test has no drive 'Table'" in reported

@@ -9,8 +9,9 @@ import pytest
 from backend.library.measurements import pack, unpack
 from backend.station.evaluation import recompute
 from backend.tools.measuring.waveform import Waveform
-from backend.tools.sweep.evaluation import Loop, SweepSettings, as_json
+from backend.tools.sweep.evaluation import Loop, SweepSettings
 from backend.tools.sweep.run import sweep
+from backend.tools.sweep.stored import answer_of
 from drivers.errors import OutOfRange
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE, errors, mechanics, silent
@@ -38,7 +39,7 @@ async def test_mechanics(waveform: Waveform, loop: Loop, drive: str) -> None:
     assert [r.kind for r in found.resonances] == ["antiresonance", "resonance"]
     assert found.resonances[0].frequency_hz == pytest.approx(123.3, rel=0.01)
     assert found.resonances[1].frequency_hz == pytest.approx(213.5, rel=0.01)
-    assert recompute(unpack(file)) == as_json(found)
+    assert recompute(unpack(file)) == answer_of(found).model_dump(mode="json")
 
 
 async def test_a_loop_from_its_reference() -> None:

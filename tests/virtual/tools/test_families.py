@@ -6,14 +6,12 @@ time for; limits are those of `tuning.md`, truth is the analytic response of the
 
 from __future__ import annotations
 
-import json
-
 import pytest
 from pydantic import TypeAdapter
 
 from backend.commands.tools import lines_of
 from backend.tools.autotune.result import AutotuneAnswer
-from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, as_json, autotune
+from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, autotune
 from backend.tools.inertia.evaluation import InertiaSettings, answer_of
 from backend.tools.inertia.run import TOOL as INERTIA
 from backend.tools.inertia.run import inertia
@@ -116,7 +114,9 @@ async def test_autotune_of_a_family_and_back(drive: str) -> None:
         await put_back(b.axis, result.before)
         for key, raw in result.before.items():
             assert await b.axis.drive.raw(key) == raw
-        published = TypeAdapter[ToolOutcome](ToolOutcome).validate_json(json.dumps(as_json(result)))
+        published = TypeAdapter[ToolOutcome](ToolOutcome).validate_json(
+            answer_of(result).model_dump_json()
+        )
         assert isinstance(published, AutotuneAnswer)
         assert published.before == result.before
         assert published.mechanics.kind == "mechanics"

@@ -13,9 +13,15 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import httpx
 import pytest
 
-from backend.tools.autotune.run import AutotuneSettings, as_json, autotune
+from backend.api.app import make_app
+from backend.recording.writer import RecordingWriter
+from backend.station.bench import Bench
+from backend.tools.autotune.run import AutotuneSettings, autotune
+from backend.tools.autotune.tool import answer_of
+from tests.unit.recording.support import block, header
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE, mechanics, silent
 
@@ -59,7 +65,7 @@ def _job(result: object) -> str:
 async def test_results_are_read_by_generated_types(client: ModuleType) -> None:
     async with direct(mechanics((1e-4, 60.0, 0.006)), 5e-4) as b:
         found = await autotune(b.axis, b.session, AutotuneSettings(WIDE), silent())
-    answer = as_json(found)
+    answer = answer_of(found).model_dump(mode="json")
 
     def read(result: object, kind: str) -> object:
         job = client.JobInfo.model_validate_json(_job(result))
@@ -76,3 +82,31 @@ async def test_results_are_read_by_generated_types(client: ModuleType) -> None:
     assert moved.inertia_kgm2 == pytest.approx(1.5e-4, rel=0.02)  # type: ignore[attr-defined]
     stepped = read(answer["step"], "StepAnswer")
     assert len(stepped.actual) == len(stepped.time_s)  # type: ignore[attr-defined]
+
+
+async def test_a_recording_is_read_by_generated_types(client: ModuleType, tmp_path: Path) -> None:
+    """Samples of known values, through the interface: of the stretch that was asked for, all."""
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    writer = RecordingWriter(folder / "known.sdrec", header(), pytest.fail)
+    for number in range(5):
+        writer.put(0, block(number))
+    writer.close({"reason": "stopped"})
+    bench = Bench(tmp_path)
+    transport = httpx.ASGITransport(make_app(bench, hosts=frozenset({"test"})))
+    async with httpx.AsyncClient(transport=transport, base_url="http://test/api/v1") as http:
+        stored = client.RecordingDetail.model_validate_json(
+            (await http.get("/recordings/known.sdrec")).raise_for_status().content
+        )
+        answer = await http.get(
+            "/recordings/known.sdrec/samples", params={"from_s": 0.0125, "duration_s": 0.02}
+        )
+    await bench.close()
+    found = client.RecordedSamples.model_validate_json(answer.raise_for_status().content)
+    assert [trace.unit for trace in found.traces] == ["inc", "rpm"]
+    assert [c.name for c in stored.info.channels] == [trace.name for trace in found.traces]
+    # Samples 13 to 32 of 50, one a millisecond; the second signal counts from 1000 on.
+    for column, trace in enumerate(found.traces):
+        assert trace.t_s == pytest.approx([n / 1000 for n in range(13, 33)], abs=1e-9)
+        assert trace.values == [n + 1000 * column + 1 / 3 for n in range(13, 33)]
+    assert found.more

@@ -7,9 +7,10 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from backend.tools.sweep.evaluation import SweepSettings, as_json
+from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.plan import check
 from backend.tools.sweep.run import sweep
+from backend.tools.sweep.stored import answer_of
 from drivers.errors import OutOfRange
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE, errors, mechanics, silent
@@ -40,7 +41,9 @@ async def test_odd_lines_tell_odd_from_even_distortion_and_measure_as_well() -> 
     assert found.detected is not None
     assert found.detected.odd > 2.0 * found.detected.even
     assert any(each.code == "sweep.distortion-detected" for each in found.warnings)
-    assert as_json(found)["detected"] == asdict(found.detected)
+    published = answer_of(found).detected
+    assert published is not None
+    assert published.model_dump() == asdict(found.detected)
     with pytest.raises(OutOfRange) as refused:
         check(SweepSettings(WIDE, odd_lines=True, excitation="chirp"))
     assert refused.value.code == "sweep.odd-lines-need-multisine"

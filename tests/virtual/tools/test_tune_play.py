@@ -16,7 +16,7 @@ import pytest
 from backend.tools.autotune import again as tune_again
 from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, apply_and_verify, autotune
-from backend.tools.autotune.run import as_json as tuned_json
+from backend.tools.autotune.tool import answer_of
 from backend.tools.measuring.temporary import put_back
 from backend.tools.sweep.evaluation import completed
 from backend.work.jobs import Progress
@@ -84,9 +84,10 @@ async def test_what_the_loop_shows_is_predicted_and_verified_by_other_data() -> 
     # It is reported, with the result and with the measurement.
     (note,) = (note for note in result.notes if note.code == "autotune.answers-otherwise")
     assert note in verified.sweep.warnings
-    reported: Any = tuned_json(result)
-    assert reported["again"]["predicted"]["bandwidth_hz"] == again.predicted.bandwidth_hz
-    assert len(reported["again"]["closed_db"]) == len(reported["again"]["frequency_hz"])
+    reported = answer_of(result).again
+    assert reported is not None
+    assert reported.predicted.bandwidth_hz == again.predicted.bandwidth_hz
+    assert len(reported.closed_db or ()) == len(reported.frequency_hz or ()) > 0
 
 
 @pytest.mark.parametrize("step", ["4 of 6: designing for", "6 of 6: measuring"])

@@ -967,7 +967,7 @@ export interface paths {
         put?: never;
         /**
          * Start Autotune
-         * @description All steps from inertia to verification; `before` of the result undoes what was applied.
+         * @description Measure, design and, with --apply or --keep, verify an axis's loop gains. The axis moves.
          */
         post: operations["start_autotune"];
         delete?: never;
@@ -1352,7 +1352,7 @@ export interface paths {
         put?: never;
         /**
          * Start Sweep
-         * @description Measure a frequency response. The result has the form of ``servodeck sweep --out``.
+         * @description Measure a frequency response and write it as JSON. The axis moves.
          */
         post: operations["start_sweep"];
         delete?: never;
@@ -2879,6 +2879,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/recordings/{name}/samples": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Get Samples
+         * @description A stretch of a stored recording as numbers, for programs; whole ones are exported.
+         */
+        get: operations["get_samples"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/recordings/{name}/stop": {
         parameters: {
             query?: never;
@@ -3371,7 +3391,7 @@ export interface paths {
         };
         /**
          * List Tools
-         * @description Every tool that has a descriptor: its words, and the form of its settings.
+         * @description Every tool: its words, and the form of its settings.
          */
         get: operations["list_tools"];
         put?: never;
@@ -3663,6 +3683,11 @@ export interface components {
             /** Tried Messages */
             tried_messages: components["schemas"]["MessageInfo"][];
             verified: components["schemas"]["VerifiedInfo"] | null;
+            /**
+             * Written
+             * @description when what is in force was written; its verification came after
+             */
+            written?: string | null;
         };
         /**
          * AutotuneRequest
@@ -3671,6 +3696,7 @@ export interface components {
         AutotuneRequest: {
             /**
              * Apply
+             * @description write the design and verify it
              * @default true
              */
             apply: boolean;
@@ -3686,26 +3712,37 @@ export interface components {
              * @default 1
              */
             cycle_ms: number;
-            /** Ends Rev */
+            /**
+             * Ends Rev
+             * @description taught end
+             */
             ends_rev?: [
                 number,
                 number
             ] | null;
-            /** Load */
+            /**
+             * Load
+             * @description judged from the response if not said
+             */
             load?: ("stiff" | "medium" | "compliant") | null;
             /**
              * Loop
+             * @description which loop is closed meanwhile
              * @default auto
              * @enum {string}
              */
             loop: "auto" | "none" | "speed" | "position";
             /**
              * Mark
+             * @description the design to apply
              * @default balanced
              * @enum {string}
              */
             mark: "robust" | "balanced" | "fast";
-            /** Motor Inertia Kgm2 */
+            /**
+             * Motor Inertia Kgm2
+             * @description inertia of the motor alone
+             */
             motor_inertia_kgm2?: number | null;
             /**
              * Rated Torque Nm
@@ -3714,6 +3751,7 @@ export interface components {
             rated_torque_nm?: number | null;
             /**
              * Scheme
+             * @description how the axis may travel
              * @default free
              * @enum {string}
              */
@@ -9590,6 +9628,53 @@ export interface components {
             value: number | string | null;
         };
         /**
+         * RecordedSamples
+         * @description Samples of a stretch of a recording, every one as it was recorded.
+         */
+        RecordedSamples: {
+            /** From S */
+            from_s: number;
+            /**
+             * More
+             * @description there are samples after this stretch
+             */
+            more: boolean;
+            /**
+             * Start
+             * Format: date-time
+             * @description time of the first sample of the recording
+             */
+            start: string;
+            /** Traces */
+            traces: components["schemas"]["RecordedTrace"][];
+            /**
+             * Until S
+             * @description this moment is the next stretch's
+             */
+            until_s: number;
+        };
+        /**
+         * RecordedTrace
+         * @description Samples [n] of one signal; ``t_s`` counts from the first sample of the recording.
+         */
+        RecordedTrace: {
+            /** Drive */
+            drive: string;
+            /** Key */
+            key: string;
+            /** Name */
+            name: string;
+            /** T S */
+            t_s: number[];
+            /** Unit */
+            unit: string;
+            /**
+             * Values
+             * @description null where the bus had none
+             */
+            values: (number | null)[];
+        };
+        /**
          * RecordingColumn
          * @description One column of a recording.
          */
@@ -11479,6 +11564,7 @@ export interface components {
         SweepRequest: {
             /**
              * Base Motion
+             * @description turn the axis slowly meanwhile, so that friction is passed
              * @default true
              */
             base_motion: boolean;
@@ -11501,21 +11587,27 @@ export interface components {
              * @enum {string}
              */
             excitation: "multisine" | "chirp" | "prbs" | "stepped";
-            /** F Max Hz */
+            /**
+             * F Max Hz
+             * @description highest line
+             */
             f_max_hz?: number | null;
             /**
              * F Min Hz
+             * @description lowest line
              * @default 5
              */
             f_min_hz: number;
             /**
              * Kind
+             * @description what is measured
              * @default mechanics
              * @enum {string}
              */
             kind: "mechanics" | "speed_loop" | "position_loop";
             /**
              * Loop
+             * @description which loop is closed meanwhile
              * @default auto
              * @enum {string}
              */
@@ -11533,12 +11625,13 @@ export interface components {
             rated_torque_nm?: number | null;
             /**
              * Realisations
+             * @description pairs of realisations
              * @default 2
              */
             realisations: number;
             /**
              * Share
-             * @description of the permitted torque
+             * @description excitation's share of the permitted torque
              * @default 0.35
              */
             share: number;
@@ -12332,6 +12425,8 @@ export type RecordTrigger = components['schemas']['RecordTrigger'];
 export type RecordedAxis = components['schemas']['RecordedAxis'];
 export type RecordedChannel = components['schemas']['RecordedChannel'];
 export type RecordedParameter = components['schemas']['RecordedParameter'];
+export type RecordedSamples = components['schemas']['RecordedSamples'];
+export type RecordedTrace = components['schemas']['RecordedTrace'];
 export type RecordingColumn = components['schemas']['RecordingColumn'];
 export type RecordingDetail = components['schemas']['RecordingDetail'];
 export type RecordingEvent = components['schemas']['RecordingEvent'];
@@ -36293,6 +36388,149 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    get_samples: {
+        parameters: {
+            query?: {
+                /** @description since the first sample */
+                from_s?: number;
+                duration_s?: number;
+            };
+            header?: never;
+            path: {
+                name: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RecordedSamples"];
+                };
             };
             /** @description Not a request of this interface */
             400: {

@@ -47,7 +47,7 @@ describe('a message of the server', () => {
   it('is strung together with others as each language does', () => {
     const both = {
       code: '+',
-      params: { joint: ': ', part0: { code: 'api-tuning.tune', params: {} }, part1: 'X' },
+      params: { joint: ': ', part0: { code: 'autotune.title', params: {} }, part1: 'X' },
     }
     expect(words('en', both)).toBe('Tune: X')
     expect(words('zh', both)).toBe('整定：X')

@@ -22,6 +22,8 @@ const CHINESE_JOINTS: Record<string, string> = { '; ': '；', ': ': '：', ', ':
 const RENAMED: Record<string, string> = {
   'autotune.no-candidate-kept-promise': 'autotune.no-candidate-verified',
   'autotune.promise-not-kept': 'autotune.prediction-not-confirmed',
+  'api-tuning.frequency-response': 'sweep.title',
+  'api-tuning.tune': 'autotune.title',
 }
 
 /** The server's own files, so that page, server and command line say the same. */

@@ -1,5 +1,4 @@
 api-tuning_cannot-be-evaluated = { $value }: { $cause }
-api-tuning_frequency-response = Frequency response
 api-tuning_give-either-gains-level = give either gains or a level
     .remedy = give one of the two
 api-tuning_not-frequency-response = { $value } is not a frequency response
@@ -11,4 +10,3 @@ api-tuning_now-change-left-changed = { $drive }: { $parameter } is { $value } no
     .remedy = look at the list of changes; undo it all the same, or write the value that you want
 api-tuning_too-large = { $name } is too large
     .remedy = import one measurement at a time, as this program exported it
-api-tuning_tune = Tune

@@ -135,6 +135,12 @@ printed_stored-version = { $name } version { $version }
 printed_then = then
 printed_trial-does-not = {"  "}tried { $setting } { $before } -> { $after }: { $refusal }; undone
 printed_trial-reaches = {"  "}tried { $setting } { $before } -> { $after }: reaches Operational; undone, to keep it set { $setting } in the profile
+printed_tuning-in-force = in force: { $count ->
+        [one] { $count } parameter was changed; it is
+       *[other] { $count } parameters were changed; they are
+    } not stored in the drive yet
+printed_tuning-not-applied = nothing was written; --apply verifies a design, --keep leaves it in force
+printed_tuning-taken-back = taken back: all parameters are as before
 printed_type-digest = type the digest to confirm this change
 printed_value-differs = { $key }  { $name }: drive { $drive } → file { $file }
 printed_value-stays = { $drive }: { $key } (was { $was }) stays as it is

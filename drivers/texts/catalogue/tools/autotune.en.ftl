@@ -78,6 +78,7 @@ autotune_slower-than-it-was = slower than it was, with { NUM($share, format: ".0
 autotune_stands-too-near-end = { $drive } stands too near to an end to measure what its notches do
     .remedy = jog it away from the end, then tune again
 autotune_step = { $step } of { $steps }: step
+autotune_title = Tune
 autotune_too-little-margin = it keeps too little margin for what the axis may be
 autotune_torque-limit-not-commanded = { $drive }: the torque was at its limit, or not what was commanded, for { NUM($saturated_share, format: ".0%") } of the measurement, so nothing is designed from it
     .remedy = raise the drive's torque limits, or lower the envelope's torque

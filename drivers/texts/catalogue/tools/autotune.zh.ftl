@@ -75,6 +75,7 @@ autotune_slower-than-it-was = 比原来慢，速度增益为原来的 { NUM($sha
 autotune_stands-too-near-end = { $drive } 距端点太近，无法测量陷波器的作用
     .remedy = 请点动离开端点后重新整定
 autotune_step = 第 { $step } 步（共 { $steps } 步）：阶跃
+autotune_title = 整定
 autotune_too-little-margin = 对轴可能的变化，其裕度太小
 autotune_torque-limit-not-commanded = { $drive }：测量中有 { NUM($saturated_share, format: ".0%") } 的时间转矩达到限值或与指令不符，因此不据此设计
     .remedy = 请提高驱动器的转矩限值，或降低此处的转矩限值

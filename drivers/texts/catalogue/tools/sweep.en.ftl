@@ -42,6 +42,7 @@ sweep_stepped-sine-lasts-too = a stepped sine lasts too long for an axis that no
     .remedy = measure it with the speed loop closed
 sweep_still-turns-after-speed = { $drive } still turns after its speed was tried
     .remedy = use the machine's emergency stop
+sweep_title = Frequency response
 sweep_torque-at-limit = the torque was at its limit, or not what was commanded, for { NUM($share, format: ".0%") } of the time: lower the excitation or raise the limit
 sweep_torque-follows-slowly = the torque follows its command more slowly than a current loop: a low-pass of the torque is set in the drive (torque filter), which limits every loop. What the response owes to its form is charged to the band
 sweep_torque-is-commanded = the drive reports the torque that it commands: what its current loop takes is not known, and is charged to the band

@@ -42,6 +42,7 @@ sweep_stepped-sine-lasts-too = 对于没有闭环保持的轴，步进正弦持�
     .remedy = 请在速度环闭合时测量
 sweep_still-turns-after-speed = { $drive } 在试验速度之后仍在转动
     .remedy = 请使用机器的急停
+sweep_title = 频率响应
 sweep_torque-at-limit = 转矩在 { NUM($share, format: ".0%") } 的时间内达到限值，或与指令不符：请减小激励或提高限值
 sweep_torque-follows-slowly = 转矩跟随指令比电流环慢：驱动器中设置了转矩低通（转矩滤波器），它限制所有回路。其形式的影响已计入误差带
 sweep_torque-is-commanded = 驱动器上报的是指令转矩：其电流环的影响未知，已计入置信带

@@ -1,4 +1,4 @@
-"""Numbers as a report writes them; a dash where there is none."""
+"""Numbers as people are shown them; a dash where there is none."""
 
 from __future__ import annotations
 
