@@ -7,7 +7,6 @@ import types
 import typing
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -139,16 +138,10 @@ def _kind(tool: AnyTool, name: str, field: FieldInfo, *, pair: bool) -> Any:
     kind = field.annotation
     if pair:
         return float | None
-    choice = next((each for each in (kind, *typing.get_args(kind)) if _is_choice(each)), None)
-    if choice is not None:
-        values = StrEnum(f"{tool.kind}_{name}", {value: value for value in typing.get_args(choice)})
-        return values if choice is kind else values | None
+    if any(typing.get_origin(each) is Literal for each in (kind, *typing.get_args(kind))):
+        return kind
     assert typing.get_origin(kind) in (None, types.UnionType), f"{tool.kind}: {name} has no option"
     return kind
-
-
-def _is_choice(kind: Any) -> bool:
-    return typing.get_origin(kind) is Literal
 
 
 def _settings(tool: AnyTool, given: dict[str, Any]) -> Any:

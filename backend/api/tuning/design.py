@@ -42,6 +42,7 @@ from backend.station.connected_drive import ConnectedDrive
 from backend.tools.autotune import candidates as tune_candidates
 from backend.tools.autotune import gains
 from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.autotune.tool import candidate_info
 from backend.tools.measuring.temporary import put_back, write_settings
 from backend.tools.notch import filters as notch
 from backend.tools.notch.meaning import meaning_of
@@ -262,7 +263,7 @@ async def candidates(
         tune_candidates.candidates_for, connected.drive, facts, plant, request.inertia_kgm2, load,
         request.sample_rate_hz,
     )  # fmt: skip
-    return CandidatesInfo(load=load, candidates=[tune_candidates.candidate_json(c) for c in table])
+    return CandidatesInfo(load=load, candidates=[candidate_info(each) for each in table])
 
 
 @router.post("/drives/{drive_id}/tune/predict")

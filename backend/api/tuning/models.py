@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from backend.api.models import Message
+from backend.tools.autotune.result import CandidateInfo
 from backend.tools.results import ToolOutcome
 from backend.tools.wire_message import MessageInfo
 
@@ -173,7 +174,7 @@ class CandidatesInfo(Message):
     """The table, fastest first; up to three rows carry a mark."""
 
     load: str
-    candidates: list[dict[str, object]]
+    candidates: list[CandidateInfo]
 
 
 class PredictRequest(Message):

@@ -37,8 +37,8 @@ def answer_of(result: AutotuneResult, after: Mapping[str, int] | None = None) ->
         inertia=inertia_evaluation.answer_of(result.inertia),
         mechanics=sweep_stored.answer_of(result.mechanics),
         load=result.load,
-        candidates=tuple(_candidate(each) for each in result.candidates),
-        applied=_candidate(result.applied) if result.applied else None,
+        candidates=tuple(candidate_info(each) for each in result.candidates),
+        applied=candidate_info(result.applied) if result.applied else None,
         verified=_verified(result.verified, result) if result.verified else None,
         again=_again(result.again) if result.again else None,
         step=step_evaluation.answer_of(result.step) if result.step else None,
@@ -53,7 +53,8 @@ def answer_of(result: AutotuneResult, after: Mapping[str, int] | None = None) ->
     )
 
 
-def _candidate(candidate: Candidate) -> CandidateInfo:
+def candidate_info(candidate: Candidate) -> CandidateInfo:
+    """One row of the table of designs."""
     return CandidateInfo.model_validate(figures_of(candidate))
 
 

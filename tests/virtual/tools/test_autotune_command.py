@@ -226,7 +226,7 @@ def test_by_a_server_a_design_is_taken_back_or_kept(
     assert "not kept: 300 Hz: too fast" in reported
     assert seen["meanwhile"] != seen["before"]
     assert seen["after"] == seen["meanwhile" if keep else "before"]
-    assert ("taken back: all parameters are as before" in reported) is not keep
+    assert ("undone: all parameters are as before" in reported) is not keep
 
 
 def test_a_drive_that_the_server_does_not_have(

@@ -4505,9 +4505,7 @@ export interface components {
          */
         CandidatesInfo: {
             /** Candidates */
-            candidates: {
-                [key: string]: unknown;
-            }[];
+            candidates: components["schemas"]["CandidateInfo"][];
             /** Load */
             load: string;
         };

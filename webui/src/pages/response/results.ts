@@ -101,9 +101,6 @@ export const asStep = (result: unknown): StepAnswer | null => {
 export const asAutotune = (value: unknown): Autotune | null =>
   has(value, 'mechanics', 'candidates', 'before') ? (value as Autotune) : null
 
-export const asCandidates = (value: unknown[]): Candidate[] =>
-  value.filter((each) => has(each, 'gains', 'notches', 'marks')) as Candidate[]
-
 /** Files that a job stored, newest last. */
 export function filesOf(result: unknown): string[] {
   const files = (result as { measurements?: unknown } | null)?.measurements

@@ -10,7 +10,7 @@ import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { fixed, hertz } from '../response/bode'
-import { asCandidates, type Candidate } from '../response/results'
+import type { Candidate } from '../response/results'
 import { remember } from '../response/undo'
 import { CandidateTable } from './CandidateTable'
 
@@ -60,7 +60,7 @@ export function CandidatesPanel({
           body,
         }),
       )
-      setFound({ load: answer.load, rows: asCandidates(answer.candidates) })
+      setFound({ load: answer.load, rows: answer.candidates })
       setWritten(false)
     })
   const apply = (candidate: Candidate) =>
