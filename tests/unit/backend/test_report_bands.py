@@ -17,6 +17,9 @@ from backend.report.facts import Measured
 from backend.report.gather import measured_from
 from backend.report.texts import Words
 from backend.report.tools import verdict_of
+from backend.tools.autotune.result import AutotuneAnswer, VerdictInfo, VerifiedInfo
+from backend.tools.registry import BY_KIND
+from backend.tools.sweep.result import SweepAnswer
 from tests.support import measurements as known
 
 GOALS = {"gain_margin_db": 9.5, "phase_margin_deg": 46.0, "ms": 1.7}
@@ -48,8 +51,14 @@ def measured(drive: Drive, folder: Path, found: dict[str, object]) -> Measured:
     """As the job of a tuning leaves it in the store."""
     store = MeasurementStore(folder)
     store.store("1-loop.sdmeas", known.file_of(drive, known.speed_loop(), datetime.now(UTC)))
-    answer = {"candidates": [], "verified": {"sweep": {"kind": "speed_loop"}, "verdict": found}}
-    measure._conclude(store, ["1-loop.sdmeas"], answer)
+    verified = VerifiedInfo.model_construct(
+        sweep=SweepAnswer.model_construct(kind="speed_loop"),
+        verdict=VerdictInfo.model_validate(found),
+    )
+    answer = AutotuneAnswer.model_construct(
+        inertia=None, mechanics=None, step=None, verified=verified
+    )
+    measure._conclude(store, ["1-loop.sdmeas"], BY_KIND["autotune"], answer)
     (one,), unusable = measured_from(store, [("1-loop.sdmeas", "")])
     assert not unusable
     return one
