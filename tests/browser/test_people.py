@@ -275,7 +275,7 @@ def test_a_guest_looks_and_is_seen_and_nothing_more(opened: Open, bench: Bench) 
     expect(guest.get_by_text("a guest may not do this without a grant")).to_be_visible()
     guest.mouse.up()
     button(guest, "Control is free").click()
-    expect(guest.get_by_text("may only look")).to_be_visible()
+    expect(guest.get_by_text("may only view")).to_be_visible()
     assert not bench.moves()
     # The person on site goes where the guest is, and sees the guest's pointer there.
     olaf.get_by_role("link", name="Go to their page").click()

@@ -20,12 +20,6 @@ from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
 from drivers.texts import limits
 from drivers.texts.message import text
 
-CONSENT = (
-    "No watchdog of the drive is active on this link: if the cable is pulled or this program dies, "
-    "it keeps the commanded speed or torque until its own travel limit or its emergency stop. "
-    "Go on only with the drive's travel limits active and a hand on the emergency stop."
-)
-
 
 @dataclass(frozen=True, slots=True)
 class MoveSettings:

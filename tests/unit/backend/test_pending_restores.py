@@ -74,7 +74,7 @@ async def test_a_line_too_slow_for_putting_back_names_what_is_left(
         RestoreFailed, match=f"^samples did not come; .*{SPEED} .was 400"
     ) as reported:
         await motion()
-    assert "running server puts them back" in (reported.value.remedy or "")
+    assert "running server restores them" in (reported.value.remedy or "")
     assert [entry.key for entry in x.drive.pending_restores.entries] == [SPEED]
 
 
