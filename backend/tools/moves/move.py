@@ -18,7 +18,7 @@ from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
 from drivers.texts import limits
-from drivers.texts.message import text
+from drivers.texts.message import joined, text
 
 
 @dataclass(frozen=True, slots=True)
@@ -333,7 +333,7 @@ async def _still_inside(axis: Axis, watch: _Watch) -> int:
         raws.append(raw)
     status, position, velocity = raws
     if drive.decode_state(status) is not State.OPERATION_ENABLED:
-        causes = "; ".join(await axis.blocked_by()) or "it left Operation enabled"
+        causes = joined(await axis.blocked_by() or [text("axis.cause-left-enabled")])
         raise NotAllowed("moves.stopped-during-move", drive=drive.name, causes=causes)
     moved, shown = abs(units.position(position - watch.start)), envelope.shown
     if moved > envelope.travel_rev * 1.02 + 0.05:

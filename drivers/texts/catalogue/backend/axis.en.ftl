@@ -1,5 +1,16 @@
 axis_606ch-6064h-opposite-signs = { $drive }: 606Ch and 6064h have opposite signs
     .remedy = check the polarity 607Eh: set its bits 6 and 7 to the same value; then move again
+axis_cause-a-fault = a fault is present
+axis_cause-fault = fault present: { $faults }
+axis_cause-input = input { $terminal } ({ $function }) is active
+axis_cause-left-enabled = it left Operation enabled
+axis_cause-limit-negative = the negative limit switch is active
+axis_cause-limit-positive = the positive limit switch is active
+axis_cause-local = the drive is not under bus control (bit Remote is 0)
+axis_cause-no-mode = no mode of operation is set
+axis_cause-no-power = no main power: the DC bus is not charged, or STO is open
+axis_cause-none = the drive gives no reason
+axis_cause-write-settings = { $count } parameters take effect only after “Write settings”
 axis_check-load-and-limits = check load and limits
 axis_cyclic-exchange-runs-already = { $url }: the cyclic exchange runs already
     .remedy = stop the exchange first to choose another cycle

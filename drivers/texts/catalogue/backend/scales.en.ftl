@@ -1,5 +1,9 @@
+scales_gear-finer-than-encoder = one user increment is finer than the encoder: { NUM($reached, format: ".6g") } user increments and { $counts } encoder increments per revolution
+scales_gear-not-exact = the ratio cannot be set exactly: over { NUM($over, format: "g") } { $unit } the axis is off by { NUM($drift, format: ".2g") } { $unit }, and a rotary axis that runs in one direction drifts
+scales_gear-pi = the ratio contains π and is rounded to a millionth of a millimetre per revolution; the real diameter has more influence: check it with a long move
 scales_gear-ratio-outside = { $profile }: { NUM($value, format: ".6g") } encoder increments per user increment are outside { $limit }; the drive reports { $fault } then
     .remedy = choose a coarser or finer user increment
+scales_gear-ratio-unusual = { NUM($value, format: ".6g") } encoder increments per user increment are outside { $limit }; the drive then reports { $fault }. { $notes }
 scales_increments-per-revolution-unknown = { $drive }: increments per revolution are unknown, so { $value } cannot be converted
     .remedy = set feed constant and gear ratio on the Parameters page
 scales_missing = { $kind }: { $replace } is missing
