@@ -129,7 +129,7 @@ export const parameters = {
     '轴的危险区域内无人，且手在急停按钮上。',
   ],
   'motion.write': ['Write this setting', '写入该设置'],
-  'motion.disableFirst': ['The axis has power: disable it first.', '轴已得电：请先取消使能。'],
+  'motion.disableFirst': ['The axis has power: disable it first.', '轴已得电：请先断使能。'],
   'motion.reasonMissing': ['Give a reason.', '请填写原因。'],
   'mark.unreachable': ['not on this link', '此链路不可达'],
   'compare.with': ['Compare with', '比较对象'],
