@@ -62,7 +62,7 @@ export const tuning = {
     '仅奇数谱线：区分噪声、偶次失真和奇次失真',
   ],
   'sweep.base': [
-    'Move slowly back and forth during the measurement, so that friction does not hold the axis',
+    'Reciprocate slowly during the measurement, so that friction does not hold the axis',
     '测量时缓慢往复运动，以克服静摩擦',
   ],
   'sweep.moves': [
