@@ -41,7 +41,10 @@ export const functions = {
   ],
   'bundle.make': ['Make a bundle now', '立即生成'],
   'bundle.armed': ['A fault creates one automatically.', '发生故障时自动生成。'],
-  'bundle.notArmed': ['Faults do not create one: this is switched off.', '故障时不自动生成（已关闭）。'],
+  'bundle.notArmed': [
+    'Faults do not create one: this is switched off.',
+    '故障时不自动生成（已关闭）。',
+  ],
   'bundle.none': ['There is none yet.', '尚无支持包。'],
 
   'io.inputs': ['Inputs', '输入'],
@@ -313,7 +316,10 @@ export const functions = {
   'group.modulo': ['Modulo and rotary axis', '循环（取模）旋转轴'],
   'group.impedance': ['Impedance control', '阻抗控制'],
   'group.inputs': ['Terminals', '端子'],
-  'settings.none': ['The profile contains no such settings of this drive.', '配置文件不含此类设置。'],
+  'settings.none': [
+    'The profile contains no such settings of this drive.',
+    '配置文件不含此类设置。',
+  ],
 
   'watch.title': ['Watch list', '监视列表'],
   'watch.add': ['Add a parameter', '添加参数'],

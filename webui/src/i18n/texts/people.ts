@@ -11,7 +11,10 @@ export const people = {
   'door.newPassword': ['New password', '新密码'],
   'door.again': ['New password again', '再次输入新密码'],
   'door.differs': ['The two are not the same.', '两次输入不一致。'],
-  'door.passwordRule': ['10 characters or more; several words are good', '至少 10 个字符，建议用多个词'],
+  'door.passwordRule': [
+    '10 characters or more; several words are good',
+    '至少 10 个字符，建议用多个词',
+  ],
   'door.setUp': ['First administrator of this station', '本站的首位管理员'],
   'door.setUpText': [
     'Nobody can log in yet. The person at the machine creates the first account.',

@@ -22,8 +22,14 @@ export const recordings = {
   'recordings.state.waiting': ['waits for its trigger', '等待触发'],
   'recordings.state.recording': ['recording', '录制中'],
   'recordings.state.complete': ['complete', '完整'],
-  'recordings.state.interrupted': ['interrupted; data up to there intact', '被中断，之前的数据完好'],
-  'recordings.state.failed': ['ended by a failure; data up to there intact', '因故障结束，之前的数据完好'],
+  'recordings.state.interrupted': [
+    'interrupted; data up to there intact',
+    '被中断，之前的数据完好',
+  ],
+  'recordings.state.failed': [
+    'ended by a failure; data up to there intact',
+    '因故障结束，之前的数据完好',
+  ],
   'recordings.state.unusable': ['not usable', '不可用'],
   'recordings.open': ['Open in rerun', '在 rerun 中打开'],
   'recordings.export': ['Export as {kind}', '导出为 {kind}'],

@@ -40,10 +40,7 @@ export const scales = {
     'Neither the drive nor its description states the unit.',
     '驱动器及其描述文件均未说明单位。',
   ],
-  'scales.uncertainty.unreadable': [
-    'The stated unit is not known here.',
-    '所给单位无法识别。',
-  ],
+  'scales.uncertainty.unreadable': ['The stated unit is not known here.', '所给单位无法识别。'],
   'scales.uncertainty.behind_gear': [
     'It counts turns, and 6091h holds a gear ratio: the shaft it refers to is not stated.',
     '以转数计，而 6091h 中设有减速比：未说明是哪根轴。',
@@ -74,10 +71,7 @@ export const scales = {
     '606Ch showed {value} per increment per second.',
     '606Ch 每增量每秒对应 {value}。',
   ],
-  'scales.toldNothing': [
-    '606Ch did not follow the position.',
-    '606Ch 的值与位置不相符。',
-  ],
+  'scales.toldNothing': ['606Ch did not follow the position.', '606Ch 的值与位置不相符。'],
   'scales.state': ['State from a data sheet', '按数据手册给定'],
   'scales.countsPerRev': ['Increments per revolution', '每转增量数'],
   'scales.rawPerRpm': ['Raw speed of 1 rpm', '1 rpm 的原始速度值'],
