@@ -59,7 +59,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     "health.hash": ("SHA-256 of the baseline", "基线的 SHA-256"),
     "health.checks": ("Rounds measured since", "此后测量的轮数"),
     "health.changed": (
-        "The stored baseline was changed after it was signed: its checksum differs. Nothing is compared.",
+        "The stored baseline was changed after it was signed: its checksum differs. "
+        "Nothing is compared.",
         "存储的基线与签署时不同：校验和不一致。未作比较。",
     ),
     "health.next": ("Next", "下一步"),
@@ -104,8 +105,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     "of_rated": ("% of rated", "额定百分比"),
     "demand": ("commanded", "指令"),
     "bode.caption": (
-        "Shaded: valid range of the estimate ({low} to {high} Hz at {rate} samples per second). The "
-        "pale band around a line holds the true value with 95 % confidence.",
+        "Shaded: valid range of the estimate ({low} to {high} Hz at {rate} samples per second). "
+        "The pale band around a line holds the true value with 95 % confidence.",
         "阴影：估计有效的频段（{low} 至 {high} Hz，每秒 {rate} 次采样）。"
         "曲线周围浅色带为 95% 置信区间。",
     ),
