@@ -58,7 +58,7 @@ export const tuning = {
   'sweep.count': ['Realisations', '重复次数'],
   'sweep.countHelp': ['more take longer and reduce noise', '越多越慢，噪声越小'],
   'sweep.odd': [
-    'Odd lines alone: tells noise, even and odd distortion apart',
+    'Odd lines only: separates noise, even and odd distortion',
     '仅奇数谱线：区分噪声、偶次失真和奇次失真',
   ],
   'sweep.base': [
