@@ -140,7 +140,7 @@ printed_tuning-in-force = in force: { $count ->
        *[other] { $count } parameters were changed; they are
     } not stored in the drive yet
 printed_tuning-not-applied = nothing was written; --apply verifies a design, --keep leaves it in force
-printed_tuning-taken-back = taken back: all parameters are as before
+printed_tuning-taken-back = undone: all parameters are as before
 printed_type-digest = type the digest to confirm this change
 printed_value-differs = { $key }  { $name }: drive { $drive } → file { $file }
 printed_value-stays = { $drive }: { $key } (was { $was }) stays as it is
