@@ -295,7 +295,7 @@ async def test_a_gear_that_cannot_be_taken_back_is_pending(x: ConnectedDrive, se
     writing, before = await half_a_gear(x, servo)
     servo.mute = True
     servo.gate.set()
-    with pytest.raises(LinkTimeout, match="not put back"):
+    with pytest.raises(LinkTimeout, match="not restored"):
         await writing
     assert {entry.key: entry.raw for entry in x.drive.pending_restores.entries} == before
 
