@@ -21,6 +21,7 @@ import platformdirs
 import yaml
 from pydantic import ValidationError
 
+from profiles.language.standard_help import HELP_FILE, with_standard_help
 from profiles.motion.classify import STANDARD_FILE, classified
 from profiles.schema import Profile
 
@@ -129,7 +130,7 @@ def parse_profile(texts: dict[str, str]) -> Profile:
     _refuse_own_classes(merged)
     _move_notes(merged)
     try:
-        return classified(Profile.model_validate(merged))
+        return classified(with_standard_help(Profile.model_validate(merged)))
     except ValidationError as error:
         raise ProfileError(_explain(merged, error)) from error
 
@@ -191,7 +192,7 @@ def _cache_path(drive: str, files: list[Path]) -> Path:
     digest = hashlib.sha256()
     schema = (_HERE / name for name in ("schema.py", "functions.py", "record.py"))
     motion = (*sorted((_HERE / "motion").glob("*.py")), STANDARD_FILE)
-    for path in [*schema, *motion, Path(__file__), *files]:
+    for path in [*schema, *motion, HELP_FILE, Path(__file__), *files]:
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
     folder = Path(os.environ.get("SERVODECK_CACHE") or platformdirs.user_cache_dir("servodeck"))

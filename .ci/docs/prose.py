@@ -12,6 +12,9 @@ from terms import ROOT, Banned, Term, banned
 DOCS = ROOT / "docs"
 CATALOGUE = ROOT / "drivers" / "texts" / "catalogue"
 PAGE_TEXTS = ROOT / "webui" / "src" / "i18n" / "texts"
+#: Texts of the report in both languages, and Chinese ones in YAML (`--help`, profiles).
+REPORT = ROOT / "backend" / "report" / "texts.py"
+CHINESE = (ROOT / "drivers" / "texts" / "help.zh.yaml", *(ROOT / "profiles").glob("*/zh/*.yaml"))
 #: Words that a sentence may have outside of reference pages.
 LONGEST = 30
 #: Pages that are looked up and not read: their sentences may be longer.
@@ -90,6 +93,17 @@ def words_on_page(terms: Sequence[Term]) -> Iterator[Finding]:
             Line(number, re.sub(r"^\s*(//|/?\*).*|^\s*'[^']+':", "", line))
             for number, line in enumerate(file.read_text("utf-8").splitlines(), 1)
         )
+        yield from _words(file, lines, rules)
+
+
+def words_elsewhere(terms: Sequence[Term]) -> Iterator[Finding]:
+    """Banned words in the report and in the Chinese texts of `--help` and of the profiles."""
+    chinese = banned(terms, chinese=True)
+    for file, rules in [
+        (REPORT, [*banned(terms, chinese=False), *chinese]),
+        *((file, chinese) for file in sorted(CHINESE)),
+    ]:
+        lines = (Line(n, line) for n, line in enumerate(file.read_text("utf-8").splitlines(), 1))
         yield from _words(file, lines, rules)
 
 

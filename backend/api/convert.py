@@ -180,7 +180,8 @@ def axis_state(bench: Bench, connected: ConnectedDrive, now: Snapshot) -> models
         temperature=value("temperature"),
         units=now.units,
         faults=[fault(known) for known in now.faults],
-        blocked_by=list(now.blocked_by),
+        blocked_by=[words_of(cause) for cause in now.blocked_by],
+        blocked_by_messages=[message_of(cause) for cause in now.blocked_by],
         moving_job=job.id if job else None,
         turning=turning(now.turning),
     )

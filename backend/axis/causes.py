@@ -1,6 +1,6 @@
 """What may keep an axis from being enabled beside what its status word says: for a refusal.
 
-The words are hints from what the drive reports at this moment. They are read only after a change
+These are hints from what the drive reports at this moment. They are read only after a change
 of state was refused, when a person looks for the reason.
 """
 
@@ -10,18 +10,19 @@ from backend.drive.drive import Drive
 from backend.drive.faults import integer
 from backend.drive.terminals import read_terminals
 from drivers.errors import DriveError
+from drivers.texts.message import Text, text
 
 #: Words in the names of input functions that stop an axis (tables of the manuals' DI functions).
 _STOPPING = ("emergency stop", "external fault", "signal stop")
 _POSITIVE_LIMIT, _NEGATIVE_LIMIT = 1, 0
 
 
-async def hints(drive: Drive) -> list[str]:
+async def hints(drive: Drive) -> list[Text]:
     """Inputs that stop the axis, limit switches that are on, and a mode that is not set.
 
     What cannot be read is left out: this explains another error.
     """
-    found: list[str] = []
+    found: list[Text] = []
     try:
         found += await _terminals(drive)
         found += await _limits(drive)
@@ -31,10 +32,10 @@ async def hints(drive: Drive) -> list[str]:
     return found
 
 
-async def _terminals(drive: Drive) -> list[str]:
+async def _terminals(drive: Drive) -> list[Text]:
     """Active inputs whose function stops the axis or must be on for it to be enabled."""
     return [
-        f"input {state.terminal.name} ({state.function_name}) is active"
+        text("axis.cause-input", terminal=state.terminal.name, function=state.function_name)
         for state in await read_terminals(drive)
         if state.terminal.direction == "in"
         and state.on
@@ -42,7 +43,7 @@ async def _terminals(drive: Drive) -> list[str]:
     ]
 
 
-async def _limits(drive: Drive) -> list[str]:
+async def _limits(drive: Drive) -> list[Text]:
     """Limit switches that are on (60FDh, CiA 402-2; some families exchange the bits)."""
     key = drive.key("digital_inputs")
     if key is None:
@@ -53,13 +54,13 @@ async def _limits(drive: Drive) -> list[str]:
     positive, negative = _POSITIVE_LIMIT, _NEGATIVE_LIMIT
     if drive.profile.quirk("limit_bits_swapped") is not None:
         positive, negative = negative, positive
-    names = (("positive", positive), ("negative", negative))
-    return [f"the {name} limit switch is on" for name, bit in names if raw >> bit & 1]
+    codes = (("axis.cause-limit-positive", positive), ("axis.cause-limit-negative", negative))
+    return [text(code) for code, bit in codes if raw >> bit & 1]
 
 
-async def _mode(drive: Drive) -> list[str]:
-    """Families that want a mode before they are enabled (001:488)."""
+async def _mode(drive: Drive) -> list[Text]:
+    """Families that need a mode before they are enabled (001:488)."""
     display = drive.key("mode_display")
     if drive.profile.quirk("mode_before_enable") is None or display is None:
         return []
-    return [] if await drive.raw(display) else ["no mode of operation is set"]
+    return [] if await drive.raw(display) else [text("axis.cause-no-mode")]

@@ -30,7 +30,7 @@ from drivers.codec import encode
 from drivers.dialect import dialect_of
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError
 from drivers.link import OwnsPowerState
-from drivers.texts.message import Text, text
+from drivers.texts.message import Text, joined, text
 from profiles.schema import Fault
 
 #: Longest time that one change of the power state may take (brake and bus included).
@@ -250,7 +250,7 @@ class PowerState:
         causes = await self.blocked_by()
         if goal is State.OPERATION_ENABLED:
             causes += await hints(self.drive)
-        why = "; ".join(causes) or "the drive gives no reason"
+        why = joined(causes) if causes else text("axis.cause-none")
         error = NotAllowed(
             "axis.stays-not-go",
             drive=self.drive.name,
@@ -266,25 +266,27 @@ class PowerState:
         error.names_faults = state in (State.FAULT, State.FAULT_REACTION)
         return error
 
-    async def blocked_by(self) -> list[str]:
-        """Known causes that keep the axis from being enabled, in words."""
+    async def blocked_by(self) -> list[Text]:
+        """Known causes that keep the axis from being enabled."""
         drive = self.drive
-        causes: list[str] = []
+        causes: list[Text] = []
         word = await self.status_word()
         state = drive.decode_state(word)
         if state in (State.FAULT, State.FAULT_REACTION):
             faults = await self.active_faults()
-            names = ", ".join(f"{fault.code} {fault.name}" for fault in faults) or "unknown"
-            causes.append(f"fault present: {names}")
+            names = ", ".join(f"{fault.code} {fault.name}" for fault in faults)
+            causes.append(
+                text("axis.cause-fault", faults=names) if names else text("axis.cause-a-fault")
+            )
         own = drive.profile.quirk("own_status_word") is not None
         enabled_states = (State.READY, State.SWITCHED_ON)
         if not own and state in enabled_states and not word & cia402.STATUS_VOLTAGE_ENABLED:
-            causes.append("no main power: the DC bus is not charged, or STO is open")
+            causes.append(text("axis.cause-no-power"))
         if not own and not word & cia402.STATUS_REMOTE and state in enabled_states:
-            causes.append("the drive is not under bus control (remote bit is 0)")
+            causes.append(text("axis.cause-local"))
         waiting = [k for k, until in drive.pending.items() if until == "write_settings"]
         if waiting:
-            causes.append(f"write-settings pending for {len(waiting)} parameters")
+            causes.append(text("axis.cause-write-settings", count=len(waiting)))
         return causes
 
     async def active_faults(self) -> list[Fault]:

@@ -17,13 +17,6 @@ from profiles.schema import Raw
 CLEANUP_TIMEOUT_S = 5.0
 
 
-#: What to do about values that could not be put back.
-PUT_BACK_LATER = (
-    "a running server puts them back, or offers to, when the drive answers again and its axis "
-    "stands; without one write these values by hand before the next motion"
-)
-
-
 class RestoreFailed(DriveError):
     """A cleanup could not put something back; the message lists what."""
 

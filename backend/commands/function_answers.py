@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from backend.api.drive.models_axis import ActiveFault
 from backend.scales.gear_calculator import GearPlan
+from drivers.texts.message import language
 from profiles.schema import Raw
 
 
@@ -56,5 +57,6 @@ def of_plan(plan: GearPlan) -> Gear:
     """A plan that was made here."""
     return Gear(
         [(v.parameter.key, v.parameter.name, v.raw) for v in plan.values],
-        plan.travel_per_motor_turn, plan.unit, plan.reached, plan.error_ppm, list(plan.warnings),
+        plan.travel_per_motor_turn, plan.unit, plan.reached, plan.error_ppm,
+        [each.words(language()) for each in plan.warnings],
     )  # fmt: skip

@@ -35,7 +35,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "settings.none": ("Tuning changed no setting.", "整定未更改任何设置。"),
     "settings.files": (
-        "This report was made from files alone; it does not know the drive's settings.",
+        "This report was made from files alone and does not contain the drive's settings.",
         "本报告仅由文件生成，不含驱动器设置。",
     ),
     "handover": ("Hand-over to the controller", "移交给控制器"),
@@ -59,7 +59,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     "health.hash": ("SHA-256 of the baseline", "基线的 SHA-256"),
     "health.checks": ("Rounds measured since", "此后测量的轮数"),
     "health.changed": (
-        "The stored baseline is not what was signed: its checksum differs. Nothing is compared.",
+        "The stored baseline was changed after it was signed: its checksum differs. "
+        "Nothing is compared.",
         "存储的基线与签署时不同：校验和不一致。未作比较。",
     ),
     "health.next": ("Next", "下一步"),
@@ -85,7 +86,7 @@ TEXTS: dict[str, tuple[str, str]] = {
         "限制：±{travel} 转，{speed} rpm，{torque}% 额定转矩。",
     ),
     "differs": (
-        "Evaluated anew from its raw signals, this measurement gives other numbers than at the "
+        "Computed again from the raw signals, this measurement gives other results than at the "
         "time ({what}); the new ones are shown.",
         "由原始信号重新计算的结果与当时不同（{what}）；此处为新结果。",
     ),
@@ -104,13 +105,13 @@ TEXTS: dict[str, tuple[str, str]] = {
     "of_rated": ("% of rated", "额定百分比"),
     "demand": ("commanded", "指令"),
     "bode.caption": (
-        "Shaded: where the estimate holds ({low} to {high} Hz at {rate} samples per second). The "
-        "pale band about a line holds the true value with 95 % confidence.",
+        "Shaded: valid range of the estimate ({low} to {high} Hz at {rate} samples per second). "
+        "The pale band around a line holds the true value with 95 % confidence.",
         "阴影：估计有效的频段（{low} 至 {high} Hz，每秒 {rate} 次采样）。"
         "曲线周围浅色带为 95% 置信区间。",
     ),
     "step.caption": (
-        "Commanded and actual over time, and the torque it took.",
+        "Commanded and actual value over time, and the torque.",
         "指令与实际随时间变化，以及所需转矩。",
     ),
     "kind": ("Kind", "类型"),
@@ -118,8 +119,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     "gain_margin": ("Gain margin", "增益裕度"),
     "overshoot": ("Overshoot", "超调"),
     "rise": ("Rise (10–90 %)", "上升时间（10–90%）"),
-    "settling": ("Settling", "调整时间"),
-    "following": ("Greatest following error", "最大跟随误差"),
+    "settling": ("Settling time", "调节时间"),
+    "following": ("Largest following error", "最大跟随误差"),
     "following_rms": ("Following error, RMS", "跟随误差有效值"),
     "torque_peak": ("Torque peak", "转矩峰值"),
     "torque_rms": ("Torque RMS", "转矩有效值"),
@@ -151,19 +152,19 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "step.verdict": (
         "{kind}: overshoot {overshoot}, settling {settling}.",
-        "{kind}：超调 {overshoot}，调整时间 {settling}。",
+        "{kind}：超调 {overshoot}，调节时间 {settling}。",
     ),
     "move.verdict": (
-        "{kind}: greatest following error {following}, settling {settling}.",
-        "{kind}：最大跟随误差 {following}，调整时间 {settling}。",
+        "{kind}: largest following error {following}, settling {settling}.",
+        "{kind}：最大跟随误差 {following}，调节时间 {settling}。",
     ),
     "no_verdict": (
         "Nothing was measured, so nothing is concluded.",
         "未进行测量，无结论。",
     ),
     "warn.stale": (
-        "{kind}: measured before the last setting was changed; it does not show the axis as it "
-        "is now. Measure it again.",
+        "{kind}: measured before the last setting was changed; it does not show the axis in "
+        "its present state. Measure again.",
         "{kind}：测量早于最后一次设置更改，不代表轴的当前状态。请重新测量。",
     ),
     "warn.unverified": (

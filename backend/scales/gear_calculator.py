@@ -19,7 +19,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from drivers.errors import OutOfRange
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 from profiles.schema import Parameter, Profile
 
 _Length = Annotated[float, Field(gt=1e-6, le=1e6, allow_inf_nan=False)]
@@ -125,7 +125,7 @@ class GearPlan:
     encoder_counts: int
     encoder_travel: float
     range_travel: float
-    warnings: tuple[str, ...]
+    warnings: tuple[Text, ...]
 
 
 def plan_gear(profile: Profile, mechanics: Mechanics, encoder_counts: int | None) -> GearPlan:
@@ -166,7 +166,9 @@ def plan_gear(profile: Profile, mechanics: Mechanics, encoder_counts: int | None
         encoder_travel=float(travel / counts),
         range_travel=float(2**31 * _exact(mechanics.resolution)),
         warnings=tuple(
-            text for text in (uncertainty, *_warnings(mechanics, wanted, reached, counts)) if text
+            found
+            for found in (uncertainty, *_warnings(mechanics, wanted, reached, counts))
+            if found is not None
         ),
     )
 
@@ -254,8 +256,8 @@ def _reached(profile: Profile, raws: dict[str, int], counts: int) -> Fraction:
     return Fraction(raws[spec.feed], turns) / ratio
 
 
-def _check_bounds(profile: Profile, ratio: Fraction) -> str:
-    """Encoder increments per user increment within what the drive accepts; a warning or nothing.
+def _check_bounds(profile: Profile, ratio: Fraction) -> Text | None:
+    """Encoder increments per user increment within what the drive accepts; a warning or None.
 
     Raises:
         OutOfRange: naming the fault that the drive would report.
@@ -263,14 +265,13 @@ def _check_bounds(profile: Profile, ratio: Fraction) -> str:
     gear = profile.functions.gear
     low, high = gear.min_ratio, gear.max_ratio
     if (low is None or ratio >= low) and (high is None or ratio <= high):
-        return ""
+        return None
     limit = f"{low or 0:g} to {high or math.inf:g}"
-    text = (
-        f"{float(ratio):.6g} encoder increments per user increment are outside {limit}; the drive "
-        f"reports {gear.fault or 'a fault'} then"
-    )
     if not gear.strict:
-        return f"{text}. {gear.notes}"
+        return text(
+            "scales.gear-ratio-unusual",
+            value=float(ratio), limit=limit, fault=gear.fault, notes=gear.notes,
+        )  # fmt: skip
     raise OutOfRange(
         "scales.gear-ratio-outside",
         value=float(ratio),
@@ -280,25 +281,18 @@ def _check_bounds(profile: Profile, ratio: Fraction) -> str:
     )
 
 
-def _warnings(mechanics: Mechanics, wanted: Fraction, reached: Fraction, counts: int) -> list[str]:
-    found: list[str] = []
+def _warnings(mechanics: Mechanics, wanted: Fraction, reached: Fraction, counts: int) -> list[Text]:
+    found: list[Text] = []
     if reached > counts:
-        found.append(
-            f"one user increment is finer than the encoder: {float(reached):.6g} increments to "
-            f"{counts} of the encoder per revolution"
-        )
+        found.append(text("scales.gear-finer-than-encoder", reached=float(reached), counts=counts))
     if abs(reached - wanted) > 10 * _EXACT * wanted:
         drift = float(abs(reached - wanted) / wanted)
         over = 1000.0 if mechanics.unit == "mm" else 360.0
         found.append(
-            f"the ratio cannot be written exactly: over {over:g} {mechanics.unit} the axis is off "
-            f"by {drift * over:.2g} {mechanics.unit}, and a rotary axis that runs one way drifts"
+            text("scales.gear-not-exact", over=over, unit=mechanics.unit, drift=drift * over)
         )
     elif mechanics.kind in ("belt", "rack") and (
         mechanics.diameter_mm is not None or mechanics.module_mm is not None
     ):
-        found.append(
-            "π is no fraction: the ratio is rounded to a millionth of a millimetre per turn, and "
-            "the real diameter decides; measure a long move"
-        )
+        found.append(text("scales.gear-pi"))
     return found

@@ -16,10 +16,6 @@ if TYPE_CHECKING:
     from backend.station.bench import Bench
     from backend.station.connected_drive import ConnectedDrive
 
-#: Why no motion may begin on a bus at present.
-_CHANGING = "the cyclic exchange is just being changed"
-_SEARCHED = "drives are being looked for, which may reset those that are there"
-
 
 class Exchanges:
     """For one bench. ``running`` holds the session of each bus by its URL."""

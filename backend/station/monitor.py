@@ -86,7 +86,7 @@ class Snapshot:
     values: dict[str, float | None] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     faults: tuple[Fault, ...] = ()
-    blocked_by: tuple[str, ...] = ()
+    blocked_by: tuple[Text, ...] = ()
     turning: Turning | None = None
     """It turns although nobody may move it."""
 

@@ -26,11 +26,6 @@ _FIRST_RETRY_S = 0.2
 _LAST_RETRY_S = 5.0
 _SEND_TIMEOUT_S = 0.05
 
-_BUS_OFF_REMEDY = (
-    "check the bit rate of every node, the wiring between CAN_H and CAN_L and the termination; "
-    "the adapter is started again by itself"
-)
-
 
 class CanPort:
     """The adapter and its receiving thread.

@@ -211,7 +211,7 @@ def load(station: Station, drive: str, data: bytes, **query: bool) -> Any:
 def test_firmware_goes_only_where_the_profile_says_so(station: Station) -> None:
     refused = load(station, "b", b"x", confirmed=True)
     assert refused.status_code == 409
-    assert "does not say that it takes firmware" in refused.json()["detail"]
+    assert "does not state that it accepts firmware" in refused.json()["detail"]
     asked = load(station, "a", b"x")
     assert asked.status_code == 409
     assert "without firmware" in asked.json()["detail"]

@@ -272,6 +272,7 @@ def test_enabling_while_a_fault_is_present_gives_the_cause(station: Station, x: 
     assert now["faults"][0]["causes"]
     assert now["faults"][0]["remedies"]
     assert any("fault present" in cause for cause in now["blocked_by"])
+    assert "axis.cause-fault" in [message["code"] for message in now["blocked_by_messages"]]
     station.drives.command(do="inject", axis="Feed screw", what="over_temperature", value=0)
     state = station.ok(station.http.post(f"/drives/{x}/fault-reset", json={}))
     assert state["state"] == "Switch on disabled"

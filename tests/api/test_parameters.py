@@ -29,14 +29,14 @@ def test_read_all(station: Station, x: str) -> None:
     # MLink has one register for subindex 0 and 1: nobody can tell them apart there.
     beyond = [row for row in readable if not row["reachable"]]
     assert {"2005:00", "1A02:01", "6502:00"} <= {row["key"] for row in beyond}
-    assert all("MLink cannot tell" in row["unreachable_why"] for row in beyond)
+    assert all("MLink cannot distinguish" in row["unreachable_why"] for row in beyond)
     good = [row for row in readable if row["reachable"]]
     assert result["failed"] == {}
     assert result["read"] == len(good) > 300
     assert all(row["reading"]["raw"] is not None for row in good)
     answer = station.http.put(f"/drives/{x}/parameters/1C12:00", json={"raw": 0})
     assert answer.status_code == 409
-    assert "MLink cannot tell" in answer.json()["detail"]
+    assert "MLink cannot distinguish" in answer.json()["detail"]
 
 
 def test_write_is_read_back_and_reported_to_everybody(station: Station, x: str) -> None:

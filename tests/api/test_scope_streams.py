@@ -275,4 +275,4 @@ def test_many_subscriptions_and_requests_are_refused_in_words(
             page.send(type="scope_start", subscription=number, channels=channels, period_s=1)
         number = live_scope.MOST_SUBSCRIPTIONS + 1
         info = page.wait("scope_info", 20, subscription=number)
-        assert "the most of one page" in info["problem"]["detail"]
+        assert "one page can have at most" in info["problem"]["detail"]

@@ -55,7 +55,7 @@ def step(page: Page, station: Station, axis: str) -> None:
             page.wait_for_timeout(500)
         if amplitude == 180:
             page.get_by_text("Keep", exact=True).click()
-            page.get_by_role("button", name="Keep this picture as reference").click()
+            page.get_by_role("button", name="Keep this view as reference").click()
             page.get_by_text("Measurements", exact=True).click()
     page.wait_for_timeout(1500)
 

@@ -24,7 +24,7 @@ def test_a_hold_lasts_through_a_busy_moment_and_the_page_says_so(
         assert bench.jog_job()["result"]["reason"] in SILENT
     else:
         raise AssertionError("no hold of eight lasted")
-    expect(page.get_by_text("There was a hiccup of")).to_be_visible()
+    expect(page.get_by_text("The signal was interrupted for")).to_be_visible()
 
 
 def test_a_release_in_a_busy_moment_is_final(laptop: Page, bench: Bench) -> None:

@@ -58,17 +58,17 @@ def test_from_the_code_to_the_roles(page: Page, people: People, station: Station
     page.locator("form button[type=submit]").click()
 
     panel = page.locator("section", has=page.get_by_role("heading", name="This station"))
-    expect(panel).to_contain_text("which network port leads to the drives")
+    expect(panel).to_contain_text("choose the network ports of the drives")
     office = panel.get_by_label("Port of the office")
     expect(office).to_have_value("eth0")
     panel.get_by_label("Name in the network").fill("Cabinet-3")
     panel.get_by_label("Port of the drives").select_option("eth0")
-    panel.get_by_role("button", name="Keep").click()
+    panel.get_by_role("button", name="Save").click()
     expect(panel).to_contain_text("eth0 cannot be the EtherCAT port and the office's")
     assert read(station.folder / "state") is None
 
     panel.get_by_label("Port of the drives").select_option("eth1")
-    panel.get_by_role("button", name="Keep").click()
+    panel.get_by_role("button", name="Save").click()
     expect(panel).to_contain_text("cabinet-3: EtherCAT on eth1, office on eth0.")
     assert read(station.folder / "state") == Box("cabinet-3", "eth1", "eth0")
     expect(panel.get_by_label("Name in the network")).to_have_count(0)

@@ -108,7 +108,7 @@ def test_tags_search_and_putting_aside(
     expect(phone.get_by_role("article", name="other.sdset")).to_have_count(0)
     expect(row).to_be_visible()
     phone.get_by_label("Search").fill("")
-    phone.get_by_role("button", name="Put other.sdset aside").click()
+    phone.get_by_role("button", name="Archive other.sdset").click()
     phone.get_by_role("dialog").get_by_role("button", name="Archive").click()
     expect(phone.get_by_role("article", name="other.sdset")).to_have_count(0)
     phone.get_by_label("Archived entries").check()
@@ -126,14 +126,14 @@ def test_the_audit_says_who_wrote_what(laptop: Page, bench: Bench) -> None:
     expect(row).to_contain_text("local user")
     expect(row).to_contain_text(GAIN)
     laptop.get_by_role("button", name="Check the chain").click()
-    expect(laptop.get_by_text("The chain is whole")).to_be_visible()
+    expect(laptop.get_by_text("The chain is complete")).to_be_visible()
     with laptop.expect_download() as download:
         laptop.get_by_role("link", name="Export as CSV").click()
     text = download.value.path().read_text("utf-8")
     assert f",{before},{before + 20}," in text
     laptop.get_by_role("main").get_by_label("Axis").select_option("X")
     laptop.get_by_label("Search").fill("no such words")
-    expect(laptop.get_by_text("No entry fits.")).to_be_visible()
+    expect(laptop.get_by_text("No entry matches.")).to_be_visible()
 
 
 # --- stations that share one library -----------------------------------------------------

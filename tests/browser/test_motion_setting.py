@@ -25,7 +25,7 @@ def test_what_moves_is_not_written_in_the_table(laptop: Page, bench: Bench, key:
     expect(row.get_by_role("button", name=re.compile("^Edit"))).to_have_count(0)
     row.click()
     detail = page.get_by_label("Chosen parameter")
-    expect(detail).to_contain_text("Can put energy into the motor")
+    expect(detail).to_contain_text("Can energise the motor")
     expect(detail.get_by_role("textbox")).to_have_count(0)
     # Past the page: refused, with the page that can.
     path = f"/drives/{bench.drive}/parameters/{key}"
@@ -49,7 +49,7 @@ def test_a_setting_that_can_move_needs_reason_and_consent(laptop: Page, bench: B
     expect(value).to_have_value("0")
     value.select_option("1")
     # What for (the reason below), until when, and within what limits the permission is given.
-    for label, fact in (("Until when", "for this one write"), ("Within what limits", "0.001 rev")):
+    for label, fact in (("Valid until", "for this one write"), ("Limits", "0.001 rev")):
         term = dialog.get_by_role("term").filter(has_text=label)
         expect(term).to_be_visible()
         expect(term.locator("xpath=following-sibling::dd[1]")).to_contain_text(fact)

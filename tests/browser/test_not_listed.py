@@ -59,7 +59,7 @@ def test_import_from_the_connect_page(laptop: Page, station: Station, tmp_path: 
     dialog.get_by_label("Name of the new profile").fill("nova_page")
     dialog.get_by_role("button", name="Import", exact=True).click()
     expect(dialog).to_contain_text("Nova N-400")
-    dialog.get_by_text("What was odd about it").click()
+    dialog.get_by_text("Irregularities").click()
     expect(dialog.get_by_role("listitem").first).to_be_visible()
     page.keyboard.press("Escape")
     expect(found.get_by_label("Profile")).to_have_value("nova_page")

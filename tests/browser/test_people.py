@@ -245,7 +245,7 @@ def invited(host: Page, opened: Open, bench: Bench, *allowed: str) -> Page:
     host.get_by_label("Name of the guest").fill("Gert")
     for each in allowed:
         host.get_by_label(each, exact=True).first.check()
-    button(host, "Make an invitation").click()
+    button(host, "Create an invitation").click()
     reported = host.locator(".note.info")
     link = reported.locator(".mono").first.inner_text()
     code = reported.locator("strong.mono").inner_text()
@@ -255,7 +255,7 @@ def invited(host: Page, opened: Open, bench: Bench, *allowed: str) -> Page:
     assert host.evaluate("navigator.clipboard.readText()") == link
     guest = opened(link.split("/", 3)[3])
     guest.get_by_label("Code").fill(code.lower().replace("-", " "))
-    button(guest, "Come in").click()
+    button(guest, "Join").click()
     expect(guest.get_by_text("You are a guest of")).to_be_visible()
     open_axis(guest, bench.drive, "motion")
     guest.get_by_role("heading", level=1).wait_for()
@@ -263,7 +263,7 @@ def invited(host: Page, opened: Open, bench: Bench, *allowed: str) -> Page:
 
 
 def end_visit(host: Page) -> None:
-    button(host, "End the visit").first.click()
+    button(host, "End the session").first.click()
 
 
 def test_a_guest_looks_and_is_seen_and_nothing_more(opened: Open, bench: Bench) -> None:
@@ -275,7 +275,7 @@ def test_a_guest_looks_and_is_seen_and_nothing_more(opened: Open, bench: Bench) 
     expect(guest.get_by_text("a guest may not do this without a grant")).to_be_visible()
     guest.mouse.up()
     button(guest, "Control is free").click()
-    expect(guest.get_by_text("may only look")).to_be_visible()
+    expect(guest.get_by_text("may only view")).to_be_visible()
     assert not bench.moves()
     # The person on site goes where the guest is, and sees the guest's pointer there.
     olaf.get_by_role("link", name="Go to their page").click()
@@ -317,7 +317,7 @@ def test_a_guest_looks_and_is_seen_and_nothing_more(opened: Open, bench: Bench) 
     # Chat stays text, whatever is in it.
     olaf.evaluate("location.hash = '#/people'")
     guest.evaluate("location.hash = '#/people'")
-    guest.get_by_placeholder("A line for everybody here").fill(MARKUP)
+    guest.get_by_placeholder("Message to everybody here").fill(MARKUP)
     button(guest, "Send").click()
     expect(olaf.get_by_text(MARKUP)).to_be_visible()
     end_visit(olaf)

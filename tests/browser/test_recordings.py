@@ -178,7 +178,7 @@ def test_armed_kept_and_bounded_from_the_page(page: Page, bench: Bench) -> None:
     expect(page.get_by_text("No recordings.")).to_be_visible()
     page.get_by_label("Search recordings").fill("")
     page.get_by_text("recording ends when less").click()
-    page.get_by_label("All together at most").fill("7")
+    page.get_by_label("Total at most").fill("7")
     page.get_by_role("button", name="Set", exact=True).click()
     answer = bench.station.http
 

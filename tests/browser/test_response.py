@@ -71,10 +71,10 @@ def test_a_measurement_is_explained(laptop: Page, axis: str) -> None:
         read = tuning.number_in(row(table, kind).inner_text(), "Hz")
         assert read == pytest.approx(truth, rel=0.01)
     # 1.5e-4 behind the spring against 5e-5 before it, and an antiresonance at 100 Hz.
-    reported = page.get_by_text(re.compile("Behind the soft part hangs")).inner_text()
+    reported = page.get_by_text(re.compile("The inertia behind the soft part is")).inner_text()
     assert "medium stiffness" in reported
     assert tuning.number_in(reported, "times") == pytest.approx(3.0, rel=0.05)
-    page.get_by_text("What the shape of the curve tells").click()
+    page.get_by_text("What the shape of the curve shows").click()
     expect(page.get_by_text("tighten the coupling, then put a notch")).to_be_visible()
 
     # Evaluated anew from the raw signals, with what it was taken with.
@@ -117,7 +117,7 @@ def test_a_notch_is_dragged_and_predicted_but_not_written(
     ).click()
     notch = page.get_by_role("slider", name="Notch 1")
     center = page.get_by_label("Centre")
-    expect(page.get_by_text("The drive will do: ")).to_be_visible()
+    expect(page.get_by_text("Effect in the drive: ")).to_be_visible()
     expect(page.get_by_text("with the notches below")).to_be_visible()
     placed = float(notch.get_attribute("aria-valuenow") or "nan")
     assert placed == pytest.approx(RESONANCE_HZ, rel=0.01)
@@ -261,6 +261,6 @@ def test_on_a_phone(phone: Page, axis: str) -> None:
         if name == "response":
             show(page, axis, "Mechanics")
             page.get_by_role("table", name="Resonances").wait_for()
-            page.get_by_text("What the shape of the curve tells").click()
+            page.get_by_text("What the shape of the curve shows").click()
         assert page.evaluate(TOO_SMALL) == [], name
         assert page.evaluate(SIDEWAYS) == 0, name

@@ -38,7 +38,7 @@ def test_a_small_move_teaches_the_scales(laptop: Page, station: Station) -> None
     page, drive = laptop, station.add(5, CAN, "generic402", "N")
     open_axis(page, drive, "overview")
     card = page.locator("section.panel").filter(has=page.get_by_role("heading", name="Scales"))
-    expect(card).to_contain_text("The axis is not moved by unit.")
+    expect(card).to_contain_text("The axis cannot be moved in units.")
     expect(card).to_contain_text("Increments per revolution are unknown.")
     for increments in (1000, 5000):
         card.get_by_label("Increments", exact=True).fill(str(increments))
@@ -48,7 +48,7 @@ def test_a_small_move_teaches_the_scales(laptop: Page, station: Station) -> None
         # How far it went by the drive's own count stands beside what the person confirms.
         until(lambda wanted=increments: abs(moved(card) - wanted) < 20, what=f"{increments} moved")
     card.get_by_label("The shaft turned by").fill("0.5")
-    card.get_by_role("button", name="That is what it turned").click()
+    card.get_by_role("button", name="Confirm this turn").click()
     expect(card).to_contain_text("Position and speed are certain.")
     taught = {each["quantity"]: each for each in scales(station, drive)["scales"]}
     # 5000 increments were half a turn; 1 rpm is 10 of 0.1 rpm.

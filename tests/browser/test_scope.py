@@ -277,7 +277,7 @@ def test_setups_references_and_snapshots_are_kept(page: Page, station: Station, 
     page.get_by_label("Name of this set-up").fill("Following error")
     page.get_by_role("button", name="Save", exact=True).click()
     expect(page.get_by_role("button", name="Use Following error")).to_be_visible()
-    page.get_by_role("button", name="Keep this picture as reference").click()
+    page.get_by_role("button", name="Keep this view as reference").click()
     expect(page.get_by_text("Ref 1 Spindle Velocity actual value")).to_be_visible()
     page.get_by_label("Name (or the time)").fill("before oiling")
     page.get_by_label("Notes").fill("noisy below 10 rpm")

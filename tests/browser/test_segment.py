@@ -141,9 +141,9 @@ def test_an_exchange_that_broke_off_comes_back_and_says_so(laptop: Page, axis: B
     link = axis.station.ok(axis.station.http.get("/buses"))[0]
     assert link["cyclic"]["running"]
     os.kill(host_process(), signal.SIGKILL)
-    reported = page.get_by_text("The exchange broke off and is being set up again by itself")
+    reported = page.get_by_text("The exchange was interrupted and is being restored automatically")
     expect(reported).to_be_visible(timeout=SLOW_MS)
-    expect(page.get_by_role("button", name="Do not set it up again")).to_be_visible()
+    expect(page.get_by_role("button", name="Do not restore it")).to_be_visible()
     segment.command("refuse", slave=1, state="SAFEOP", code=None)
     expect(page.get_by_text("Runs every 1000 µs")).to_be_visible(timeout=SLOW_MS)
     expect(reported).to_have_count(0)

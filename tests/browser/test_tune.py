@@ -125,7 +125,7 @@ def test_place_write_and_take_back_a_notch(page: Page, axis: str, station: Stati
     stored = page.locator("li.measured", has_text="Mechanics").first
     stored.get_by_role("button", name="Show", exact=True).click()
     page.get_by_role("button", name="Notch here").first.click()
-    expect(page.get_by_text("The drive will do: ")).to_be_visible()
+    expect(page.get_by_text("Effect in the drive: ")).to_be_visible()
     page.get_by_role("button", name="Write the notches").click()
     confirm(page, "Write")
     expect(page.get_by_text("Notches were written.")).to_be_visible()

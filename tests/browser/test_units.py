@@ -22,7 +22,7 @@ def test_a_screw_becomes_a_gear_and_is_taken_back(laptop: Page, bench: Bench) ->
     assert bench.raw("6092:01") == before
     plan.get_by_role("button", name="Write the gear").click()
     dialog = page.get_by_role("dialog")
-    expect(dialog).to_contain_text("mean something else")
+    expect(dialog).to_contain_text("changes the meaning")
     dialog.get_by_role("button", name="Write the gear").click()
     # 10 mm of 0.001 mm.
     until(lambda: bench.raw("6092:01") == 10000, what="the feed is written")
@@ -32,8 +32,8 @@ def test_a_screw_becomes_a_gear_and_is_taken_back(laptop: Page, bench: Bench) ->
     _move_in_millimetres(page, bench)
     open_axis(page, bench.drive, "setup")
     bench.write("6092:01", before)
-    page.get_by_role("button", name="Forget the mechanics").click()
-    expect(page.get_by_role("button", name="Forget the mechanics")).to_have_count(0)
+    page.get_by_role("button", name="Delete the mechanics").click()
+    expect(page.get_by_role("button", name="Delete the mechanics")).to_have_count(0)
     open_axis(page, bench.drive, "overview")
     expect(page.get_by_text("Travel", exact=True)).to_have_count(0)
 
@@ -87,7 +87,7 @@ def test_a_gain_is_written_and_undone(laptop: Page, bench: Bench) -> None:
     block.get_by_role("button", name="Write (1)").click()
     # Scale 0.1 Hz.
     until(lambda: bench.raw("2005:03") == 1500, what="the gain is in the drive")
-    expect(block.get_by_text("acts later").first).to_be_visible()
+    expect(block.get_by_text("takes effect later").first).to_be_visible()
     page.locator(".note.info").get_by_role("button").first.click()
     until(lambda: bench.raw("2005:03") == before, what="it is as before")
 
@@ -117,7 +117,7 @@ def test_the_resistor_of_the_manuals_example(laptop: Page, bench: Bench) -> None
     page.get_by_role("button", name="Calculate").click()
     # Equation 9 of manual 004: 24.67 J, and more than both resistors take.
     expect(page.get_by_text("24.67 J")).to_be_visible()
-    expect(page.get_by_text(re.compile("More than built-in and external"))).to_be_visible()
+    expect(page.get_by_text(re.compile("This exceeds the built-in and external"))).to_be_visible()
 
 
 def test_the_course_of_the_brake_is_drawn(laptop: Page, bench: Bench) -> None:
@@ -141,5 +141,5 @@ def test_the_watch_list_is_live_and_stays(laptop: Page, bench: Bench) -> None:
     page.reload()
     open_axis(page, bench.drive, "overview")
     expect(page.locator("ul.watch li").filter(has_text="2040:00")).to_contain_text("°C")
-    page.get_by_role("button", name=re.compile("^Take .* off the list")).first.click()
+    page.get_by_role("button", name=re.compile("^Remove .* from the list")).first.click()
     expect(page.locator("ul.watch li")).to_have_count(0)

@@ -5,6 +5,7 @@ The pages are followed in order, command by command, and the output that they sh
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -51,11 +52,24 @@ def test_page_is_followed(
         call(one)
 
 
+@pytest.mark.parametrize("page", PAGES[:3])
+def test_the_chinese_page_has_the_same_commands(page: str) -> None:
+    """So the replay of the English page is that of the Chinese one, wiring included."""
+    english, chinese = DOCS / page, DOCS / "zh" / page
+    assert [(one.words, one.output) for one in commands(chinese)] == [
+        (one.words, one.output) for one in commands(english)
+    ]
+    sources = re.compile(r"00\d:\d+")
+    assert sources.findall(chinese.read_text("utf-8")) == sources.findall(
+        english.read_text("utf-8")
+    )
+
+
 def test_no_page_is_left_out() -> None:
     with_commands = {
         page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md") if commands(page)
     }
-    assert with_commands == set(PAGES)
+    assert with_commands == {*PAGES, *(f"zh/{page}" for page in PAGES[:3])}
 
 
 def test_shown_lines_are_compared() -> None:

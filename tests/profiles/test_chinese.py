@@ -12,7 +12,7 @@ from profiles.language.overlay import load_overlay, load_shared, parse_overlay
 from profiles.language.texts import check_overlay, texts_of, translations, untranslated
 from profiles.loader import ProfileError
 
-FAMILIES = ("mms7", "ds_c", "ep3e", "m6l", "r6l", "generic402")
+FAMILIES = ("mms7", "ds_c", "ep3e", "m6l", "r6l", "el7", "generic402")
 #: Wrong terms of the term base, with the right one.
 FORBIDDEN = {
     "模数": "取模", "制动器": "抱闸", "去使能": "断使能", "断开使能": "断使能", "共振": "谐振",

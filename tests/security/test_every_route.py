@@ -251,7 +251,7 @@ def test_what_a_page_asked_is_not_done_after_its_connection_ended(
         named = {"X-Servodeck-Connection": page.connection}
         assert rename(cast, named).status_code == 200
     late = until(lambda: refused(rename(cast, named)), 5, "the connection has ended")
-    assert "has ended since: nothing was done" in late.json()["detail"]
+    assert "has ended: nothing was done" in late.json()["detail"]
     assert cast.administrator.ask("POST", "/stop", json={}, headers=named).status_code == 200
     assert rename(cast, {}).status_code == 200, "programs name no connection"
 

@@ -67,7 +67,7 @@ def halls(store: Store, tmp_path: Path) -> tuple[Hall, Hall]:
 def test_what_one_station_measured_is_opened_on_another(halls: tuple[Hall, Hall]) -> None:
     one, two = halls
     lying = one.entry("one")
-    with pytest.raises(NotAllowed, match="no file of this station"):
+    with pytest.raises(NotAllowed, match="not a file of this station"):
         share(two.library, two.index, lying)
     shared = share(one.library, one.index, lying)
     assert (shared.station, shared.name, shared.latest.axis.serial) == ("", f"one {NAME}", 7)
@@ -110,7 +110,7 @@ def test_nothing_that_is_damaged_comes_into_the_folder(
     wrong = one.library.add("measurement", "one no.sdmeas", b"no measurement", Addition())
     for name in ("../up.sdmeas", "one.txt"):
         odd = one.library.add("measurement", name, b"x", Addition())
-        with pytest.raises(NotAllowed, match="no file name"):
+        with pytest.raises(NotAllowed, match="not a file name"):
             fetch(two.library, two.index, odd)
     with pytest.raises(NotAllowed, match="no measurement"):
         fetch(two.library, two.index, wrong)

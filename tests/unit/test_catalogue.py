@@ -209,7 +209,7 @@ def test_files_of_earlier_versions_open_with_their_sentences() -> None:
     assert remedy.words() == str(opened.remedy())
     slower = {"code": "autotune.promise-not-kept", "params": {}}
     inner = {"code": "autotune.slower-than-it-was", "params": {"share": 0.5, "why": slower}}
-    assert "it did not meet its prediction" in Text.from_wire(inner).words()
+    assert "did not confirm its prediction" in Text.from_wire(inner).words()
 
 
 def test_the_page_knows_the_same_earlier_names() -> None:

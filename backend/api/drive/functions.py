@@ -23,7 +23,7 @@ from backend.api.drive.models_functions import (
     WatchUpdate,
 )
 from backend.api.drive.models_parameters import ParameterValue
-from backend.api.errors import NotFound, message_or_none, words_of
+from backend.api.errors import NotFound, message_of, message_or_none, words_of
 from backend.api.models import JobInfo
 from backend.audit.asked import note_before
 from backend.axis.axis import Envelope
@@ -242,7 +242,8 @@ async def plan_gear(connected: TheDrive, request: Mechanics) -> GearPlanInfo:
         acts=limits.acts,
         notes=limits.notes,
         source=limits.source,
-        warnings=list(plan.warnings),
+        warnings=[words_of(each) for each in plan.warnings],
+        warnings_messages=[message_of(each) for each in plan.warnings],
         counted=counted(connected, plan),
     )
 

@@ -59,6 +59,9 @@ class AxisState(Message):
     units: dict[str, str] = Field(description="unit of each of the values above")
     faults: list[ActiveFault]
     blocked_by: list[str] = Field(description="causes that keep the axis from being enabled")
+    blocked_by_messages: list[MessageInfo] = Field(
+        default_factory=list, description="of blocked_by, as code and facts"
+    )
     moving_job: str | None
     turning: TurningInfo | None = Field(
         description="it turns although nobody may move it; None where it does not"

@@ -11,6 +11,7 @@ from backend.api.drive.models_parameters import ParameterValue
 from backend.api.models import Message, Positive
 from backend.functions.regeneration import Verdict
 from backend.scales.gear_calculator import Mechanics
+from backend.tools.wire_message import MessageInfo
 
 
 class PastFaultInfo(Message):
@@ -143,6 +144,9 @@ class GearPlanInfo(Message):
     notes: str
     source: str
     warnings: list[str]
+    warnings_messages: list[MessageInfo] = Field(
+        default_factory=list, description="of warnings, as code and facts"
+    )
     counted: list[str] = Field(description="parameters whose numbers change their meaning")
 
 

@@ -44,8 +44,8 @@ async def first_kept(
     """The first candidate that meets its prediction stays; ``tried`` says why others do not.
 
     ``candidates`` are tried in their order; what is ``promised`` is what was asked for, which a
-    more careful one may keep where it does not reach its own goals. One that only hums is tried
-    again with less gain, as ``softer`` makes it, before a slower one is. The last one that
+    more careful one may keep where it does not reach its own goals. One with torque ripple only
+    is tried again with less gain, as ``softer`` makes it, before a slower one is. The last one that
     ``time_left`` allows is the most careful of all.
 
     Raises:

@@ -212,7 +212,7 @@ async def _pre_checks(axis: Axis, settings: AutotuneSettings) -> AxisFacts:
     drive = axis.drive
     await axis.require_certain_scales()
     if await axis.state() in (State.FAULT, State.FAULT_REACTION):
-        causes = "; ".join(await axis.blocked_by())
+        causes = joined(await axis.blocked_by())
         raise NotAllowed("autotune.axis-has-fault", drive=drive.name, causes=causes)
     if drive.pending:
         raise NotAllowed(

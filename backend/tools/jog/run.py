@@ -23,7 +23,7 @@ from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from drivers.texts import limits
-from drivers.texts.message import text
+from drivers.texts.message import joined, prose, text
 
 PERIOD_S = threshold.PERIOD_S
 TRAVEL_MARGIN_REV = threshold.TRAVEL_MARGIN_REV
@@ -120,7 +120,7 @@ async def _follow(axis: Axis, settings: JogSettings, hold: Hold, start: int) -> 
                 "jog.left-enabled",
                 drive=drive.name,
                 enabled=State.OPERATION_ENABLED.value,
-                why="; ".join(await axis.blocked_by()) or state.value,
+                why=joined(await axis.blocked_by() or [prose(state.value)]),
             )
         _inside(axis, settings, units.position(position - start))
         ahead = start + settings.direction * travel

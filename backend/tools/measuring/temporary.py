@@ -6,13 +6,14 @@ from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 
 from backend.axis.axis import Axis
-from backend.axis.restoring import CLEANUP_TIMEOUT_S, PUT_BACK_LATER, RestoreFailed, shielded
+from backend.axis.restoring import CLEANUP_TIMEOUT_S, RestoreFailed, shielded
 from backend.axis.stop.quick_stop import quick_stop_keys, raise_quick_stop_from
 from backend.drive.optional import existing
 from backend.tools.moves.procedures import run_procedure
 from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
+from drivers.texts.message import joined, text
 from profiles.schema import Raw
 
 
@@ -109,13 +110,13 @@ async def put_back_in_time(axis: Axis, before: Mapping[str, Raw]) -> None:
     except LinkTimeout as error:
         pending = {entry.key: entry.raw for entry in drive.pending_restores.entries}
         left = ", ".join(f"{key} (was {pending[key]})" for key in before if key in pending)
+        advice = (error.remedy_text, text("measuring.not-restored/remedy"))
         raise RestoreFailed(
             "measuring.not-restored-2",
             drive=drive.name,
-            remedy="; ".join(said for said in (error.remedy, PUT_BACK_LATER) if said),
+            remedy=joined(part for part in advice if part is not None),
             cause=error.text,
             left=left,
-            detail="; ".join(said for said in (error.remedy, PUT_BACK_LATER) if said),
         ) from error
 
 

@@ -16,7 +16,7 @@ from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
-from drivers.texts.message import text
+from drivers.texts.message import joined, text
 
 _START_HOMING = 0x10
 
@@ -101,7 +101,7 @@ async def _attained(axis: Axis, settings: HomingSettings, progress: Progress) ->
     while True:
         status = await axis.status_word()
         if drive.decode_state(status) is not State.OPERATION_ENABLED:
-            causes = "; ".join(await axis.blocked_by()) or "it left Operation enabled"
+            causes = joined(await axis.blocked_by() or [text("axis.cause-left-enabled")])
             raise NotAllowed("moves.broke-off-homing", drive=drive.name, causes=causes)
         if not own and status & cia402.STATUS_HOMING_ERROR:
             raise NotAllowed(

@@ -12,7 +12,7 @@ from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, Rejected
-from drivers.texts.message import prose
+from drivers.texts.message import joined, prose, text
 from profiles.functions import DriveIdentification
 
 
@@ -82,7 +82,7 @@ async def _until_done(
     while True:
         elapsed = time.monotonic() - began
         if drive.decode_state(await axis.status_word()) is not State.OPERATION_ENABLED:
-            causes = "; ".join(await axis.blocked_by()) or "it left Operation enabled"
+            causes = joined(await axis.blocked_by() or [text("axis.cause-left-enabled")])
             raise NotAllowed("moves.broke-off-identification", drive=drive.name, causes=causes)
         status = await drive.raw(spec.status_key)
         name = names.get(status, str(status))

@@ -18,13 +18,7 @@ from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
 from drivers.texts import limits
-from drivers.texts.message import text
-
-CONSENT = (
-    "No watchdog of the drive is active on this link: if the cable is pulled or this program dies, "
-    "it keeps the commanded speed or torque until its own travel limit or its emergency stop. "
-    "Go on only with the drive's travel limits active and a hand on the emergency stop."
-)
+from drivers.texts.message import joined, text
 
 
 @dataclass(frozen=True, slots=True)
@@ -339,7 +333,7 @@ async def _still_inside(axis: Axis, watch: _Watch) -> int:
         raws.append(raw)
     status, position, velocity = raws
     if drive.decode_state(status) is not State.OPERATION_ENABLED:
-        causes = "; ".join(await axis.blocked_by()) or "it left Operation enabled"
+        causes = joined(await axis.blocked_by() or [text("axis.cause-left-enabled")])
         raise NotAllowed("moves.stopped-during-move", drive=drive.name, causes=causes)
     moved, shown = abs(units.position(position - watch.start)), envelope.shown
     if moved > envelope.travel_rev * 1.02 + 0.05:

@@ -27,11 +27,6 @@ from drivers.errors import LinkTimeout, NotAllowed, exceeded
 from drivers.halt import HaltCause
 from drivers.link import Link
 
-CONSENT = (
-    "the drive has no watchdog that ends a speed when this computer falls silent: if the cable is "
-    "pulled or the program dies during the measurement, the axis goes on with its last speed "
-    "until its own travel limit or its emergency stop"
-)
 #: Bit 8 of DS_C's status word (003:305).
 _HOMED = 1 << 8
 _WHOLE_RANGE = 2**31

@@ -41,11 +41,6 @@ _DC_SYSTEM_TIME, _DC_OFFSET, _DC_DELAY = 0x910, 0x920, 0x928
 _DC_CONTROL, _DC_ACTIVATE, _DC_START, _DC_CYCLE, _DC_SYNC1 = 0x980, 0x981, 0x990, 0x9A0, 0x9A4
 _ASSIGN = {"rx": 0x1C12, "tx": 0x1C13}
 _READ_ONLY = 0x06010002
-_FIXED = (
-    "its process data are fixed and others than the profile says: import the maker's ESI file of"
-    " this very revision (Connect page, My drive is not listed), or, if that has been done, choose"
-    " another device of the file"
-)
 _SETPOINTS = {0x6040, 0x607A, 0x60FF, 0x6071, 0x60B0, 0x60B1, 0x60B2}
 _SYNC_LEAD_NS = 100_000_000
 _SYNC1_BIT, _SYNC_TRY_S = 0x0400, 3.0

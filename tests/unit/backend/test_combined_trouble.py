@@ -219,7 +219,7 @@ async def test_what_a_page_enabled_loses_its_power_with_it(
     assert servo.number(STATUS) == ENABLED
     await _left(bench, tmp_path, page)
     assert servo.number(STATUS) != ENABLED
-    assert any("loses its power" in entry.text for entry in bench.journal.entries())
+    assert any("is disabled" in entry.text for entry in bench.journal.entries())
 
 
 async def test_who_controls_the_axis_looks_after_it_from_then_on(

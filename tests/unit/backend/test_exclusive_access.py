@@ -91,13 +91,13 @@ async def test_a_question_under_way_ends_before_the_write_and_none_follows_it(
     assert slow.asked == [GAIN, SAVE]
     assert quiet.exclusive.held
     with pytest.raises(
-        ExclusiveAccessHeld, match=r"X axis must not be asked for another 10 s.*stores"
+        ExclusiveAccessHeld, match=r"X axis must not be accessed for another 10 s.*is storing"
     ):
         await quiet.read("2005:03")
     with pytest.raises(ExclusiveAccessHeld):
         await quiet.write("2005:03", 300)
     many = await quiet.read_many(["2005:03", "2005:10"])
-    assert all("must not be asked" in reading.error for reading in many.values())
+    assert all("must not be accessed" in reading.error for reading in many.values())
     assert slow.asked == [GAIN, SAVE]
     saving.cancel()
     await asyncio.wait([saving])
@@ -113,7 +113,7 @@ async def test_a_long_reading_lets_the_storing_in_between(quiet: Drive, slow: Sl
     await turns()
     slow.answers.set()
     many = await reading
-    assert any("must not be asked" in reading.error for reading in many.values())
+    assert any("must not be accessed" in reading.error for reading in many.values())
     assert quiet.exclusive.held
     assert slow.asked[-1] == SAVE
     saving.cancel()

@@ -170,7 +170,7 @@ async def test_no_motion_begins_on_a_bus_that_is_searched(
 async def test_what_was_not_enabled_in_time_is_not_enabled_later(x: ConnectedDrive) -> None:
     """No main power: the loop tried on, and enabled by itself when the power came."""
     loop = Loop(x)
-    with x.axis.granted("a test"), pytest.raises(NotAllowed, match="does not go to"):
+    with x.axis.granted("a test"), pytest.raises(NotAllowed, match="does not change to"):
         await x.axis.go_to_cyclic(loop, State.OPERATION_ENABLED, Mode.CSP, 0.01)  # type: ignore[arg-type]
     assert loop.goals == [State.OPERATION_ENABLED, State.SWITCH_ON_DISABLED]
 
@@ -295,7 +295,7 @@ async def test_a_gear_that_cannot_be_taken_back_is_pending(x: ConnectedDrive, se
     writing, before = await half_a_gear(x, servo)
     servo.mute = True
     servo.gate.set()
-    with pytest.raises(LinkTimeout, match="not put back"):
+    with pytest.raises(LinkTimeout, match="not restored"):
         await writing
     assert {entry.key: entry.raw for entry in x.drive.pending_restores.entries} == before
 

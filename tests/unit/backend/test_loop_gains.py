@@ -51,6 +51,6 @@ def test_gains_without_a_meaning_are_refused_with_what_can_be_done() -> None:
 
 
 def test_a_load_ratio_needs_the_motor() -> None:
-    with pytest.raises(NotAllowed, match="ratio to the motor's") as reported:
+    with pytest.raises(NotAllowed, match="ratio to the motor inertia") as reported:
         plan_gains(drive("m6l"), Gains(1.0, 1.0, 1.0, 1.0), 1e-4)
-    assert "motor's inertia" in (reported.value.remedy or "")
+    assert "motor inertia" in (reported.value.remedy or "")

@@ -35,14 +35,14 @@ TARGET, MODE, CONTROL = "607A:00", "6060:00", "6040:00"
 
 async def test_a_grant_made_by_hand_permits_nothing(x: ConnectedDrive) -> None:
     forged = Grant("x", "", "a forgery", time.monotonic() + 60)
-    with pytest.raises(NotGranted, match="not for it"):
+    with pytest.raises(NotGranted, match="does not cover it"):
         await x.drive.command(TARGET, 1000, forged)
 
 
 async def test_a_grant_is_for_one_drive(x: ConnectedDrive) -> None:
     with (
         x.drive.authority.granted("y", "Y", "move Y") as other,
-        pytest.raises(NotGranted, match="not for it"),
+        pytest.raises(NotGranted, match="does not cover it"),
     ):
         await x.drive.command(TARGET, 1000, other)
 

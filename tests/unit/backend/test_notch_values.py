@@ -151,7 +151,7 @@ def test_levels_become_what_was_measured() -> None:
     # Depths that were not tried are not promised.
     deeper = encode(R6L, "X", 0, Notch(150.0, 75.0, -40.0), None, meaning)
     assert deeper.raw["2007:0F"] == 10
-    with pytest.raises(OutOfRange, match="measured first"):
+    with pytest.raises(OutOfRange, match="measure their effect first"):
         encode(R6L, "X", 0, Notch(150.0, 75.0, -20.0), None)
 
 

@@ -74,7 +74,7 @@ async def test_a_line_too_slow_for_putting_back_names_what_is_left(
         RestoreFailed, match=f"^samples did not come; .*{SPEED} .was 400"
     ) as reported:
         await motion()
-    assert "running server puts them back" in (reported.value.remedy or "")
+    assert "running server restores them" in (reported.value.remedy or "")
     assert [entry.key for entry in x.drive.pending_restores.entries] == [SPEED]
 
 
@@ -133,7 +133,7 @@ async def test_it_is_named_and_put_back_by_itself(
     assert not x.drive.pending_restores
     assert CONTROL not in dict(servo.written), "nothing is enabled or disabled by it"
     lines = [entry.text for entry in bench.journal.entries("x")]
-    assert any("put back: " in line and f"{TORQUE} = 3000" in line for line in lines)
+    assert any("restored: " in line and f"{TORQUE} = 3000" in line for line in lines)
 
 
 async def test_a_drive_that_answers_twice_in_a_row_is_read_and_put_back(

@@ -34,7 +34,7 @@ def test_virtual_buses_are_those_of_the_server(
 
 
 def test_what_is_no_bus_is_asked_of_nobody() -> None:
-    with pytest.raises(OutOfRange, match="no bus URL"):
+    with pytest.raises(OutOfRange, match="not a bus URL"):
         server_for("eth0", None)
 
 
@@ -52,7 +52,7 @@ def test_blocks_are_taken_apart() -> None:
 
 @pytest.mark.parametrize("frame", [b"", b"x" * 60, b"SCKB" + bytes(10)])
 def test_what_is_no_block_is_reported(frame: bytes) -> None:
-    with pytest.raises(ProtocolError, match="no scope block"):
+    with pytest.raises(ProtocolError, match="not a scope block"):
         decode(frame)
 
 

@@ -189,7 +189,7 @@ def test_a_measurement_from_before_the_change_proves_nothing(facts: Facts) -> No
     def warned(changed: Facts) -> str:
         return "\n".join(texts_of(compose(changed, "en")))
 
-    assert "Measure it again" not in warned(facts)
+    assert "Measure again" not in warned(facts)
     step = replace(measured(facts, "step-speed"), saved=at(4))
     loop = measured(facts, "sweep-speed_loop")
     assert "Step of speed: measured before" in warned(replace(facts, measured=(step, loop)))

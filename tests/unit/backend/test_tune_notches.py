@@ -132,4 +132,4 @@ async def test_notches_are_learned_only_where_a_design_can_be_verified_after_it(
     )
     reported = " ".join(str(each) for each in [said, *left.given_up])
     assert ("designed without notches" in reported) is (not fits and before is None)
-    assert ("fewer of their values" in reported) is (fits or before is not None)
+    assert ("at fewer settings" in reported) is (fits or before is not None)

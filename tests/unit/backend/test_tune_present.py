@@ -93,7 +93,7 @@ async def test_without_margins_the_design_comes_back(monkeypatch: pytest.MonkeyP
 async def test_a_prediction_that_was_right_is_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     applied, held, _tried, note = await outcome(monkeypatch, measured_hz=61.0, as_it_was_keeps=True)
     assert (applied.candidate.gains.speed_nms, held) == (2.0, NEW)
-    assert "too little margin" in str(note)
+    assert "margin is too small" in str(note)
 
 
 async def test_cancelled_between_two_verifications_nothing_stays(

@@ -58,9 +58,7 @@ async def test_the_last_one_that_time_allows_is_the_most_careful(
     seen, left = await seen_of(monkeypatch, clock, 43.0, 9.0)
     assert seen == [10.0]
     assert clock.now_s == 1052.0
-    assert str(left.reported()).startswith(
-        "3 designs were not verified, so none of them was applied"
-    )
+    assert str(left.reported()).startswith("3 designs were not verified and not applied")
     # After 44 s one more fits, and it is not the next one.
     seen, left = await seen_of(monkeypatch, clock, 35.0, 9.0)
     assert seen == [10.0, 7.0]

@@ -86,6 +86,18 @@ def test_banned_words_in_messages_and_on_the_page(
     assert [(one.file.name, one.line) for one in prose.words_on_page(terms.load())] == [("x.ts", 1)]
 
 
+def test_banned_words_in_report_and_chinese_files(
+    prose: ModuleType, terms: ModuleType, pages: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    report, overlay = pages / "texts.py", pages / "names.yaml"
+    report.write_text('"ms": ("Greatest sensitivity Ms", "最大灵敏度 Ms"),\n', "utf-8")
+    overlay.write_text('"Resonance": 谐振\n"Set-point": 共振\n', "utf-8")
+    monkeypatch.setattr(prose, "REPORT", report)
+    monkeypatch.setattr(prose, "CHINESE", (overlay,))
+    found = [(one.file.name, one.line) for one in prose.words_elsewhere(terms.load())]
+    assert found == [("texts.py", 1), ("names.yaml", 2)]
+
+
 @pytest.mark.parametrize(("words", "count"), [(30, 0), (31, 1)])
 def test_long_sentences(prose: ModuleType, pages: Path, words: int, count: int) -> None:
     sentence = " ".join(["word"] * words)

@@ -41,7 +41,7 @@ def refused(tmp_path: Path, text: str) -> str:
         ("ds_c", "canopen://virtual0", 128, "outside 1 to 127"),
         ("ds_c", "canopen://virtual0", 0, "outside 1 to 127"),
         ("ds_c", "canopen://socketcan/can0", 1, "answers on no canopen://socketcan/can0"),
-        ("mms7", "usb://virtual0", 1, "no bus URL"),
+        ("mms7", "usb://virtual0", 1, "not a bus URL"),
     ],
 )
 def test_ports_that_a_drive_does_not_have(

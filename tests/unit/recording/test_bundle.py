@@ -155,7 +155,7 @@ def test_what_a_full_disk_does_not_take_is_held_until_it_does(
         on_drives=[],
         buses=SimpleNamespace(opened={}),
     )
-    free, written = [0], "what was held in memory is kept in"
+    free, written = [0], "the data held in memory are stored in"
     monkeypatch.setattr(capture, "free_bytes", lambda _folder: free[0])
     monkeypatch.setattr(capture, "AGAIN_S", 0.01)
 

@@ -56,7 +56,7 @@ async def test_a_loop_from_its_reference() -> None:
 
 async def test_a_stepped_sine_needs_a_loop() -> None:
     async with direct(ONE) as b:
-        with pytest.raises(OutOfRange, match="no loop holds"):
+        with pytest.raises(OutOfRange, match="without a closed loop"):
             await sweep(
                 b.axis, b.session, SweepSettings(WIDE, loop="none", excitation="stepped"), silent()
             )

@@ -63,4 +63,4 @@ async def test_gains_without_margins_make_way_for_a_slower_design_that_says_so()
     assert result.verified is not None
     assert result.verified.kept
     (note,) = (note for note in result.notes if note.code == "autotune.slower-than-it-was")
-    assert "too little margin" in note.words()
+    assert "margin is too small" in note.words()

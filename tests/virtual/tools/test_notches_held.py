@@ -85,7 +85,7 @@ async def test_a_held_axis_learns_its_notches_and_stays_held(
         # A loop that has no room for whatever a notch may be is left alone.
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(notch_in_loop, "safe_centre_hz", lambda *_: None)
-            with pytest.raises(NotAllowed, match="might make it swing"):
+            with pytest.raises(NotAllowed, match="could make the loop oscillate"):
                 await learned(b, found, silent)
         with pytest.raises(NotAllowed, match="no mechanical model"):
             await learned(b, replace(found, model=None), silent)

@@ -111,7 +111,7 @@ async def test_a_606c_that_contradicts_the_position_ends_the_motion(
         with pytest.raises(MotionHalted, match=means) as ended:
             await generate(b.axis, b.session, spin, silent())
         assert ended.value.halt.cause is HaltCause.CONTRADICTION
-        assert "606Ch says" in ended.value.message
+        assert "606Ch reads" in ended.value.message
         assert "rpm, the position says" in ended.value.message
 
 
@@ -160,7 +160,7 @@ async def test_measurements_do_not_compute_from_a_606c_that_is_wrong() -> None:
     """606Ch in another unit than stated, of a slow move: the recording shows it."""
     async with direct(rough(speed_factor=0.5), drive="generic402") as b:
         settings = InertiaSettings(Envelope(2.0, 300.0, 100.0, 30.0), rated_torque_nm=1.27)
-        with pytest.raises((Interrupted, MotionHalted), match="606Ch says"):
+        with pytest.raises((Interrupted, MotionHalted), match="606Ch reads"):
             await inertia(b.axis, b.session, settings, silent())
 
 

@@ -293,7 +293,7 @@ async def test_a_drive_that_falls_silent_is_given_up(bench: Bench, link: Canopen
     await until(lambda: bench.device.value(0x6040) == 6)
     assert _cyclic(link).newest(["speed"], 1.0) == {}
     assert bench.device.value(0x60FF) == 0
-    assert _lost(link, "stopped coming")
+    assert _lost(link, "no more cyclic data")
     bench.node.mute = False
 
 

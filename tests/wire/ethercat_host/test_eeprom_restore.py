@@ -190,7 +190,7 @@ def test_an_identity_that_was_overwritten_is_repaired_from_the_firmware(chip: Ch
     assert [d.field for d in plan.changes] == ["vendor_id", "product_code"]
     chip.carry_out(plan)
     assert chip.truth() == saved
-    with pytest.raises(NotAllowed, match="does not say what it is"):
+    with pytest.raises(NotAllowed, match="does not report its identity"):
         plan_identity(chip.read(), None)
     chip.damage(0, b"\x55")
     with pytest.raises(NotAllowed, match="checksum of the EEPROM is wrong"):
@@ -224,7 +224,7 @@ def test_an_eeprom_that_the_processor_plays_is_left_alone(chip: Chip) -> None:
     plan = plan_restore(chip.read(), Image(saved), DRIVE)
     status = chip.eeprom.status
     chip.eeprom.status = lambda now: status(now) | 0x0020  # type: ignore[method-assign]
-    with pytest.raises(NotAllowed, match="plays the EEPROM"):
+    with pytest.raises(NotAllowed, match="emulates the EEPROM"):
         chip.carry_out(plan)
     assert chip.eeprom.words_written == 0
 

@@ -92,7 +92,7 @@ async def test_killing_the_host_in_motion_stops_the_axis_and_recovers_disabled(r
         await bus.reported("the cyclic exchange runs again; every axis is disabled", within_s=15)
         assert bus.link.process_data.running
         assert not bus.link.process_data.trouble
-        with pytest.raises(LinkLost, match="broke off, the motion has ended"):
+        with pytest.raises(LinkLost, match="was interrupted, the motion has ended"):
             await bus.link.process_data.renew(1)
         here = rig.truth(0, 0x6064)
         await asyncio.sleep(0.3)

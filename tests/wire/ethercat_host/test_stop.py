@@ -139,7 +139,7 @@ def test_no_write_that_waits_follows_a_stop() -> None:
     name, _, error = wire.ended[0]
     assert name == "write"
     assert isinstance(error, NotAllowed)
-    assert "a stop came first" in error.message
+    assert "a stop was sent first" in error.message
     assert not wire.when(ENABLE_MAIL)
 
 

@@ -154,7 +154,7 @@ async def test_a_drive_with_a_bare_eeprom_is_read_whole_and_moved_by_nobody(bus:
         assert entries[0x1018, 4].bit_length == 32
         assert await bus.link.read(BARE, Address(0x3123, 0, "UINT16")) == b"\x23\x01"
         bus.link.attach(BARE, odd_profile())
-        with pytest.raises(NotAllowed, match="EEPROM does not tell where its process data are"):
+        with pytest.raises(NotAllowed, match="EEPROM does not describe its process data"):
             await bus.link.process_data.configure(
                 [CyclicSignal(BARE, Address(0x6064, 0, "INT32"), "position")],
                 [CyclicSignal(BARE, Address(0x607A, 0, "INT32"), "target")],

@@ -165,7 +165,7 @@ def test_a_wrong_checksum_is_shown_and_nothing_is_loaded(wire: Wire) -> None:
     wire.clock.time_ns += 1_000_000_000
     wire.number()
     assert wire.value(0x0502, 2) & 0x1800 == 0x1800, "checksum wrong, not loaded (0502h)"
-    assert wire.value(0x0012, 2) == 0, "no alias"
+    assert wire.value(0x0012, 2) == 0, "not an alias"
     assert wire.value(0x0140, 1) == 0, "no process data interface"
     wire.write(0x0120, b"\x02\x00")
     wire.clock.time_ns += 1_000_000_000

@@ -221,7 +221,7 @@ async def test_search_that_finds_nothing(port: Path) -> None:
 
 def test_wire_refuses_to_replace_a_file(port: Path) -> None:
     port.write_text("precious")
-    with pytest.raises(LinkLost, match="no virtual wire"):
+    with pytest.raises(LinkLost, match="not a virtual wire"):
         PtyWire(port).open()
     assert port.read_text() == "precious"
 

@@ -332,7 +332,7 @@ def test_line_that_never_falls_silent_is_reported() -> None:
     port = ScriptedPort()
     line = line_on(port)
     port.due = [(i * 0.001, b"\x55") for i in range(3000)]
-    with pytest.raises(ProtocolError, match="never falls silent"):
+    with pytest.raises(ProtocolError, match="is never idle"):
         line.read(1, 0, 1)
     assert port.sent == []
 

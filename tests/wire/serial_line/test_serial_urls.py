@@ -57,7 +57,7 @@ def test_options() -> None:
 
 
 @pytest.mark.parametrize(("text", "complaint"), [
-    ("", "no bus URL"), ("/dev/ttyUSB0", "no bus URL"), ("http://x", "no bus URL"),
+    ("", "not a bus URL"), ("/dev/ttyUSB0", "not a bus URL"), ("http://x", "not a bus URL"),
     ("mlink://", "names no adapter"), ("modbus:///", "names no adapter"),
     ("mlink:///x?parity=E&parity=N", "twice"), ("mlink:///x?parity=Q", "N \\(none\\)"),
     ("mlink:///x?baudrate=fast", "whole number"), ("mlink:///x?baudrate=-1", "whole number"),

@@ -3859,6 +3859,11 @@ export interface components {
              * @description causes that keep the axis from being enabled
              */
             blocked_by: string[];
+            /**
+             * Blocked By Messages
+             * @description of blocked_by, as code and facts
+             */
+            blocked_by_messages?: components["schemas"]["MessageInfo"][];
             /** Dc Voltage */
             dc_voltage: number | null;
             /** Drive */
@@ -6274,6 +6279,11 @@ export interface components {
             wanted: number;
             /** Warnings */
             warnings: string[];
+            /**
+             * Warnings Messages
+             * @description of warnings, as code and facts
+             */
+            warnings_messages?: components["schemas"]["MessageInfo"][];
         };
         /**
          * GearValueInfo

@@ -28,7 +28,7 @@ describe('a message of the server', () => {
       'x: no design met its prediction in the verification: y',
     )
     expect(words('en', { code: 'autotune.promise-not-kept', params: {} })).toBe(
-      'it did not meet its prediction when it was verified',
+      'the verification did not confirm its prediction',
     )
   })
   it('has a remedy behind its code', () => {

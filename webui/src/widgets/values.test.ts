@@ -174,6 +174,15 @@ describe('filters', () => {
     const wanted = { filter: 'all' as const, group: 'Gains', search: '' }
     expect(select(chinese, wanted, marks).map((each) => each.key)).toHaveLength(2)
   })
+  it('leave reserved parameters out until somebody looks for them', () => {
+    const reserved = row({ key: '2001:1F', name: "Reserved (Don't set)" })
+    const all = [...rows, reserved]
+    const chosen = (search: string) =>
+      select(all, { filter: 'all', group: null, search }, marks).map((each) => each.key)
+    expect(chosen('')).not.toContain('2001:1F')
+    expect(chosen('2001:1F')).toEqual(['2001:1F'])
+    expect(chosen('reserved')).toEqual(['2001:1F'])
+  })
   it('find a translated parameter in both languages', () => {
     const said = new Map([[rows[0]!.name, '速度环比例增益']])
     const [first] = translatedRows(rows, said)

@@ -1,4 +1,4 @@
-api-handover_drive = { $value } is of a { $profile } drive, { $drive } is a { $profile_drive }
+api-handover_drive = { $value } belongs to a { $profile } drive; { $drive } is a { $profile_drive }
     .remedy = choose a set of the same drive family
 api-handover_drive-twice = { $drive } is named twice in the segment
     .remedy = name each drive once, in the order of the cable
@@ -7,4 +7,4 @@ api-handover_esi-file-not-base64 = the ESI file is not base64
 api-handover_larger-bytes = { $file } is larger than { $max_bytes } bytes
     .remedy = choose another file
 api-handover_no-hand-over = { $drive_name } has no hand-over { $value }
-    .remedy = choose one of the list
+    .remedy = choose one from the list

@@ -1,13 +1,13 @@
-api-scope_no-snapshot-scope = { $value } is no snapshot of the scope: { $first }: { $other_first }
+api-scope_no-snapshot-scope = { $value } is not a snapshot of the scope: { $first }: { $other_first }
     .remedy = take it on the Scope page
 api-scope_no-viewer = there is no viewer.{ $kind }
-api-scope_not-exported-yet = { $value } was not exported yet
+api-scope_not-exported-yet = { $value } has not been exported yet
     .remedy = export it first
 api-scope_server-starting-ending = the server is starting or ending
     .remedy = try again
 api-scope_snapshot-too-large = the snapshot is too large
-    .remedy = show a shorter stretch, or record it
+    .remedy = show a shorter time, or record the signals
 api-scope_viewer-no-version = the viewer has no { $name } of version { $version }
     .remedy = load the page again
-api-scope_viewer-sent-compressed = the viewer is sent compressed
+api-scope_viewer-sent-compressed = the viewer is sent only in compressed form
     .remedy = use a browser

@@ -1,5 +1,5 @@
 api_no = there is no { $path }
-api_no-time-utc = { $moment } is no time in UTC
+api_no-time-utc = { $moment } is not a time in UTC
     .remedy = choose a later or earlier day
 api_nobody-logged = nobody is logged in
     .remedy = log in

@@ -1,11 +1,11 @@
-audit_line-no-entry-audit = line { $number } is no entry of an audit
+audit_line-no-entry-audit = line { $number } is not an entry of an audit
     .remedy = export it with --format jsonl, without a filter
 audit_another-value-kept = the drive keeps { $kept } instead of { $wanted }
 audit_events-lost = { $count ->
     [one] { $count } event
    *[other] { $count } events
-    } found no room
-audit_hash-not-of-anchor = its hash is not that of the anchor, { $anchor }: history was rewritten
+    } could not be stored
+audit_hash-not-of-anchor = its hash differs from that of the anchor, { $anchor }: the history was rewritten
 audit_head-gone = the head of the chain is missing
 audit_end-missing = the chain ended with entry { $ended }; the last one present is { $last }
 audit_anchor-beyond-end = the anchor names entry { $anchor }; the last one present is { $last }

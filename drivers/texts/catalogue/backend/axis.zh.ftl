@@ -1,5 +1,16 @@
 axis_606ch-6064h-opposite-signs = { $drive }：606Ch 与 6064h 符号相反
     .remedy = 请检查极性 607Eh：其位 6 和位 7 应一致；然后再次移动
+axis_cause-a-fault = 存在故障
+axis_cause-fault = 存在故障：{ $faults }
+axis_cause-input = 输入 { $terminal }（{ $function }）有效
+axis_cause-left-enabled = 驱动器已离开运行使能状态（Operation enabled）
+axis_cause-limit-negative = 负限位开关有效
+axis_cause-limit-positive = 正限位开关有效
+axis_cause-local = 驱动器未由总线控制（Remote 位为 0）
+axis_cause-no-mode = 未设置运行模式
+axis_cause-no-power = 无主电源：母线未充电，或 STO 断开
+axis_cause-none = 驱动器未给出原因
+axis_cause-write-settings = { $count } 个参数需执行“写入设置”后生效
 axis_check-load-and-limits = 请检查负载和限值
 axis_cyclic-exchange-runs-already = { $url }：周期通信已在运行
     .remedy = 若要选择其他周期，请先停止通信

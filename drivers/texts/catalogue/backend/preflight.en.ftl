@@ -7,4 +7,4 @@ preflight_ethercat-master-servodeck-uses = an EtherCAT master of servodeck uses 
 preflight_list-preflight-changed-cannot = the list of what the preflight changed cannot be read: { $path }
     .remedy = restart the computer, which restores these settings, and delete the file
 preflight_measurement-failed = the measurement on { $interface } failed: { $reason }
-    .remedy = run the preflight without an interface, and look at what it names first
+    .remedy = run the preflight without an interface, and check its first finding

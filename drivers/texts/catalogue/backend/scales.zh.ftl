@@ -1,5 +1,9 @@
+scales_gear-finer-than-encoder = 一个用户增量比编码器更细：每转 { NUM($reached, format: ".6g") } 个用户增量，编码器每转 { $counts } 个增量
+scales_gear-not-exact = 齿轮比无法精确设置：每 { NUM($over, format: "g") } { $unit } 偏差 { NUM($drift, format: ".2g") } { $unit }，单方向运行的旋转轴会漂移
+scales_gear-pi = 齿轮比含 π，已取整到每转百万分之一毫米；实际直径的影响更大，请用长行程核对
 scales_gear-ratio-outside = { $profile }：每个用户增量对应 { NUM($value, format: ".6g") } 个编码器增量，超出 { $limit }；此时驱动器报告 { $fault }
     .remedy = 请选择更粗或更细的用户增量
+scales_gear-ratio-unusual = 每个用户增量对应 { NUM($value, format: ".6g") } 个编码器增量，超出 { $limit }；此时驱动器报告 { $fault }。{ $notes }
 scales_increments-per-revolution-unknown = { $drive }：每转增量未知，因此无法换算 { $value }
     .remedy = 请在“参数”页面设置进给常数和齿轮比
 scales_missing = { $kind }：缺少 { $replace }

@@ -1,6 +1,6 @@
 computer_ethercat-not-available-servodeck = EtherCAT on { $value } is not available: servodeck runs EtherCAT on Linux only
     .remedy = run servodeck on a computer with Linux at the machine and open its page from here; Modbus, MLink and CANopen by slcan work on this one
-computer_not-available-looks-linux = { $what } is not available: it looks at what Linux says of itself
+computer_not-available-looks-linux = { $what } is not available: it reads information that only Linux provides
     .remedy = run it on the computer with Linux at the machine
 computer_serial-port-no-file = a serial port has no file descriptor on Windows
 computer_shared-memory-not-available = shared memory for { $value } is not available: servodeck runs EtherCAT on Linux only

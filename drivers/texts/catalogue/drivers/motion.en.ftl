@@ -1,4 +1,4 @@
-motion_account-has-another-role = the account of whoever began it has another role
+motion_account-has-another-role = the role of the person who began it was changed
 motion_beyond-limit = { $quantity ->
     [position] position
     [speed] speed
@@ -13,13 +13,13 @@ motion_beyond-limit-in = { $quantity ->
  } { $value } { $unit } is beyond the limit of { $limit } { $unit }: the axis is braked and disabled
 motion_by-door = { $how } ({ $route })
 motion_commanded = it was halted
-motion_contradiction = 606Ch says { NUM($speed, format: ".6g") }, the position says { NUM($from_position, format: ".6g") } (raw units of 606Ch; { $note }): the axis is braked and disabled
+motion_contradiction = 606Ch reads { NUM($speed, format: ".6g") }, the position gives { NUM($from_position, format: ".6g") } (raw units of 606Ch; { $note }): the axis is braked and disabled
 motion_door-assign = choose what a terminal does on the I/O page, with the axis disabled
-motion_door-force = overrule terminals on the I/O page
-motion_door-move = move the axis on the Motion page, which sets limits and a dead-man
+motion_door-force = force terminals on the I/O page
+motion_door-move = move the axis on the Motion page, which sets limits and a dead-man timeout
 motion_door-power = enable the axis and choose its mode on the Motion page
 motion_door-procedure = run the procedure “{ $title }”
-motion_door-set = somebody with the right to move sets it, with the axis disabled
+motion_door-set = a person with the right to move sets it, with the axis disabled
 motion_expired = the setpoints were not renewed in time: the axis is braked and disabled
 motion_following = the following error is beyond its limit
 motion_halted = { $where }: { $cause }
@@ -36,21 +36,21 @@ motion_left-enabled = the drive left Operation enabled: { $by ->
         [others] { " (" }{ $note })
        *[other] { $note }
     }
-motion_lost = the cyclic data stopped coming
+motion_lost = no more cyclic data are received
 motion_measured-contradict = measured position and speed contradict each other
-motion_move-axis-permission-hand = { $drive }: { $parameter } can move the axis, and the permission at hand is not for it
+motion_move-axis-permission-hand = { $drive }: { $parameter } can move the axis, and the present permission does not cover it
     .remedy = begin the motion anew on the Motion page
 motion_moved-already = { $drive } is moved already: { $purpose }
     .remedy = wait for it to end, or stop it
-motion_nobody-asked-motion-not = { $drive }: nobody asked for this motion, so it is not begun
+motion_nobody-asked-motion-not = { $drive }: this motion was not requested, so it is not begun
     .remedy = begin it on the Motion page
 motion_permission-move-ended = { $drive }: { $purpose }: the permission to move has ended: { $why }
     .remedy = begin the motion anew when it is safe
 motion_position = the position is beyond its limit
-motion_put-energy-motor-not = { $drive }: { $parameter } { $key } can put energy into the motor, so it is not written as a parameter
-motion_session-is-over = the session of whoever began it is over
+motion_put-energy-motor-not = { $drive }: { $parameter } { $key } can energise the motor, so it is not written as a parameter
+motion_session-is-over = the session of the person who began it has ended
 motion_speed = the speed is beyond its limit
 motion_stop-was-pressed = STOP was pressed
-motion_time-is-over = its time is over
+motion_time-is-over = its time has ended
 motion_torque = the torque is beyond its limit
 motion_unfit = a setpoint does not fit its object: the axis is braked

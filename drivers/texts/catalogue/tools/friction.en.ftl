@@ -1,10 +1,10 @@
 friction_actual-torque-not-change = { $drive }: its actual torque ({ $parameter }) does not change during a reciprocating move; friction cannot be computed from it
     .remedy = use a drive or a bus that reports the actual torque with every cycle
-friction_between-rpm-rpm-fastest = between { NUM($slowest_rpm, format: ".3g") } rpm and { NUM($fastest_rpm, format: ".3g") } rpm, the fastest speed that the limits of travel and speed leave, there is nothing to map
+friction_between-rpm-rpm-fastest = no speed is left to map between { NUM($slowest_rpm, format: ".3g") } rpm and { NUM($fastest_rpm, format: ".3g") } rpm, the fastest speed that the limits of travel and speed permit
     .remedy = permit more travel or speed, or ask for a lower slowest speed
 friction_first-short-move = a first short move
 friction_going-back-evaluating = going back and evaluating
-friction_no-speed-held-evenly = no speed was held evenly in both directions, so that there is no friction to map
+friction_no-speed-held-evenly = no speed was held evenly in both directions, so there is no friction to map
     .remedy = tune the speed loop first, or permit higher speeds
 friction_speeds-friction-map-take = the speeds of a friction map take longer than { NUM($time_s, format: "g") } s
     .remedy = allow more time, or ask for fewer speeds

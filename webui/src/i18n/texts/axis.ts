@@ -8,15 +8,15 @@ export const axis = {
     '读取全部参数，与文件或出厂值比较。',
   ],
   'next.mechanics': [
-    'Say what the motor drives, so that units and limits are those of the machine.',
+    'Describe the mechanics, so that units and limits are those of the machine.',
     '说明电机带动什么，使单位和限制与机器一致。',
   ],
   'next.terminals': [
-    'See that switches and brake are wired to what they should do.',
+    'Check that switches and brake are wired to their functions.',
     '确认开关和抱闸的接线与功能相符。',
   ],
   'next.jog': [
-    'Hold a button and look: right direction, right distance, free travel. Then home.',
+    'Hold a button and check direction, distance and free travel. Then home the axis.',
     '按住按钮观察：方向、距离正确，行程无阻。然后回零。',
   ],
   'next.tune': [
@@ -62,15 +62,15 @@ export const axis = {
   'log.error': ['error', '错误'],
   'procedures.title': ['Procedures', '操作流程'],
   'procedures.stopped': [
-    'Nothing moves: it is refused while the axis is enabled.',
+    'No motion: the procedure is refused while the axis is enabled.',
     '不会产生运动：轴使能时会被拒绝。',
   ],
   'procedures.which.write_settings': [
-    'Changed values in the drive that act from then on ({count}):',
+    'Changed values in the drive that take effect with this ({count}):',
     '以下 {count} 个已修改的值已在驱动器中，执行后生效：',
   ],
   'procedures.none.write_settings': [
-    'No changed value waits for it: nothing will be different.',
+    'No changed value is pending: nothing will change.',
     '没有等待生效的修改值：执行后不会有任何变化。',
   ],
   'procedures.safe.write_settings': [
@@ -82,11 +82,11 @@ export const axis = {
     '以下 {count} 个值尚未保存，保存后下次启动仍有效：',
   ],
   'procedures.none.save': [
-    'No value is known to be unsaved: what the drive has now is stored once more.',
+    'No unsaved value is known: the present values are stored again.',
     '没有已知的未保存值：将再次存储驱动器当前的全部值。',
   ],
   'procedures.safe.save': [
-    'The drive stores all its other parameters along with them, as they are.',
+    'The drive also stores the present values of all other parameters.',
     '驱动器会同时存储其余所有参数的当前值。',
   ],
   'procedures.steps': ['What is done ({count} {count|step|steps})', '执行内容（{count} 步）'],
@@ -105,7 +105,7 @@ export const axis = {
   'motion.disable': ['Disable', '断使能'],
   'jog.title': ['Jog', '点动'],
   'jog.help': [
-    'Moves only while a button is held. Letting go, leaving the window, hiding the tab or losing the connection stops the axis. A hiccup of the page or the network for 200 ms brakes it; it goes on if the hold is back within half a second. The travel limit counts from where the jog begins.',
+    'Moves only while a button is held. Releasing the button, leaving the window, hiding the tab or losing the connection stops the axis. An interruption of the page or the network for 200 ms brakes it; the motion continues if the signal returns within 500 ms. The travel limit counts from the start of the jog.',
     '仅在按住时运动。松开、离开窗口、隐藏标签页或断开连接都会停止轴。页面或网络中断 200 毫秒时轴会制动；若半秒内恢复按住信号则继续运动。行程限制从点动起点计算。',
   ],
   'jog.pad': ['Jog: hold the left or right arrow key', '点动：按住左或右方向键'],
@@ -116,21 +116,21 @@ export const axis = {
   'jog.minus': ['Held: negative', '按住：负向'],
   'jog.keys': ['Keyboard: focus this area, then hold ← or →.', '键盘：聚焦此区域后按住 ← 或 →。'],
   'jog.invalid': ['Fill in speed, acceleration and limits first.', '请先填写速度、加速度和限制。'],
-  'jog.taken': ['Something else moves the axis now: {title}.', '轴正由其他任务移动：{title}。'],
+  'jog.taken': ['Another job moves the axis now: {title}.', '轴正由其他任务移动：{title}。'],
   'jog.ending': [
-    'The jog comes to its end: the axis brakes, is switched off, and gets its settings back.',
+    'The jog is ending: the axis brakes, is disabled, and its settings are restored.',
     '点动正在结束：轴制动、断使能并恢复设置。',
   ],
   'jog.gap': [
-    'Hiccup: no sign of life from this page for {ms} ms. The axis brakes; it goes on if you keep holding and the page is back within 500 ms.',
+    'Interruption: no signal from this page for {ms} ms. The axis brakes; it continues if you keep holding and the signal returns within 500 ms.',
     '短暂中断：本页面 {ms} 毫秒无响应。轴正在制动；若继续按住且页面在 500 毫秒内恢复，轴将继续运动。',
   ],
   'jog.gapOver': [
-    'There was a hiccup of {ms} ms: the axis braked and went on. The network is slow, or this device is busy.',
+    'The signal was interrupted for {ms} ms: the axis braked and continued. The network is slow, or this device is busy.',
     '发生了 {ms} 毫秒的短暂中断：轴制动后继续运动。网络较慢，或本设备繁忙。',
   ],
   'jog.gapEnded': [
-    'The signs of life of this page stopped, so the axis braked.',
+    'The signal of this page stopped, so the axis braked.',
     '本页面的响应中断，因此轴已制动。',
   ],
   'jog.ended': ['Ended: {reason}', '已结束：{reason}'],
@@ -140,25 +140,25 @@ export const axis = {
   'reason.pointer cancelled': ['pointer cancelled', '触控被取消'],
   'reason.another key': ['another key or button', '按下了其他按键'],
   'reason.the page fell silent': [
-    'this device was too busy to keep up the hold. Close other programs and tabs, then hold again',
+    'this device was too busy to keep the signal alive. Close other programs and tabs, then hold again',
     '本设备过于繁忙，无法维持按住。请关闭其他程序和标签页后再按住',
   ],
   'reason.no sign of life from the page for 500 ms': [
-    'no sign of life from the page for 500 ms. Is the network slow, or this device busy? Hold again',
+    'no signal from the page for 500 ms: the network is slow, or this device is busy. Hold again',
     '页面 500 毫秒无响应。网络慢或设备繁忙？请重新按住',
   ],
   'reason.no sign of life from the page for 200 ms': [
-    'no sign of life from the page for 200 ms. Is the network slow, or this device busy? Hold again',
+    'no signal from the page for 200 ms: the network is slow, or this device is busy. Hold again',
     '页面 200 毫秒无响应。网络慢或设备繁忙？请重新按住',
   ],
   'reason.cancelled': ['stopped', '已停止'],
   'start.not': ['Not begun.', '未开始。'],
   'start.noConnection': [
-    'There is no connection to the server. It comes back by itself; then press again.',
+    'There is no connection to the server. It is restored automatically; then press again.',
     '与服务器的连接已断开，会自动恢复；恢复后请再按一次。',
   ],
   'start.noAnswer': [
-    'The drive did not answer when the button was pressed. Press again once it does; look at cable and supply if it stays away.',
+    'The drive did not answer when the button was pressed. Press again once it answers; otherwise check cable and supply.',
     '按下时驱动器无应答。恢复应答后请再按一次；若一直无应答，请检查电缆和供电。',
   ],
   'start.incomplete': [
@@ -170,7 +170,7 @@ export const axis = {
     '有限值为空或不允许。请填写“运动之前”中的限值。',
   ],
   'start.agree': [
-    'This is done only with your consent. Read what stands above and tick the box there.',
+    'This requires your consent. Read the text above and tick the box there.',
     '需要您的同意才能执行。请阅读上方说明并勾选。',
   ],
   'start.noExchange': [
@@ -194,18 +194,18 @@ export const axis = {
     '以给定速度运行指定时间后停止。',
   ],
   'move.help.PT': [
-    'Holds a torque for the time given, then stops. A free axis speeds up.',
+    'Holds a torque for the time given, then stops. An axis without load accelerates.',
     '保持给定转矩指定时间后停止。空载轴会加速。',
   ],
   'move.target': ['Target', '目标'],
   'move.speedLimit': ['Speed limit', '速度限制'],
-  'move.relative': ['Relative to where the axis stands', '相对当前位置'],
+  'move.relative': ['Relative to the present position', '相对当前位置'],
   'move.timeout': ['Give up after', '超时'],
   'move.time': ['Run for', '运行时间'],
   'move.start': ['Start the move', '开始移动'],
   'move.consentText': [
-    'No watchdog of the drive is active on this link: if the cable is pulled or this program dies, it keeps the commanded speed or torque until its own travel limit or its emergency stop.',
-    '此链路上没有驱动器看门狗在起作用：如果拔掉电缆或程序终止，它会保持指令速度或转矩，直到其行程限位或急停。',
+    'WARNING: no watchdog of the drive is active on this link. If the cable is pulled or this program ends, the axis keeps the commanded speed or torque until its travel limit or the emergency stop acts.',
+    '警告：此链路上没有驱动器看门狗在起作用。如果拔掉电缆或程序终止，它会保持指令速度或转矩，直到其行程限位或急停。',
   ],
   'move.consent': [
     'I agree for this one move. The drive’s travel limits are active and a hand is on the emergency stop.',
@@ -253,7 +253,7 @@ export const axis = {
   'homing.fast': ['Speed during search for switch', '寻找开关速度'],
   'homing.slow': ['Speed during search for zero', '寻找原点速度'],
   'homing.offset': ['Home offset', '原点偏移'],
-  'homing.empty': ['What is left empty stays as it is in the drive.', '留空的项保持驱动器中的值。'],
+  'homing.empty': ['Empty fields keep the value in the drive.', '留空的项保持驱动器中的值。'],
   'homing.start': ['Start homing', '开始回零'],
   'homing.limit': ['limit switch', '限位开关'],
   'homing.home': ['home switch', '原点开关'],

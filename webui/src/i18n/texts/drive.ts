@@ -36,7 +36,7 @@ export const drive = {
   'procedure.Save to the drive': ['Save to the drive', '保存到驱动器'],
   'procedure.Store parameters': ['Store parameters', '存储参数'],
   'procedure.Store nothing of what is written from now on': [
-    'Store nothing of what is written from now on',
+    'Do not store values written from now on',
     '此后写入的内容不存储',
   ],
   'procedure.Store what is written from now on': [

@@ -6,7 +6,7 @@ export const handover = {
   'handover.openNamed': ['Hand {name} over to the controller', '将 {name} 移交给控制器'],
   'handover.title': ['Hand over to the controller', '移交给控制器'],
   'handover.lead': [
-    'A controller writes its own start-up list at every boot and so overwrites what was tuned. Nothing here writes to a drive.',
+    'A controller writes its own start-up list at every boot and thereby overwrites the tuning. Nothing here writes to a drive.',
     '控制器每次启动都会写入自己的启动列表，从而覆盖整定结果。此处的操作不会写入驱动器。',
   ],
   'handover.format': ['Controller', '控制器'],
@@ -36,7 +36,7 @@ export const handover = {
   'handover.fileBad': ['Letters, digits, space, dot, dash', '仅限字母、数字、空格、点、短横'],
   'handover.esi': ["The drives' ESI files", '驱动器的 ESI 文件'],
   'handover.esiHelp': [
-    'With it mailboxes, sync managers, clock and frames are complete. Without it an ENI cannot be run by a master.',
+    'With it mailboxes, sync managers, clock and frames are complete. Without it a master cannot run the ENI.',
     '提供后，邮箱、同步管理器、时钟和帧完整。若不提供，主站无法运行该 ENI。',
   ],
   'handover.segment': [
@@ -55,7 +55,7 @@ export const handover = {
   'handover.download': ['Download {name}', '下载 {name}'],
   'handover.leftOut': ['Left out, and why', '略去的参数及原因'],
   'handover.hash': ['Checksum (SHA-256): {sum}', '校验和（SHA-256）：{sum}'],
-  'handover.notes': ['To heed', '注意事项'],
+  'handover.notes': ['Note', '注意事项'],
   'handover.compareTitle': ['What will the controller overwrite?', '控制器会覆盖哪些值？'],
   'handover.compareHelp': [
     "Choose the controller's list: it is compared with this set and with the drive as it is now.",
@@ -72,7 +72,7 @@ export const handover = {
     '控制器不会覆盖此参数集的任何值。',
   ],
   'handover.restored': [
-    'The drive holds other values than this set here; the controller writes those of the set: {keys}',
+    'These values in the drive differ from this set; the controller writes those of the set: {keys}',
     '以下参数在驱动器中与此参数集不同，控制器会写入参数集的值：{keys}',
   ],
   'handover.unknownHere': [
@@ -80,7 +80,7 @@ export const handover = {
     '因参数集和驱动器均无值而未比较：{keys}',
   ],
   'handover.unreadNow': [
-    'The drive gave no value of these, so whether the controller changes them there is not known; compare again: {keys}',
+    'The drive gave no value of these, so it is not known whether the controller changes them. Compare again: {keys}',
     '驱动器未给出以下参数的值，因此不知道控制器是否会更改它们，请重新比较：{keys}',
   ],
   'handover.notWritten': [
@@ -106,7 +106,7 @@ export const handover = {
     '控制器将更改限值 {name}。',
   ],
   'handover.says.unit': [
-    'The controller will change units or gearing: every position and speed then means something else.',
+    'The controller will change units or gearing: the meaning of every position and speed changes.',
     '控制器将更改单位或电子齿轮：此后所有位置和速度的含义都会改变。',
   ],
   'handover.says.motion': [
@@ -122,7 +122,7 @@ export const handover = {
   'handover.defect.twice': ['Written twice: the last value counts', '重复写入：以最后的值为准'],
   'handover.defect.order': ['Written after what depends on it', '写入顺序错误：晚于依赖它的参数'],
   'handover.defect.state': [
-    'Written in a transition that is not on the way up',
+    'Written in a transition outside start-up',
     '在非启动过程的状态转换中写入',
   ],
   'handover.defect.energises': ['Can move the motor', '可能使电机运动'],

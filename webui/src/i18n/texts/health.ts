@@ -2,7 +2,7 @@ import type { Texts } from '../types'
 
 /** Tune page: baseline, comparison and trend of an axis. */
 export const health = {
-  'health.measure': ['Measure a baseline, or otherwise', '测量基线或自定设置'],
+  'health.measure': ['Measure a baseline, or with other settings', '测量基线或自定设置'],
   'health.repeat': ['Repeat the measurements', '重复测量'],
   'health.baseline': [
     'Baseline of {rounds} rounds, signed {when} by {person}',
@@ -13,7 +13,7 @@ export const health = {
     '采用基线的限值：{travel} rev、{speed} rpm、额定转矩的 {torque} %',
   ],
   'health.notIntact': [
-    'The baseline is not what was signed: its checksum differs. Nothing is compared with it; sign a new one.',
+    'The baseline was changed after it was signed: its checksum differs. Nothing is compared with it; sign a new one.',
     '基线与签署时不同：校验和不一致。不与其比较；请签署新的基线。',
   ],
   'health.otherSettings': [

@@ -23,8 +23,8 @@ export const imported = {
   'import.unit.permille': ['‰ of rated torque', '额定转矩的 ‰'],
   'import.rated': ['Rated torque', '额定转矩'],
   'import.constant': ['Torque constant', '转矩常数'],
-  'import.structure': ['What it is of the axis', '在轴上的含义'],
-  'import.structure.unknown': ['not said: response and modes only', '未说明：仅响应和模态'],
+  'import.structure': ['Meaning on the axis', '在轴上的含义'],
+  'import.structure.unknown': ['not stated: response and modes only', '未说明：仅响应和模态'],
   'import.structure.motor_speed': [
     'torque to the speed of the motor: also inertia, notches, gains',
     '转矩到电机速度：另有惯量、陷波、增益',
@@ -34,7 +34,7 @@ export const imported = {
   'import.more': ['Band and drive', '频段与驱动器'],
   'import.filter': ['Filter of the recorded output', '所记录输出的滤波器'],
   'import.filterHelp': [
-    'First-order low-pass; it is taken out before inertia and gains are concluded.',
+    'First-order low-pass; it is removed before inertia and gains are computed.',
     '一阶低通；在得出惯量和增益之前予以扣除。',
   ],
   'import.current': ['Bandwidth of the current loop', '电流环带宽'],
@@ -57,7 +57,7 @@ export const imported = {
     '激励：噪声；局部多项式法。',
   ],
   'import.band': [
-    'The band is where another run of the same machine puts each line, with another excitation of 0.7 to 2 times the level.',
+    'The band shows the range of each line in another run of the same machine, with 0.7 to 2 times the excitation.',
     '置信带表示同一机器以 0.7 至 2 倍幅度的另一激励再次测量时各谱线所在的范围。',
   ],
   'import.inertia': [

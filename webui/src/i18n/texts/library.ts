@@ -21,7 +21,7 @@ export const library = {
   'library.deleted': ['Archived entries', '已归档的条目'],
   'library.count': ['{shown} of {total}', '显示 {shown} / 共 {total}'],
   'library.more': ['Show more', '显示更多'],
-  'library.none': ['Nothing fits.', '没有符合的条目。'],
+  'library.none': ['No entry matches.', '没有符合的条目。'],
   'library.empty': [
     'Nothing is stored yet. Save a parameter set, make a recording or a measurement.',
     '尚无内容。请保存参数集、进行记录或测量。',
@@ -49,9 +49,9 @@ export const library = {
     'Compare version {number}, or go back to it',
     '比较或恢复到版本 {number}',
   ],
-  'library.putAside': ['Put {name} aside', '移除 {name}'],
+  'library.putAside': ['Archive {name}', '归档 {name}'],
   'library.putAsideText': [
-    'It leaves the list; its versions are kept and it can be restored.',
+    'It is removed from the list; its versions are kept and it can be restored.',
     '它将从列表中移除；其版本会保留，可以恢复。',
   ],
   'library.putAsideNow': ['Archive', '归档'],
@@ -76,7 +76,7 @@ export const library = {
   'three.base': ['Common base', '共同基准'],
   'three.noBase': ['none: compare two', '无：两方比较'],
   'three.baseHelp': [
-    'With a base, what changed in the set and what changed in the drive are distinguished.',
+    'With a base, changes of the set and changes of the drive are distinguished.',
     '选择基准后，可区分参数集中的更改和驱动器中的更改。',
   ],
   'three.close': ['Close the comparison', '关闭比较'],
@@ -89,7 +89,7 @@ export const library = {
   'three.status.same': ['same', '相同'],
   'three.status.theirs': ['changed in the set', '参数集中已更改'],
   'three.status.drive': ['changed in the drive', '驱动器中已更改'],
-  'three.status.both': ['both changed alike', '双方更改相同'],
+  'three.status.both': ['both changed in the same way', '双方更改相同'],
   'three.status.conflict': ['conflict', '冲突'],
   'three.status.not_in_theirs': ['not in the set', '参数集中没有'],
   'three.status.not_in_drive': ['not in this drive', '驱动器中没有'],
@@ -101,7 +101,7 @@ export const library = {
     '仅勾选参数集中明确的更改。勾选冲突项则采用参数集的值。',
   ],
   'load.sameMotor': [
-    'The motor is the same: also write what belongs to one motor.',
+    'The motor is the same: also write values that belong to one motor.',
     '电机相同：同时写入仅属于该电机的值。',
   ],
   'page.audit': ['Audit', '审计'],
@@ -173,7 +173,7 @@ export const library = {
   'audit.change': ['Old → new (raw)', '旧值 → 新值（原始）'],
   'audit.outcome': ['Outcome', '结果'],
   'audit.ok': ['good', '正常'],
-  'audit.none': ['No entry fits.', '没有符合的记录。'],
+  'audit.none': ['No entry matches.', '没有符合的记录。'],
   'audit.more': ['Older entries', '更早的记录'],
   'audit.refresh': ['Refresh', '刷新'],
   'audit.export': ['Export as {format}', '导出为 {format}'],
@@ -184,12 +184,12 @@ export const library = {
     '锚点为编号、冒号和 64 位字符。',
   ],
   'audit.whole': [
-    'The chain is whole: {count} {count|entry|entries}. Note this anchor where nobody can change it:',
+    'The chain is complete: {count} {count|entry|entries}. Keep this anchor where nobody can change it:',
     '链完整：共 {count} 条。请将此锚点记在他人无法更改之处：',
   ],
   'audit.broken': ['The chain is broken at entry {number}:', '链在第 {number} 条处断裂：'],
   'audit.problem': [
-    'New entries wait ({count}): the database cannot be written. They are kept until it can.',
+    '{count} new entries wait, because the database cannot be written. They are written once it can.',
     '新记录等待中（{count} 条）：数据库无法写入。恢复后将自动补写。',
   ],
 } satisfies Texts

@@ -13,14 +13,14 @@ export const notListed = {
   'notListed.device': ['Device in this file', '文件中的设备'],
   'notListed.name': ['Name of the new profile', '新配置文件名称'],
   'notListed.nameHelp': [
-    'small letters, digits and underscore; left empty: after the device',
+    'lower-case letters, digits and underscore; empty: name of the device',
     '小写字母、数字和下划线；留空则用设备名',
   ],
-  'notListed.nameBad': ['small letters, digits and underscore', '小写字母、数字和下划线'],
+  'notListed.nameBad': ['lower-case letters, digits and underscore', '小写字母、数字和下划线'],
   'notListed.import': ['Import', '导入'],
   'notListed.fromDrive': ['Read it from the drive itself', '从驱动器读取'],
   'notListed.fromDriveHelp': [
-    'EtherCAT drives may list their own objects, a few CANopen drives carry their EDS. The maker’s file tells more: units, limits and defaults.',
+    'EtherCAT drives may list their own objects, a few CANopen drives carry their EDS. The maker’s file contains more: units, limits and defaults.',
     'EtherCAT 驱动器可列出自身对象，少数 CANopen 驱动器内含 EDS。厂家文件信息更全：单位、限值和默认值。',
   ],
   'notListed.made': [
@@ -28,15 +28,15 @@ export const notListed = {
     '{title}：{count} 个参数，名为 {profile}',
   ],
   'notListed.path': ['To improve it, edit {path}', '如需完善，请编辑 {path}'],
-  'notListed.odd': ['What was odd about it: {count}', '异常之处：{count}'],
+  'notListed.odd': ['Irregularities: {count}', '异常之处：{count}'],
   'notListed.more': ['and {count} more', '以及另外 {count} 项'],
   'notListed.otherProduct': [
-    'The description is of another product: it says vendor {vendor}, product {product}; the drive says vendor {driveVendor}, product {driveProduct}.',
+    'The description is of another product: it states vendor {vendor}, product {product}; the drive reports vendor {driveVendor}, product {driveProduct}.',
     '描述文件属于其他产品：文件为厂家 {vendor}、产品 {product}；驱动器为厂家 {driveVendor}、产品 {driveProduct}。',
   ],
   'notListed.before': [
-    'Before you move it: units and limits are the file’s and may be wrong. Turn the shaft by hand and compare the position, then jog slowly with the motor uncoupled.',
-    '运动之前：单位和限值来自文件，可能有误。请手动转动轴并核对位置，然后在电机脱开负载时低速点动。',
+    'WARNING: units and limits come from the file and may be wrong. Before you move the axis, turn the shaft by hand and compare the position, then jog slowly with the motor uncoupled.',
+    '警告：单位和限值来自文件，可能有误。运动之前请手动转动轴并核对位置，然后在电机脱开负载时低速点动。',
   ],
   'notListed.outcome.repaired': ['repaired', '已修复'],
   'notListed.outcome.left out': ['left out', '已忽略'],
@@ -44,7 +44,7 @@ export const notListed = {
   'notListed.export': ['Export a profile as EDS', '将配置文件导出为 EDS'],
   'notListed.exportNow': ['Export', '导出'],
   'notListed.broken': [
-    'This profile of yours cannot be used: {problem}',
+    'Your profile cannot be used: {problem}',
     '您的这个配置文件无法使用：{problem}',
   ],
   'line.search': ['Search baud rate and parity', '搜索波特率和校验'],
@@ -59,12 +59,12 @@ export const notListed = {
     '所有设置下均无应答。请检查电源、接线和站号。',
   ],
   'port.missing': [
-    'Not connected over {kind}: {count} {count|parameter is|parameters are} only there ({groups}).',
+    'Not connected over {kind}: {count} {count|parameter is|parameters are} available only there ({groups}).',
     '未通过 {kind} 连接：有 {count} 个参数仅在该端口（{groups}）。',
   ],
   'port.missingNothing': ['It can be connected over {kind} too.', '也可以通过 {kind} 连接。'],
   'port.connect': ['Connect {kind} too', '同时连接 {kind}'],
   'port.url': ['Bus URL', '总线 URL'],
   'port.station': ['Station', '站号'],
-  'port.accept': ['It is the same drive: connect even so', '是同一台驱动器：仍然连接'],
+  'port.accept': ['It is the same drive: connect anyway', '是同一台驱动器：仍然连接'],
 } satisfies Texts

@@ -4,11 +4,11 @@ import type { Texts } from '../types'
 export const scales = {
   'scales.title': ['Scales', '标度'],
   'scales.help': [
-    'What a raw value of this drive means, and who says so. While the scale of position or speed is not certain, no tool moves the axis by unit.',
+    'The meaning of a raw value of this drive, and its source. While the scale of position or speed is not certain, no tool moves the axis in units.',
     '该驱动器的原始值代表什么，以及依据来源。位置或速度的标度未确定时，任何工具都不会按单位移动该轴。',
   ],
   'scales.certain': ['Position and speed are certain.', '位置和速度的标度已确定。'],
-  'scales.uncertain': ['The axis is not moved by unit.', '该轴不会按单位移动。'],
+  'scales.uncertain': ['The axis cannot be moved in units.', '该轴不会按单位移动。'],
   'scales.quantity.position': ['Position', '位置'],
   'scales.quantity.velocity': ['Speed', '速度'],
   'scales.quantity.acceleration': ['Ramps', '加减速'],
@@ -25,7 +25,7 @@ export const scales = {
     '每转增量数未知。',
   ],
   'scales.uncertainty.feed_of_one': [
-    '6092h says one unit per revolution beside the encoder of 608Fh: it was never set.',
+    '6092h states one unit per revolution although 608Fh states an encoder resolution: it was never set.',
     '6092h 为每转一个单位，与 608Fh 的编码器不符：该值从未设置。',
   ],
   'scales.uncertainty.unit_and_feed': [
@@ -33,19 +33,16 @@ export const scales = {
     '60A8h 与 6092h 给出的每转单位数不同。',
   ],
   'scales.uncertainty.linear': [
-    'The unit is a length, and how far a revolution goes is unknown.',
+    'The unit is a length, and the travel per revolution is unknown.',
     '单位为长度，而每转行程未知。',
   ],
   'scales.uncertainty.not_stated': [
-    'Neither the drive nor its description says in which unit it is.',
+    'Neither the drive nor its description states the unit.',
     '驱动器及其描述文件均未说明单位。',
   ],
-  'scales.uncertainty.unreadable': [
-    'The unit that is stated is not known here.',
-    '所给单位无法识别。',
-  ],
+  'scales.uncertainty.unreadable': ['The stated unit is not known here.', '所给单位无法识别。'],
   'scales.uncertainty.behind_gear': [
-    'It counts turns, and 6091h holds a gear: of which shaft is not said.',
+    'It counts turns, and 6091h holds a gear ratio: the shaft it refers to is not stated.',
     '以转数计，而 6091h 中设有减速比：未说明是哪根轴。',
   ],
   'scales.uncertainty.needs_resolution': [
@@ -53,12 +50,12 @@ export const scales = {
     '以增量计，而每转增量数未知。',
   ],
   'scales.uncertainty.factor': [
-    '6090h is another resolution than 608Fh, or 6096h or 6097h holds a factor: what the drive makes of it is not said.',
+    '6090h is another resolution than 608Fh, or 6096h or 6097h holds a factor: how the drive uses it is not stated.',
     '6090h 与 608Fh 的分辨率不同，或 6096h、6097h 中设有系数：驱动器如何使用它未予说明。',
   ],
   'scales.teach': ['Teach by a small move', '通过微小移动示教'],
   'scales.teachHelp': [
-    'The axis moves by so many increments within 2 s, with little torque. Mark the shaft and look how far it turns. Begin small: each move may be ten times as long as the one before.',
+    'The axis moves by this number of increments within 2 s, with low torque. Mark the shaft and check how far it turns. Begin small: each move may be ten times as long as the one before.',
     '该轴在 2 秒内以小转矩移动所给增量数。请在轴上做标记，观察转过的角度。从小开始：每次移动最多为前一次的十倍。',
   ],
   'scales.increments': ['Increments', '增量数'],
@@ -69,23 +66,20 @@ export const scales = {
     'After {moved} increments. Not visible? Move further.',
     '移动 {moved} 个增量后。看不出？请移动更多。',
   ],
-  'scales.confirm': ['That is what it turned', '确认转角'],
+  'scales.confirm': ['Confirm this turn', '确认转角'],
   'scales.reported': [
     '606Ch showed {value} per increment per second.',
     '606Ch 每增量每秒对应 {value}。',
   ],
-  'scales.toldNothing': [
-    '606Ch showed nothing that goes with the position.',
-    '606Ch 的值与位置不相符。',
-  ],
+  'scales.toldNothing': ['606Ch did not follow the position.', '606Ch 的值与位置不相符。'],
   'scales.state': ['State from a data sheet', '按数据手册给定'],
   'scales.countsPerRev': ['Increments per revolution', '每转增量数'],
   'scales.rawPerRpm': ['Raw speed of 1 rpm', '1 rpm 的原始速度值'],
   'scales.rawPerRpmS': ['Raw ramp of 1 rpm/s', '1 rpm/s 的原始加速度值'],
-  'scales.keep': ['Keep', '保存'],
-  'scales.forget': ['Forget what was said', '清除给定值'],
+  'scales.keep': ['Save', '保存'],
+  'scales.forget': ['Delete the stated values', '清除给定值'],
   'scales.expired': [
-    'What was said holds for another gear or unit of the drive, and does not count now.',
+    'The stated values apply to another gear or unit of the drive and are not valid now.',
     '给定值对应驱动器的其他减速比或单位，目前无效。',
   ],
 } satisfies Texts

@@ -17,11 +17,11 @@ export const segment = {
   'segment.cable.errors': ['errors', '有错误'],
   'segment.cable.broken': ['no link', '无连接'],
   'segment.brokenBetween': [
-    'Nothing comes through between station {before} and station {station}: cable cut, or the supply of station {station} is off. It is taken up again by itself.',
+    'No communication between station {before} and station {station}: cable cut, or the supply of station {station} is off. It is connected again automatically.',
     '站 {before} 与站 {station} 之间无通信：电缆断开，或站 {station} 断电。恢复后自动重新连接。',
   ],
   'segment.brokenFirst': [
-    'Nothing comes through between the computer and station {station}: cable cut, or its supply is off. It is taken up again by itself.',
+    'No communication between the computer and station {station}: cable cut, or its supply is off. It is connected again automatically.',
     '计算机与站 {station} 之间无通信：电缆断开，或该站断电。恢复后自动重新连接。',
   ],
   'segment.clear': ['Clear error counters', '清除错误计数'],
@@ -31,7 +31,7 @@ export const segment = {
   'segment.late50': ['Late, half of all', '延迟，中位数'],
   'segment.late99': ['Late, 99 %', '延迟，99 %'],
   'segment.lateMax': ['Latest', '最大延迟'],
-  'segment.dcNow': ['Off the reference clock', '与参考时钟偏差'],
+  'segment.dcNow': ['Deviation from the reference clock', '与参考时钟偏差'],
   'segment.dcMax': ['Largest deviation', '最大偏差'],
   'segment.histogram': [
     'How late cycles began: number of cycles per lateness (logarithmic)',
@@ -56,30 +56,30 @@ export const segment = {
   'segment.forwarded': ['Forwarded RX errors', '上游损坏'],
   'segment.writeAlias': ['Write alias', '写入别名'],
   'segment.aliasWarning': [
-    'Written to the drive’s EEPROM, valid after its supply was switched off and on. Machines whose controller addresses drives by alias must be reported. Nothing may move on this bus meanwhile.',
+    'The alias is written to the drive’s EEPROM and takes effect after a power cycle. If a controller addresses drives by alias, change it there as well. Nothing may move on this bus meanwhile.',
     '写入驱动器 EEPROM，断电重启后生效。若控制器按别名寻址，需同步修改。写入期间此总线上不得有运动。',
   ],
   'segment.eeprom': ['EEPROM', 'EEPROM 存储器'],
   'segment.eepromWhat': [
-    'What the controller of this drive knows of it. Save it before anything is changed: the file restores a drive whose EEPROM was damaged or overwritten.',
-    '驱动器的控制器所保存的信息。更改之前请先保存：EEPROM 损坏或被覆盖时可用该文件恢复。',
+    'Identity and memory layout of this drive. Save it before any change: the file restores a drive whose EEPROM was damaged or overwritten.',
+    '驱动器的标识和存储布局。更改之前请先保存：EEPROM 损坏或被覆盖时可用该文件恢复。',
   ],
   'segment.eepromSave': ['Save to a file', '保存到文件'],
   'segment.eepromChoose': ['Compare with a saved file', '与已保存的文件比较'],
   'segment.eepromIdentity': ['Compare identity with the firmware', '与固件比较标识'],
   'segment.eepromUnknown': [
-    'The file is of this very drive, although the drive cannot say what it is',
+    'The file belongs to exactly this drive, although the drive reports no identity',
     '文件确属该驱动器，尽管驱动器无法说明自己的标识',
   ],
-  'segment.eepromSame': ['The EEPROM is like this already', 'EEPROM 已与此相同'],
+  'segment.eepromSame': ['The EEPROM is identical already', 'EEPROM 已与此相同'],
   'segment.eepromChanges': ['What would change', '将更改的内容'],
   'segment.eepromField': ['Field', '字段'],
   'segment.eepromNow': ['Now', '现在'],
   'segment.eepromThen': ['Then', '之后'],
   'segment.eepromSerial': ['The drive keeps its own serial number.', '驱动器保留自己的序列号。'],
   'segment.eepromWarning': [
-    '{words} words are written. With wrong contents the drive does not start. Nothing may move on this bus meanwhile.',
-    '将写入 {words} 个字。内容错误时驱动器将无法启动。期间该总线上不得有任何运动。',
+    'NOTICE: {words} words are written. With wrong contents the drive does not start. Nothing may move on this bus meanwhile.',
+    '注意：将写入 {words} 个字。内容错误时驱动器将无法启动。期间该总线上不得有任何运动。',
   ],
   'segment.eepromSaved': ['The present contents are saved to a file', '当前内容已保存到文件'],
   'segment.eepromSure': [
@@ -88,7 +88,7 @@ export const segment = {
   ],
   'segment.eepromWrite': ['Write the EEPROM', '写入 EEPROM'],
   'segment.eepromWritten': [
-    'Written and read back. It counts after the drive was switched off and on.',
+    'Written and read back. It takes effect after a power cycle.',
     '已写入并读回。驱动器断电重启后生效。',
   ],
   'segment.aliasSure': ['I want to change the EEPROM', '我确认修改 EEPROM'],
@@ -99,8 +99,8 @@ export const segment = {
   'segment.loadFirmware': ['Load firmware', '下载固件'],
   'segment.chooseFirmware': ['Choose a file…', '选择文件…'],
   'segment.firmwareWarning': [
-    'An interrupted download can leave the drive without firmware, and it cannot be cancelled. Save the parameters to a file first, have the right file for exactly this drive, and switch nothing off.',
-    '下载中断可能导致驱动器无固件，且无法取消。请先将参数保存到文件，确认文件适用于该驱动器，期间不得断电。',
+    'NOTICE: an interrupted download can leave the drive without firmware, and it cannot be cancelled. Save the parameters to a file first, use only the file for exactly this drive, and switch nothing off.',
+    '注意：下载中断可能导致驱动器无固件，且无法取消。请先将参数保存到文件，确认文件适用于该驱动器，期间不得断电。',
   ],
   'segment.firmwareSure': [
     'This is the right file, and nothing will be switched off',
@@ -118,10 +118,10 @@ export const segment = {
     'EtherCAT 需要原始帧权限。执行后请重启 servodeck。虚拟调试台无需这些权限。',
   ],
   'segment.recovering': [
-    'The exchange broke off and is being set up again by itself; every axis stays disabled until you enable it. Reason:',
+    'The exchange was interrupted and is being restored automatically; every axis stays disabled until you enable it. Reason:',
     '周期通信中断，正在自动恢复；恢复后所有轴保持断使能，需手动使能。原因：',
   ],
-  'segment.endRecovery': ['Do not set it up again', '不再恢复'],
+  'segment.endRecovery': ['Do not restore it', '不再恢复'],
   'segment.doctor': ['Why not in Operational?', '为何未进入 Operational？'],
   'segment.doctorStation': ['Station {station}', '站点 {station}'],
   'segment.doctorWell': ['is in Operational', '已处于 Operational'],

@@ -4,7 +4,7 @@ import type { Texts } from '../types'
 export const tour = {
   'tour.title': ['Guided tour', '引导教程'],
   'tour.offer': [
-    'Learn the way from jog to undo on a virtual axis in five minutes. No real machine is connected. An axis moves only when you press its button.',
+    'Learn the steps from jog to undo on a virtual axis in five minutes. No real machine is connected. An axis moves only when you press its button.',
     '用五分钟在虚拟轴上学习从点动到撤销的流程。没有连接真实机器。只有在您按下按钮时轴才会运动。',
   ],
   'tour.start': ['Start the tour', '开始教程'],

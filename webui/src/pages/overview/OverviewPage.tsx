@@ -10,6 +10,7 @@ import { quantity } from '../../widgets/format'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { Procedures } from '../../widgets/Procedures'
+import { Said } from '../../widgets/Said'
 import { useAction } from '../../widgets/useAction'
 import { useRecord } from '../../widgets/useFunctions'
 import { ScalesPanel } from './ScalesPanel'
@@ -165,8 +166,10 @@ export function Blocked({ state }: { state: AxisState | null }) {
     <div className="note warn">
       <strong>{t('overview.blocked')}</strong>
       <ul>
-        {state.blocked_by.map((cause) => (
-          <li key={cause}>{cause}</li>
+        {state.blocked_by.map((cause, n) => (
+          <li key={cause}>
+            <Said message={state.blocked_by_messages?.[n]} words={cause} />
+          </li>
         ))}
       </ul>
     </div>

@@ -76,9 +76,14 @@ const texts = (row: ParameterRow) => [row.name, row.group, ...Object.values(row.
 /** The name of a row's group that does not change with the language. */
 const groupOf = (row: ShownRow) => (row.original ?? row).group
 
+/** A row that the manual keeps for the maker: shown only to who looks for it. */
+const isReserved = (row: ShownRow) => /^reserved\b/i.test((row.original ?? row).name)
+
 export function select(rows: ShownRow[], wanted: Wanted, marks: Marks): ShownRow[] {
+  const everything = wanted.filter === 'all' && wanted.search.trim() === ''
   return rows.filter(
     (row) =>
+      !(everything && isReserved(row)) &&
       (wanted.group === null || groupOf(row) === wanted.group) &&
       passes(row, wanted.filter, marks) &&
       matches(row, wanted.search),

@@ -9,6 +9,7 @@ import { ProblemNote } from '../../widgets/ProblemNote'
 import { ProcedureButton } from '../../widgets/Procedures'
 import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { useSay } from '../../widgets/profile-text/texts'
+import { Said } from '../../widgets/Said'
 import { useAction } from '../../widgets/useAction'
 import { setRecord } from '../../widgets/useFunctions'
 import { type Form, KINDS } from './mechanics'
@@ -234,9 +235,9 @@ function PlanPanel({
           ))}
         </tbody>
       </table>
-      {plan.warnings.map((text) => (
+      {plan.warnings.map((text, n) => (
         <p key={text} className="note warn">
-          {text}
+          <Said message={plan.warnings_messages?.[n]} words={text} />
         </p>
       ))}
       {plan.acts && <p>{t('gear.acts', { acts: say(plan.acts) })}</p>}
