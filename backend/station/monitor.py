@@ -114,7 +114,7 @@ class Monitor:
         self._task: asyncio.Task[None] | None = None
         self._wake = asyncio.Event()
         self._last: dict[str, Reading] = {}
-        self._last_causes: list[str] = []
+        self._last_causes: list[Text] = []
         self._waiting: list[str] = []
         self._asked_s = -math.inf
         # All axes at the same instant would keep everybody else waiting for their sum.
