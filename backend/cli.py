@@ -109,8 +109,8 @@ COMMANDS = {
     ),
     "cycle": (
         "tools:cycle",
-        "Torque, heat and braking energy of the machine's own cycle, by reading or from a "
-        "recording. Nothing is written, nothing moves.",
+        "Torque, speed, heat and braking energy of the machine's own cycle, from reading the drive "
+        "or from a recording. Nothing is written and nothing is moved.",
     ),
     "autotune": (
         "tune:autotune",

@@ -1006,3 +1006,12 @@ class sweep_speed_injection:
     UPPER = 0.75
     """[ratio] Only above this share of the lines does the reference alone make the torque. Origin:
     7166e5a3 with benchmarks/tune_accuracy."""
+
+
+class sweep_texts:
+    """`sweep/texts.py`: phase margin in deg, gain margin in dB and Ms of a loop."""
+
+    SOUND = (45.0, 8.0, 2.0)
+    """[deg, dB, ratio] A loop is called sound from here. Origin: docs/tuning.md."""
+    POOR = (30.0, 6.0, 2.5)
+    """[deg, dB, ratio] Beyond these it is called unsafe. Origin: docs/tuning.md."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import lfilter
+import scipy
 
 from backend.analysis.duty.load import Signals
 
@@ -155,7 +155,7 @@ class _Bodies:
         """What the winding rises above its mean within the repeated load, per unit of loss."""
         decay = float(np.exp(-spacing_s / self._tau_w))
         about = np.concatenate([losses, losses]) - self._copper
-        answer = lfilter([1.0 - decay], [1.0, -decay], about)
+        answer = scipy.signal.lfilter([1.0 - decay], [1.0, -decay], about)
         return float(max(np.max(answer[losses.size :]), 0.0))
 
     def highest(self) -> float:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-import scipy.ndimage
+import scipy
 
 from backend.tools.safety_check.result import (
     Exceeded,

@@ -7,11 +7,9 @@ from typing import Literal
 from backend.tools.autotune.result import VerdictInfo
 from backend.tools.measuring.numbers import fixed, hertz, margin
 from backend.tools.sweep.result import SweepAnswer
+from backend.tools.thresholds import sweep_texts as threshold
 from backend.tools.tool import Cell, Grid, Note, Section
 
-#: docs/tuning.md: 45° or more is calm, 8 dB or more, Ms below 2; and what is no longer sound.
-SOUND = (45.0, 8.0, 2.0)
-POOR = (30.0, 6.0, 2.5)
 _MEASURED = (
     "Measured from {low} to {high}: phase margin {pm}, gain margin {gm}, Ms {ms}, bandwidth {bw}. "
     "A figure that is missing lies outside of that band.",
@@ -173,9 +171,9 @@ def tuned_verdict(result: SweepAnswer, verdict: VerdictInfo) -> Note:
 
 def _judged(figures: tuple[float | None, ...]) -> tuple[Literal["good", "warn", "fault"], str]:
     """Tone and word for a loop; where a figure is missing it is not called sound."""
-    if _within(figures, SOUND):
+    if _within(figures, threshold.SOUND):
         return ("warn", "incomplete") if None in figures else ("good", "good")
-    return ("warn", "warn") if _within(figures, POOR) else ("fault", "fault")
+    return ("warn", "warn") if _within(figures, threshold.POOR) else ("fault", "fault")
 
 
 def _within(figures: tuple[float | None, ...], limits: tuple[float, float, float]) -> bool:

@@ -7,7 +7,7 @@ import pytest
 from drive_sim import TURN, Drive, Mechanics
 from random_axes import ENVELOPE, RATED_NM, Case, errors, facts_of, played
 
-from backend.analysis.mechanics import identify
+from backend.analysis.mechanics import identification_trials
 from backend.analysis.mechanics.fit_problem import CHAIN, Problem, View
 from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
 from backend.analysis.mechanics.mode_uncertainty import ModeUncertainty, mode_uncertainties
@@ -74,7 +74,7 @@ def test_a_balance_that_leaves_realisations_less_alike_is_not_believed(rubbed, m
         directions = [np.roll(r.direction(0.0), 6) for r in given]
         return tuple(replace(r, known_direction=d) for r, d in zip(given, directions, strict=True))
 
-    monkeypatch.setattr(identify, "with_balanced_reversals", late)
+    monkeypatch.setattr(identification_trials, "with_balanced_reversals", late)
     settings = SweepSettings(ENVELOPE)
     again = evaluate(records, 1000.0, facts_of(case), settings, "speed", dc=False)
     assert again.frf.coulomb_nm == pytest.approx(0.1, rel=0.05)
