@@ -88,6 +88,7 @@ class AxisLoop:
         self._pause_left = 0
         self._rest_cycles = max(round(_REST_S / cycle_s), 1)
         self._rested = self._stopping = 0
+        self._brakes_itself = False
         self._stop_cycles = max(round(STOP_S / cycle_s), 1)
         self._mode: int | None = None
         self._motion: Motion | None = None
@@ -285,6 +286,8 @@ class AxisLoop:
     def _fell_out(self, word: int) -> None:
         if self.goal is State.OPERATION_ENABLED:
             self.goal = State.SWITCH_ON_DISABLED
+            self._brakes_itself = self.state is State.QUICK_STOP_ACTIVE
+            self._rested = self._stopping = 0
             self.halted = Halted(
                 HaltCause.LEFT_ENABLED, note=self.state.value, left_by=self._left_by(word)
             )
@@ -433,6 +436,12 @@ class AxisLoop:
         if self.state in (State.FAULT, State.FAULT_REACTION) and not self._reset:
             self.outputs[place] = cia402.DISABLE_VOLTAGE
             return
+        if self._brakes_itself:
+            # A limit switch or the drive itself began a quick stop: power is what it brakes with.
+            if self.state is State.QUICK_STOP_ACTIVE and self._may_brake():
+                self.outputs[place] = self._dialect.quick_stop
+                return
+            self._brakes_itself = False
         if self.goal is State.QUICK_STOP_ACTIVE and self.state not in _ALIVE_STATES:
             if self._stops_unseen():
                 return
@@ -456,8 +465,10 @@ class AxisLoop:
 
         Any other word would take its power away while it brakes.
         """
-        if not self._dialect.echoes_control:
-            return False
+        return self._dialect.echoes_control and self._may_brake()
+
+    def _may_brake(self) -> bool:
+        """Whether the axis did not rest long enough yet, within the time that is waited for it."""
         self._stopping += 1
         self._rested = self._rested + 1 if self._moved <= _RESTLESS else 0
         if self._rested < self._rest_cycles and self._stopping < _GIVE_UP * self._rest_cycles:

@@ -379,6 +379,31 @@ def test_a_drive_that_left_operation_enabled_between_motions_has_a_cause(
         assert text_.words("zh") != text_.words("en")
 
 
+def test_a_quick_stop_of_the_drive_itself_keeps_its_power_until_the_axis_rests() -> None:
+    """CiA 402-2: in Quick stop active the drive brakes; transition 12 takes the power away."""
+    bench = Bench().enabled()
+    bench.play(list(range(500, 50_000, 10)), renew=10_000)
+    bench.step(50)
+    bench.status = 0x0217
+    for speed in (*range(40, 2, -1), *[0] * 40):
+        bench.position += speed
+        bench.step()
+        if bench.axis.phase is Phase.IDLE:
+            bench.axis.drive_to(State.READY, None)
+        assert bench.axis.outputs[0] == 0x02, "neither without power nor enabled anew"
+    bench.step(20)
+    assert bench.axis.outputs[0] == 0x00
+
+
+def test_a_quick_stop_that_does_not_end_is_left_after_a_time() -> None:
+    bench = Bench().enabled()
+    bench.status = 0x0217
+    for _ in range(1510):
+        bench.position += 40
+        bench.step()
+    assert bench.axis.outputs[0] == 0x00
+
+
 def test_an_axis_that_was_never_enabled_is_refused_without_such_a_cause() -> None:
     bench = Bench()
     bench.step()
