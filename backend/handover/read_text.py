@@ -26,6 +26,7 @@ _DOWNLOAD = re.compile(
 _WITH_WORD = {"t": "type", "p": "position", "a": "alias", "m": "master", "d": "domain"}
 _HEADINGS = {"codesys": "line", "csv": "key"}
 _ENTRY = struct.Struct("<HBI")
+_MOST_YAML_LEVELS = 20
 
 
 def is_script(text: str) -> bool:
@@ -132,11 +133,17 @@ def _words(line: str, place: str) -> tuple[dict[str, str], list[str]]:
 
 def ros2(text: str, profile: Profile, slave: int | None) -> Iterator[Listed]:
     """A slave file of ethercat_driver_ros2, or a bus.yml of ros2_canopen."""
-    # Aliases make a small file as large as a bomb, and no slave file has them.
-    for event in yaml.parse(text, yaml.SafeLoader):
+    # Aliases make a small file as large as a bomb, and deep nesting takes a parser minutes. No
+    # slave file has either.
+    depth = 0
+    for event in yaml.parse(text, yaml.CSafeLoader):
         if isinstance(event, yaml.AliasEvent):
             raise BadRow("YAML aliases are not read")
-    content = yaml.safe_load(text)
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > _MOST_YAML_LEVELS:
+            raise BadRow(f"YAML of more than {_MOST_YAML_LEVELS} levels is not read")
+    content = yaml.load(text, yaml.CSafeLoader)
     rows = content.get("sdo") if isinstance(content, dict) else None
     if rows is None and isinstance(content, dict):
         nodes = _bus_nodes(content)
