@@ -157,7 +157,7 @@ async def test_no_motion_begins_on_a_bus_that_is_searched(
     monkeypatch.setattr(servo, "scan", scan)
     searching = asyncio.create_task(bench.buses.scan(URL, None, lambda _share, _text: None))
     await turns()
-    with pytest.raises(Busy, match="looked for"):
+    with pytest.raises(Busy, match="a scan is running"):
         bench.jobs.start("move", "Move X", forever, drive="x", motion=True)
     gate.set()
     await searching

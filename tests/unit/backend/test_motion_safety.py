@@ -302,7 +302,7 @@ async def test_what_a_motion_relies_on_is_not_written_meanwhile(
     assert answer.status_code == 409, answer.text
     # What commands motion is refused whether something moves or not.
     commands = key in ("6060:00", "6040:00", "607A:00")
-    assert ("energy into the motor" if commands else "Move X") in answer.json()["detail"]
+    assert ("can energise the motor" if commands else "Move X") in answer.json()["detail"]
     assert servo.written == []
     await bench.jobs.cancel(job)
 

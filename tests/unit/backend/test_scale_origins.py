@@ -221,7 +221,7 @@ def test_limits_are_said_in_the_units_of_the_axis() -> None:
 def test_a_contradiction_says_both_speeds() -> None:
     rpm = 65_536 / 60
     words = halted(HaltCause.CONTRADICTION, 12 * rpm, 903 * rpm)
-    assert "606Ch says 12 rpm, the position says 903 rpm: the scale of 606Ch" in words
+    assert "606Ch reads 12 rpm, the position gives 903 rpm: the scale of 606Ch" in words
 
 
 def test_two_figures_are_shown_apart() -> None:
