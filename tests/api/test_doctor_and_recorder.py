@@ -192,4 +192,4 @@ def test_the_command_shows_causes_with_facts_and_ends_with_1(station: Station) -
     rows = json.loads(command(station, "doctor", CAN, "--station", "3", "--json", code=1))
     assert rows[0]["station"] == 3
     assert rows[0]["causes"][0]["facts"]
-    assert "the doctor knows" in command(station, "doctor", LINE, code=1)
+    assert "the doctor supports" in command(station, "doctor", LINE, code=1)

@@ -213,7 +213,7 @@ def test_velocity_needs_consent_where_the_drive_has_no_watchdog(station: Station
             "travel_limit": 10, "torque_limit": 200, "timeout_s": 0.5}  # fmt: skip
     job = station.job(station.http.post(f"/drives/{x}/jobs/move", json=body))
     assert job["state"] == "failed"
-    assert "No watchdog" in job["problem"]["detail"]
+    assert "no watchdog" in job["problem"]["detail"]
     result = station.done(
         station.http.post(f"/drives/{x}/jobs/move", json=body | {"consent": True})
     )

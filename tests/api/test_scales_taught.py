@@ -69,7 +69,7 @@ def test_from_refused_to_taught(station: Station) -> None:
         assert "is not certain" in problem["detail"], job
 
     too_far = station.http.post(f"/drives/{drive}/jobs/small_move", json={"increments": 5000})
-    assert "1 to 1000 now" in station.job(too_far, 60)["problem"]["detail"]
+    assert "1 to 1000 increments now" in station.job(too_far, 60)["problem"]["detail"]
     for increments in (1000, 5000):
         body = {"increments": increments}
         moved = station.done(station.http.post(f"/drives/{drive}/jobs/small_move", json=body), 60)

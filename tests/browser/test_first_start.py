@@ -64,7 +64,7 @@ def test_from_the_code_to_the_roles(page: Page, people: People, station: Station
     panel.get_by_label("Name in the network").fill("Cabinet-3")
     panel.get_by_label("Port of the drives").select_option("eth0")
     panel.get_by_role("button", name="Save").click()
-    expect(panel).to_contain_text("eth0 cannot be the EtherCAT port and the office's")
+    expect(panel).to_contain_text("eth0 cannot be both the EtherCAT port and the office port")
     assert read(station.folder / "state") is None
 
     panel.get_by_label("Port of the drives").select_option("eth1")

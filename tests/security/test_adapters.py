@@ -162,7 +162,7 @@ def test_the_command_line_opens_none(tmp_path: Path, listener: Listener) -> None
             capture_output=True, text=True, timeout=100, check=False,
         )  # fmt: skip
         assert ended.returncode != 0
-        assert "no serial port" in ended.stderr + ended.stdout
+        assert "is not a serial port" in ended.stderr + ended.stdout
     assert not (tmp_path / "made").exists()
     assert listener.connected == 0
 

@@ -160,7 +160,7 @@ def require_reported(problem: dict[str, Any], key: str) -> None:
     assert problem["type"] == "urn:servodeck:not-granted", (key, problem)
     assert problem["parameter"] == key
     assert key in problem["detail"]
-    assert "energy" in problem["detail"]
+    assert "can energise the motor" in problem["detail"]
     assert "/api/v1/drives/" in problem["remedy"], problem
 
 

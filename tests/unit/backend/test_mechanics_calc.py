@@ -80,7 +80,7 @@ def test_a_gear_of_sixteen_bits_is_rounded_and_reported() -> None:
     wanted = math.pi * 200 / 0.01 / 10
     assert plan.reached == pytest.approx(10000 * found["2301:00"] / found["2300:00"])
     assert plan.error_ppm == pytest.approx((plan.reached / wanted - 1) * 1e6, rel=1e-3)
-    assert any("cannot be written exactly" in text for text in plan.warnings)
+    assert any("cannot be set exactly" in each.words() for each in plan.warnings)
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_what_follows_from_a_plan() -> None:
 
 def test_an_increment_finer_than_the_encoder_is_reported() -> None:
     plan = plan_gear(load_profile("ds_c"), Mechanics(kind="screw", lead_mm=20), None)
-    assert any("finer than the encoder" in text for text in plan.warnings)
+    assert any("finer than the encoder" in each.words() for each in plan.warnings)
 
 
 def test_a_missing_dimension_is_named() -> None:

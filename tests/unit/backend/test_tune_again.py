@@ -51,7 +51,7 @@ def test_words_say_what_was_predicted_first_and_what_was_verified_then() -> None
     verified: Any = SimpleNamespace(predicted_bandwidth_hz=119.0, measured_bandwidth_hz=117.0)
     text = Again(FIRST, SECOND, "same", gain_ratio=1.0).reported(verified).words()
     assert "118 Hz where 137 Hz was predicted" in text
-    assert "other realisations at 117 Hz, predicted from the loop at 119 Hz" in text
+    assert "other realisations: bandwidth 117 Hz measured, 119 Hz predicted from the loop" in text
     text = Again(FIRST, SECOND, "other", gain_ratio=0.87).reported(verified).words()
     assert "with 87% of the speed gain" in text
     for outcome in ("time", "unclear", "none", "not kept"):

@@ -97,6 +97,8 @@ async def test_a_ramp_that_a_drive_cannot_do_is_refused_in_the_unit_that_was_typ
     drive = Drive("x", "Low axis", profile, [Port(MemoryLink({}), 3, spec)])
     units = AxisUnits(profile.units, 10000.0)
     assert ramp_raw(units, drive, "6083:00", 1500.0) == 2000
-    with pytest.raises(OutOfRange, match="Low axis: 600 rpm/s is gentler") as refused:
+    with pytest.raises(
+        OutOfRange, match="Low axis: 600 rpm/s is below the lowest acceleration"
+    ) as refused:
         ramp_raw(units, drive, "6083:00", 600.0)
     assert refused.value.limit == "at least 1500 rpm/s"

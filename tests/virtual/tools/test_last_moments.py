@@ -110,7 +110,9 @@ async def test_a_load_that_the_drive_cannot_hold_is_not_measured() -> None:
             return await read_many(station, addresses)
 
         b.link.read_many = pulled  # type: ignore[method-assign]
-        with pytest.raises(Interrupted, match=r"turns with .* to hold it") as reported:
+        with pytest.raises(
+            Interrupted, match=r"turns at .* although its speed loop commands standstill"
+        ) as reported:
             await sweep(b.axis, b.session, SweepSettings(WIDE), Progress(lambda: None))
         assert "torque limits" in (reported.value.remedy or "")
         assert await b.axis.state() is not State.OPERATION_ENABLED

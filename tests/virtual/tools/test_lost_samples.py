@@ -111,7 +111,7 @@ async def test_a_realisation_that_lost_samples_is_played_again(
         settings = SweepSettings(WIDE, loop=loop, realisations=1)
         records: Any = await sweep(b.axis, b.session, settings, progress)
     assert len(late.long) == 4, "both realisations, and each of them once more"
-    again = "measuring, realisation {} of 2: once more, since samples were lost"
+    again = "measuring, realisation {} of 2: repeated, because samples were lost"
     assert {again.format(n) for n in (1, 2)} <= set(steps)
     assert [e.excitation.realisation for e, _ in records] == [0, 0]
     for sequence, recording in records:
@@ -144,7 +144,7 @@ async def test_what_is_played_again_is_shared_where_a_period_is_whole_already(
         late = Late(b, set(range(100)))
         await sweep(b.axis, b.session, SweepSettings(WIDE, realisations=1), progress)
     assert len(late.long) == 4
-    assert "measuring, realisation 2 of 2: once more, since samples were lost" in steps
+    assert "measuring, realisation 2 of 2: repeated, because samples were lost" in steps
 
 
 async def test_what_was_before_a_motion_is_no_part_of_it_however_late_it_comes() -> None:

@@ -112,7 +112,7 @@ async def test_a_606c_that_contradicts_the_position_ends_the_motion(
             await generate(b.axis, b.session, spin, silent())
         assert ended.value.halt.cause is HaltCause.CONTRADICTION
         assert "606Ch reads" in ended.value.message
-        assert "rpm, the position says" in ended.value.message
+        assert "rpm, the position gives" in ended.value.message
 
 
 @pytest.mark.parametrize("bus", ["ethercat", "canopen"])
@@ -249,7 +249,7 @@ async def test_a_small_move_teaches_resolution_and_unit(bus: str) -> None:
         units = await b.axis.units()
         assert units.scales.position.uncertainty is Uncertainty.NO_RESOLUTION
         assert units.scales.velocity.uncertainty is Uncertainty.NOT_STATED
-        with pytest.raises(OutOfRange, match="1 to 1000 now"):
+        with pytest.raises(OutOfRange, match="1 to 1000 increments now"):
             await small_move(b.axis, b.session, SmallMoveSettings(5_000), silent())
         for increments in (500, 5_000):
             await small_move(b.axis, b.session, SmallMoveSettings(increments), silent())

@@ -90,12 +90,12 @@ async def test_what_the_loop_shows_is_predicted_and_verified_by_other_data() -> 
     assert len(reported.closed_db or ()) == len(reported.frequency_hz or ()) > 0
 
 
-@pytest.mark.parametrize("step", ["4 of 6: designing for", "6 of 6: measuring"])
+@pytest.mark.parametrize("step", ["4 of 6: design for", "6 of 6: measuring"])
 async def test_cancelled_in_the_second_look_everything_is_as_before(step: str) -> None:
     await found_tight()
     async with direct(LOOSE, _CYCLE_S) as b:
         before = await settings_of(b.axis.drive)
-        second = At("4 of 6: designing for", lambda: None)
+        second = At("4 of 6: design for", lambda: None)
 
         def seen() -> None:
             second.progress(at.fraction, at.step)

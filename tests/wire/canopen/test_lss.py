@@ -114,7 +114,7 @@ async def test_several_nodes_with_numbers_are_not_distinguished_by_a_guess(
 
 
 async def test_a_number_that_somebody_has_is_refused(bench: Bench, link: CanopenLink) -> None:
-    with pytest.raises(NotAllowed, match="answers as number 5"):
+    with pytest.raises(NotAllowed, match="number 5 already answers"):
         await link.lss.set_node(truth(bench.node), 5, store=False)
     assert bench.node.node_id == 255
 

@@ -301,13 +301,13 @@ async def test_watchdogs_are_in_the_slaves(rig: Rig) -> None:
 async def test_a_refused_mapping_names_drive_and_reason(rig: Rig) -> None:
     async with rig.link() as bus:
         wish = [CyclicSignal(1, Address(0x2001, 1, "UINT16"), "odd")]
-        with pytest.raises(NotAllowed, match=r"station 1 does not take these process data"):
+        with pytest.raises(NotAllowed, match=r"station 1 does not accept these process data"):
             await bus.link.process_data.configure(wish, [], 0.001)
         rig.do("refuse", slave=0, state="SAFEOP", code=0x0025)
         with pytest.raises(NotAllowed, match=r"refuses SAFEOP.*invalid output mapping"):
             await bus.link.process_data.configure(inputs(1), outputs(1), 0.001)
         bus.link.attach(1, servo_profile())
-        with pytest.raises(NotAllowed, match="takes cycles of 250 to 10000"):
+        with pytest.raises(NotAllowed, match="accepts cycles of 250 to 10000"):
             await bus.link.process_data.configure(inputs(1), outputs(1), 0.02)
         with pytest.raises(NotAllowed, match="configure the cyclic data first"):
             await bus.link.process_data.start()

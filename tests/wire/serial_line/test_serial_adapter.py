@@ -72,7 +72,7 @@ async def test_cable_pulled_and_put_back(port: Path, opened: OpenLink) -> None:
         await link.read(1, STATUS)
         slave.wire.pull()
         assert not slave.wire.is_open
-        with pytest.raises(LinkLost, match="gone"):
+        with pytest.raises(LinkLost, match="disappeared"):
             await link.read(1, STATUS)
         results = await link.read_many(1, [STATUS, CONTROL])
         assert all(isinstance(r, LinkLost) for r in results)
