@@ -1,9 +1,12 @@
-import type { ReactNode } from 'react'
+import { type ReactNode, useState } from 'react'
 import { useT } from '../../i18n'
 import { Icon } from '../../widgets/Icon'
 import type { Section, useSections } from './sections'
 
-/** One step of the path under its title, which opens and folds it; what was typed stays. */
+/**
+ * One step of the path under its title, which opens and folds it; what was typed stays. What was
+ * never open is not drawn: values of the axis come many times a second, and draw all forms anew.
+ */
 export function Fold({
   of,
   name,
@@ -26,6 +29,8 @@ export function Fold({
 }) {
   const t = useT()
   const open = of.isOpen(name)
+  const [seen, setSeen] = useState(open)
+  if (open && !seen) setSeen(true)
   return (
     <details
       id={`step-${name}`}
@@ -48,7 +53,7 @@ export function Fold({
           </small>
         )}
       </summary>
-      <div className="stack">{children}</div>
+      <div className="stack">{seen && children}</div>
     </details>
   )
 }
