@@ -50,18 +50,22 @@ def _inputs(link: MemoryLink, raw: int, mode: int = 1) -> None:
     }
 
 
+async def _hints(drive: Drive) -> list[str]:
+    return [cause.words() for cause in await hints(drive)]
+
+
 async def test_an_active_stop_input_is_named(profile: Profile, link: MemoryLink) -> None:
     _inputs(link, 1 << 18)
-    assert await hints(_drive(profile, link)) == ["input DI3 (emergency stop) is active"]
+    assert await _hints(_drive(profile, link)) == ["input DI3 (emergency stop) is active"]
 
 
 @pytest.mark.parametrize(
     ("bit", "swapped", "words"),
     [
-        (0, False, "the negative limit switch is on"),
-        (1, False, "the positive limit switch is on"),
+        (0, False, "the negative limit switch is active"),
+        (1, False, "the positive limit switch is active"),
         # R6L: bit 0 is the forward limit (002:13914).
-        (0, True, "the positive limit switch is on"),
+        (0, True, "the positive limit switch is active"),
     ],
 )
 async def test_limit_switches_are_named(
@@ -69,13 +73,13 @@ async def test_limit_switches_are_named(
 ) -> None:
     _inputs(link, 1 << bit)
     quirks = [Quirk(kind="limit_bits_swapped", key="60FD:00", help="", source="t")]
-    assert await hints(_drive(profile, link, *quirks[: int(swapped)])) == [words]
+    assert await _hints(_drive(profile, link, *quirks[: int(swapped)])) == [words]
 
 
 async def test_a_missing_mode_is_named(profile: Profile, link: MemoryLink) -> None:
     quirk = Quirk(kind="mode_before_enable", key="6061:00", help="", source="t")
     _inputs(link, 0, mode=0)
-    assert await hints(_drive(profile, link, quirk)) == ["no mode of operation is set"]
+    assert await _hints(_drive(profile, link, quirk)) == ["no mode of operation is set"]
     assert await hints(_drive(profile, link)) == []
 
 

@@ -42,7 +42,7 @@ def test_errors_are_in_chinese(arguments: tuple[str, ...], environment: dict[str
 
 def test_option_wins_over_the_locale() -> None:
     done = servodeck("--language", "en", "scan", "nobus://", LANG="zh_CN.UTF-8")
-    assert done.stderr.startswith("error: 'nobus://' is no bus URL")
+    assert done.stderr.startswith("error: 'nobus://' is not a bus URL")
 
 
 def test_unknown_language_names_the_choices() -> None:

@@ -92,7 +92,7 @@ async def test_a_cleanup_that_fails_does_not_hide_why_it_was_due() -> None:
     await job.wait()
     assert isinstance(job.error, LinkLost)
     assert str(job.error) == (
-        "the axis was braked; x: restoring took longer than 0.01 s and was given up;"
+        "the axis was braked; x: restoring took longer than 0.01 s and was aborted;"
         " the drive does not answer"
     )
     assert job.error.remedy is not None

@@ -61,7 +61,7 @@ async def test_a_line_that_loses_samples_each_time_is_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     trial, left = beside(monkeypatch, [0, 1, 0, 9])
-    with pytest.raises(NotAllowed, match="X: samples were lost in 3 tries") as reported:
+    with pytest.raises(NotAllowed, match="X: samples were lost in 3 consecutive tries") as reported:
         await trial._played(None, lambda _: None)
     assert reported.value.remedy
     assert left == [9]

@@ -85,9 +85,9 @@ async def test_without_margins_the_design_comes_back(monkeypatch: pytest.MonkeyP
     applied, held, tried, note = await outcome(monkeypatch, measured_hz=90.0, as_it_was_keeps=False)
     assert (applied.candidate.gains.speed_nms, applied.before) == (2.0, WAS)
     assert held == NEW
-    assert [each.words() for each in tried] == ["as it was: phase margin"]
-    assert "with 29% of the speed gain" in str(note)
-    assert "did not meet its prediction" in str(note)
+    assert [each.words() for each in tried] == ["previous settings: phase margin"]
+    assert "with 29% of the previous speed gain" in str(note)
+    assert "did not confirm its prediction" in str(note)
 
 
 async def test_a_prediction_that_was_right_is_believed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -61,7 +61,10 @@ def test_a_broken_file_is_refused_in_words(folder: Path) -> None:
         (["import", "@none.eds"], "none.eds: No such file"),
         (["import", "@good.eds", "--name", "a/b"], "'a/b' cannot be the name of a profile"),
         (["import", "@good.eds", "--name", "mms7"], "there is a profile 'mms7' already"),
-        (["import", "@good.xml", "--product-code", "many"], "--product-code 'many' is no number"),
+        (
+            ["import", "@good.xml", "--product-code", "many"],
+            "--product-code 'many' is not a number",
+        ),
         (["from-drive", "mlink:///x", "--name", "A"], "'A' cannot be the name"),
         (["export-eds", "mms7", "@"], "could not be written: Is a directory"),
     ],
