@@ -277,9 +277,7 @@ async def test_another_drive_after_a_break_is_refused_in_words(rig: Rig) -> None
         cyclic = bus.link.process_data
         cyclic._setup["identities"][2][2] = 4711
         os.kill(bus.link._host.pid or 0, signal.SIGKILL)
-        await bus.reported(
-            "could not be set up again: another drive than before answers at station 2"
-        )
+        await bus.reported("could not be set up again: a different drive now answers at station 2")
         assert not cyclic.running
         assert "another drive" in cyclic.trouble
         with pytest.raises(NotAllowed, match="no axis can be enabled before that"):
