@@ -43,6 +43,7 @@ _REMEDY = (
     "kernel.apparmor_restrict_unprivileged_userns=0; in a container, its security profile), or "
     "run as root"
 )
+_KEEP_TIME = ("drivers.virtual.", "drivers.ethercat.process")
 
 
 class NamespaceUnavailable(Exception):
@@ -230,13 +231,21 @@ def _hold(names: Sequence[str]) -> int:
     return 0
 
 
+def _keeps_time(argv: Sequence[str]) -> bool:
+    """Whether a command stands for hardware, or is the master beside it, by the time of the clock.
+
+    Where time follows the frames, priority would only let setpoints expire while who renews them
+    waits for the processor. A server or a recorder would keep all others waiting.
+    """
+    return "--lockstep" not in argv and any(word.startswith(_KEEP_TIME) for word in argv)
+
+
 def _main(argv: Sequence[str]) -> int:
     if argv[:1] == ["--hold"]:
         return _hold(argv[1:])
     if len(argv) > 3 and argv[0] == "--join" and argv[2] == "--":
-        # Where time follows the frames, priority would only let setpoints expire while who renews
-        # them waits for the processor. Elsewhere: inside, nobody may ask for it any more.
-        if "--lockstep" not in argv:
+        # Inside, nobody may ask for it any more.
+        if _keeps_time(argv):
             scheduling.virtual_priority()
         try:
             enter(int(argv[1]))
