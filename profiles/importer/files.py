@@ -22,6 +22,19 @@ from profiles.schema import Profile
 _SafeDumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 
+class _PlainDumper(_SafeDumper):  # type: ignore[misc, valid-type]
+    """For the data of a model: texts and mappings are most of it, and none is there twice."""
+
+    def represent_data(self, data: object) -> yaml.Node:
+        if type(data) is str:
+            return yaml.ScalarNode("tag:yaml.org,2002:str", data)
+        if type(data) is dict:
+            pairs = [(self.represent_data(k), self.represent_data(v)) for k, v in data.items()]
+            return yaml.MappingNode("tag:yaml.org,2002:map", pairs, flow_style=False)
+        node: yaml.Node = super().represent_data(data)
+        return node
+
+
 @contextmanager
 def _without_collection() -> Iterator[None]:
     """A large file becomes a million objects without cycles: looking for those takes a quarter."""
@@ -160,4 +173,4 @@ def profile_yaml(profile: Profile) -> str:
     data = profile.model_dump(
         mode="json", exclude_defaults=True, exclude={"parameters": {"__all__": set(CLASS_FIELDS)}}
     )
-    return str(yaml.dump(data, Dumper=_SafeDumper, allow_unicode=True, sort_keys=False, width=100))
+    return str(yaml.dump(data, Dumper=_PlainDumper, allow_unicode=True, sort_keys=False, width=100))
