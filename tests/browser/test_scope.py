@@ -190,7 +190,7 @@ def test_a_sine_has_its_frequency_and_amplitude(page: Page, station: Station, cy
     page.get_by_label("Time shown").select_option("2")
     page.get_by_text("Maths", exact=True).click()
     page.get_by_role("button", name="Add a computed channel").click()
-    page.get_by_label("Text").fill("derivative(c4) * 60")
+    page.get_by_label("Expression").fill("derivative(c4) * 60")
     page.locator(".maths-row").get_by_label("Unit").fill("rpm")
     page.get_by_text("Measurements", exact=True).click()
     speed = 2 * math.pi * hertz * amplitude * 60
@@ -240,7 +240,7 @@ def test_timing_is_reported_and_follows_the_exchange(
     expect(timing).to_contain_text("synchronous 1000/s", timeout=20_000)
     station.ok(station.http.delete("/buses/cyclic", params={"url": URL}))
     expect(timing).to_contain_text("polled", timeout=20_000)
-    assert page.get_by_text("nothing for").count() == 0
+    assert page.get_by_text("no data for").count() == 0
 
 
 def test_what_passes_without_a_connection_is_counted(page: Page, cyclic: str, cable: Cable) -> None:
@@ -249,10 +249,10 @@ def test_what_passes_without_a_connection_is_counted(page: Page, cyclic: str, ca
     lost = page.locator("[data-lost]")
     before = int(lost.get_attribute("data-lost") or 0)
     cable.cut()
-    expect(page.get_by_text("nothing for").first).to_be_visible(timeout=15_000)
+    expect(page.get_by_text("no data for").first).to_be_visible(timeout=15_000)
     cable.mend()
     until(lambda: int(lost.get_attribute("data-lost") or 0) > before + 500, HANG_S, "it is counted")
-    expect(page.get_by_text("nothing for")).to_have_count(0)
+    expect(page.get_by_text("no data for")).to_have_count(0)
     expect(lost).to_contain_text("while there was no connection")
 
 
@@ -310,7 +310,7 @@ def test_a_text_that_is_no_expression_is_said_to_be_none(page: Page) -> None:
         ("", "Write something"),
         ("c1; c2", "“;” at place 3"),
     ):  # fmt: skip
-        page.get_by_label("Text").fill(text)
+        page.get_by_label("Expression").fill(text)
         expect(page.get_by_text(words)).to_be_visible()
     expect(page.get_by_role("button", name="Channels (3)")).to_be_visible()
 
