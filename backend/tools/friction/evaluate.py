@@ -81,11 +81,16 @@ class Map:
 
 @dataclass(frozen=True)
 class _Plateau:
-    """One constant speed: rad [n], % of rated [n], signed rpm; ``even`` where it was held."""
+    """One constant speed: rad [n], % of rated [n], signed rpm; ``even`` where it was held.
+
+    ``valid`` [n] is False where a sample was lost; there the arrays hold a straight line, which
+    says nothing about the ripple in between.
+    """
 
     speed: int
     angle: FloatArray
     torque: FloatArray
+    valid: npt.NDArray[np.bool_]
     rpm: float
     even: bool
 
@@ -207,7 +212,8 @@ def _plateaus(data: Map, rated_nm: float) -> list[_Plateau]:
         shares = blocks / rpm if rpm else np.zeros(threshold.BLOCKS)
         right = rpm * number > 0
         even = bool(right and np.all((shares > threshold.EVEN[0]) & (shares < threshold.EVEN[1])))
-        found.append(_Plateau(int(abs(number)) // 100, angle, torque, rpm, even))
+        speed = int(abs(number)) // 100
+        found.append(_Plateau(speed, angle, torque, data.valid[at], rpm, even))
     return found
 
 
@@ -244,18 +250,20 @@ def _level(
 ) -> tuple[float, FloatArray, float]:
     """Mean torque over whole revolutions where there is one, the means of its blocks, and over
     how many revolutions; without what goes into acceleration."""
-    angle, torque = plateau.angle, plateau.torque
+    angle, torque, valid = plateau.angle, plateau.torque, plateau.valid
     whole = np.floor(plateau.revolutions + threshold.NEARLY)
     revolutions = plateau.revolutions
     if whole >= 1.0:
         within = np.abs(angle - angle[0]) <= whole * _TURN
-        angle, torque, revolutions = angle[within], torque[within], float(whole)
+        angle, torque, valid = angle[within], torque[within], valid[within]
+        revolutions = float(whole)
     if ripple is not None:
         torque = torque - ripple.at(angle, plateau.rpm)
     count = int(whole) if whole >= 4.0 else threshold.BLOCKS
-    parts = np.array([np.mean(part) for part in np.array_split(torque, count)])
+    blocks = zip(np.array_split(torque, count), np.array_split(valid, count), strict=True)
+    parts = np.array([np.mean(part[arrived]) for part, arrived in blocks if np.any(arrived)])
     lost = inertia * _acceleration(angle, int(whole), rate)
-    return float(np.mean(torque)) - lost, parts - lost, revolutions
+    return float(np.mean(torque[valid])) - lost, parts - lost, revolutions
 
 
 def _acceleration(angle: FloatArray, whole: int, rate: float) -> float:
@@ -318,17 +326,46 @@ def _orders(
 
     ``slope`` is that of friction over speed, in % per rpm.
     """
-    angle, torque = plateau.angle, plateau.torque
-    time = np.arange(angle.size) / rate
+    angle, torque = plateau.angle[plateau.valid], plateau.torque[plateau.valid]
+    time = np.flatnonzero(plateau.valid) / rate
     trend = np.column_stack([np.ones(angle.size), time - time.mean()])
     turning = np.outer(angle, k)
-    columns = np.hstack([trend, np.cos(turning), -np.sin(turning)])
-    both = np.linalg.lstsq(columns, np.column_stack([torque, angle]), rcond=None)[0]
-    amplitude = both[2 : 2 + k.size] + 1j * both[2 + k.size :]
+    if np.all(plateau.valid):
+        columns = np.hstack([trend, np.cos(turning), -np.sin(turning)])
+        both = np.linalg.lstsq(columns, np.column_stack([torque, angle]), rcond=None)[0]
+        amplitude = both[2 : 2 + k.size] + 1j * both[2 + k.size :]
+    else:
+        amplitude = np.column_stack([_pursued(trend, turning, each) for each in (torque, angle)])
     speed = plateau.rpm / _RPM
     swing = 1j * k * speed * amplitude[:, 1]
     found = amplitude[:, 0] - inertia * 1j * k * speed * swing - slope * _RPM * swing
     return np.asarray(found, dtype=np.complex128)
+
+
+def _pursued(
+    trend: FloatArray, turning: FloatArray, wanted: FloatArray
+) -> npt.NDArray[np.complex128]:
+    """Complex amplitudes [k] of ``wanted`` [n] where samples are missing, by matching pursuit.
+
+    Over a gap longer than a period all orders together are nearly dependent, and a fit of all
+    would let them cancel one another. The largest is fitted first, then with it the largest of
+    what is left, for as long as one stands out.
+    """
+    chosen: list[int] = []
+    while True:
+        within = turning[:, chosen]
+        columns = np.hstack([trend, np.cos(within), -np.sin(within)])
+        fitted = np.linalg.lstsq(columns, wanted, rcond=None)[0]
+        left = 2.0 * np.mean((wanted - columns @ fitted)[:, None] * np.exp(-1j * turning), axis=0)
+        chance = float(np.median(np.abs(left))) / np.sqrt(2.0 * np.log(2.0))
+        size = np.abs(left)
+        size[chosen] = 0.0
+        largest = int(np.argmax(size))
+        if size[largest] <= threshold.STANDS_OUT * chance or 2 * len(chosen) >= left.size:
+            break
+        chosen.append(largest)
+    left[chosen] = fitted[2 : 2 + len(chosen)] + 1j * fitted[2 + len(chosen) :]
+    return np.asarray(left)
 
 
 def _harmonics(ripple: _Ripple | None) -> tuple[Harmonic, ...]:
@@ -359,8 +396,8 @@ def _by_angle(
     curves = []
     for sign in (1.0, -1.0):
         way = [e for e in plateaus if np.sign(e.rpm) == sign]
-        angle = np.concatenate([e.angle for e in way])
-        torque = np.concatenate([e.torque - np.mean(e.torque) for e in way])
+        angle = np.concatenate([e.angle[e.valid] for e in way])
+        torque = np.concatenate([e.torque[e.valid] - np.mean(e.torque[e.valid]) for e in way])
         place = np.floor(np.mod(angle, _TURN) / _TURN * threshold.BINS).astype(int) % threshold.BINS
         count = np.bincount(place, minlength=threshold.BINS)
         total = np.bincount(place, torque, minlength=threshold.BINS)

@@ -18,6 +18,7 @@ from backend.axis.cyclic import CyclicSession
 from backend.tools.friction.result import FrictionResult
 from backend.tools.friction.run import TOOL
 from backend.tools.friction.settings import FrictionSettings
+from backend.tools.measuring.recording import bridged
 from backend.tools.sweep import profile_speed
 from backend.tools.tool import Run
 from backend.work.jobs import Progress
@@ -216,6 +217,29 @@ async def test_kept_raw_data_give_the_same_map() -> None:
     assert again == found
     with pytest.raises(ValueError, match="not the raw data"):
         TOOL.reevaluate({}, {})
+
+
+async def test_lost_samples_do_not_bend_the_curve() -> None:
+    """A busy computer loses samples in runs; the ripple in such a gap is not a straight line."""
+    kept: dict[str, object] = {}
+    async with direct(RIPPLED) as b:
+        await _kept(b, kept)
+    arrays = dict(kept["arrays"])  # type: ignore[call-overload]
+    plateau, valid = arrays["plateau"], arrays["valid"].copy()
+    rng = np.random.default_rng(5)
+    for number in np.unique(plateau[plateau != 0]):
+        at = np.flatnonzero(plateau == number)
+        run = round(0.15 * at.size)
+        first = int(rng.integers(0, at.size - run))
+        valid[at[first : first + run]] = False
+    rows = np.column_stack([arrays["position_rad"], arrays["torque_nm"]])
+    rows[~valid] = 0.0
+    filled = bridged(rows, valid)
+    arrays |= {"valid": valid, "position_rad": filled[:, 0], "torque_nm": filled[:, 1]}
+    found = TOOL.reevaluate(arrays, kept["meta"])  # type: ignore[arg-type]
+    assert isinstance(found, FrictionResult)
+    assert largest_error(found, RIPPLED) < 0.02
+    assert {1, 24} <= {each.order_per_rev for each in found.harmonics} <= {1, 24, 48}
 
 
 async def _kept(b: DirectBench, kept: dict[str, object]) -> FrictionResult:

@@ -49,7 +49,7 @@ def bench() -> Iterator[Bench]:
     node = CanopenNode(SmallDevice(), 5, time.monotonic_ns)
     wire = CanWire(PythonCanSide(can.Bus(interface="virtual", channel=channel)), [node])
     with wire:
-        yield Bench(wire, f"canopen://virtual/{channel}?timeout_ms=100")
+        yield Bench(wire, f"canopen://virtual/{channel}?timeout_ms=250")
 
 
 @pytest.fixture
@@ -57,7 +57,7 @@ def slcan_bench(tmp_path: Path) -> Iterator[Bench]:
     path = tmp_path / "ttyCAN"
     node = CanopenNode(SmallDevice(), 5, time.monotonic_ns)
     with CanWire(SlcanSide(path), [node]) as wire:
-        yield Bench(wire, f"canopen://slcan/{path}?timeout_ms=100")
+        yield Bench(wire, f"canopen://slcan/{path}?timeout_ms=250")
 
 
 @pytest.fixture

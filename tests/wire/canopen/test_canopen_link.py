@@ -365,10 +365,16 @@ async def test_a_node_that_is_not_there_is_not_asked_for_everything(link: Canope
     assert link.quality(77).timeouts == 2
 
 
-async def test_many_absent_nodes_keep_no_other_waiting(link: CanopenLink) -> None:
-    absent = [asyncio.create_task(link.read(number, STATUS)) for number in range(60, 100)]
-    await asyncio.sleep(0)
-    assert await link.read(5, STATUS) == b"\x50\x02"
-    assert not any(task.done() for task in absent)
-    ends = await asyncio.gather(*absent, return_exceptions=True)
-    assert all(isinstance(end, LinkTimeout) for end in ends)
+async def test_many_absent_nodes_keep_no_other_waiting(bench: Bench) -> None:
+    # A second is far more than a busy computer needs for the one answer that comes.
+    link = CanopenLink(bench.url.replace("timeout_ms=250", "timeout_ms=1000"))
+    await link.open()
+    try:
+        absent = [asyncio.create_task(link.read(number, STATUS)) for number in range(60, 100)]
+        await asyncio.sleep(0)
+        assert await link.read(5, STATUS) == b"\x50\x02"
+        assert not any(task.done() for task in absent)
+        ends = await asyncio.gather(*absent, return_exceptions=True)
+        assert all(isinstance(end, LinkTimeout) for end in ends)
+    finally:
+        await link.close()

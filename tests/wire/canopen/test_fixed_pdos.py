@@ -16,7 +16,7 @@ from drivers.canopen.link import CanopenLink
 from drivers.canopen.pdo import plan
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
-from drivers.link import Address, CyclicSignal
+from drivers.link import Address, CyclicSignal, ScopeBlock
 from drivers.virtual.wires.can_wire import CanWire, PythonCanSide
 from drivers.virtual.wires.canopen import CanopenNode
 from profiles.importer import import_file
@@ -72,6 +72,10 @@ def eds(cob_access: str = "rw") -> Profile:
     return import_file(text.encode(), "a.eds").profile
 
 
+def _newest(block: ScopeBlock, channel: str) -> float:
+    return float(block.samples[-1][block.channels.index(channel)])
+
+
 @asynccontextmanager
 async def linked(drive: Profile, known: Profile) -> AsyncIterator[tuple[Bench, CanopenLink]]:
     """``drive`` is what the node is, ``known`` is the file that was imported."""
@@ -106,7 +110,7 @@ async def test_an_axis_moves_by_its_fixed_pdos(cob_access: str) -> None:
         await until(lambda: cyclic.axis_state(5)[0] == State.OPERATION_ENABLED.value)
         assert bench.device.value(0x6061) == CSP
         bench.device.turn_by_hand(123456)
-        await until(lambda: blocks[-1].samples[-1][blocks[-1].channels.index("position")] == 123456)
+        await until(lambda: bool(blocks) and _newest(blocks[-1], "position") == 123456)
         assert "axis/6060:00" in blocks[-1].channels
         await cyclic.drive_to(5, State.SWITCH_ON_DISABLED)
         await cyclic.stop()
