@@ -177,8 +177,8 @@ def every_verification(device: Any, case: Case, tally: Tally) -> Iterator[None]:
 
     async def compared(*args: Any, **given: Any) -> Verified:
         verified = await verify(*args, **given)
-        true, promised = true_margins(device), verified.promised
-        sound = true.meets(promised) and verified.hum_percent is None
+        true, guaranteed = true_margins(device), verified.guaranteed
+        sound = true.meets(guaranteed) and verified.hum_percent is None
         tally.sound += sound
         if sound and not verified.kept:
             tally.rejected.append(
@@ -197,13 +197,13 @@ def judged(found: AutotuneResult, device: Any, case: Case, tally: Tally) -> None
     if verified is None or verified.verdict is None:
         return
     tally.kept += 1
-    true, promised, verdict = true_margins(device), verified.promised, verified.verdict
-    short_deg = promised.phase_margin_deg - true.phase_margin_deg
-    short_db = promised.gain_margin_db - true.gain_margin_db
+    true, guaranteed, verdict = true_margins(device), verified.guaranteed, verified.verdict
+    short_deg = guaranteed.phase_margin_deg - true.phase_margin_deg
+    short_db = guaranteed.gain_margin_db - true.gain_margin_db
     if not true.stable or short_deg > 5.0 or short_db > 1.0:
         tally.false.append(
-            f"{case.number} {case.drive}: promised {promised.phase_margin_deg:.0f}° "
-            f"{promised.gain_margin_db:.0f} dB, true {true.phase_margin_deg:.0f}° "
+            f"{case.number} {case.drive}: guaranteed {guaranteed.phase_margin_deg:.0f}° "
+            f"{guaranteed.gain_margin_db:.0f} dB, true {true.phase_margin_deg:.0f}° "
             f"{true.gain_margin_db:.1f} dB Ms {true.ms:.2f}"
         )
     worst, most = verdict.worst, float("inf")

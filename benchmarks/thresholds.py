@@ -58,7 +58,7 @@ class Figures:
     notches: int
     failed: str = ""
 
-    def beside(self, base: Figures) -> str:
+    def compared_with(self, base: Figures) -> str:
         """What is different, in words."""
         if self.failed:
             return self.failed
@@ -252,9 +252,9 @@ def main() -> None:
             continue
         value = getattr(getattr(thresholds, space), name)
         known[full] = [
-            run(packed, ((space, name), changed(value, factor)), results, options.limit)[0].beside(
-                base
-            )
+            run(packed, ((space, name), changed(value, factor)), results, options.limit)[
+                0
+            ].compared_with(base)
             for factor in (0.5, 2.0)
         ]
         print(f"{full} = {value}  ½: {known[full][0]}  ×2: {known[full][1]}", flush=True)

@@ -113,7 +113,7 @@ TIMED = [
 ]
 BUSES = [pytest("EtherCAT tests", *REAL_TIME)]
 PAGES = [pytest("browser tests", "-m", "browser", "tests/browser")]
-BESIDE = [
+PARALLEL = [
     # Workers write to a pipe: tests of full disks bound the length of files. At idle priority a
     # test may stand still for minutes, which is no hanging.
     pytest("patient tests", *TWO, "--timeout=900", *PATIENT),
@@ -222,7 +222,7 @@ def main() -> int:
     run_quick(runner)
     checks, failed = [*QUICK, *QUICK_BESIDE], runner.failed
     if "--fast" not in sys.argv:
-        checks += [*TIMED, *BUSES, *PAGES, *BESIDE, *MATRIX]
+        checks += [*TIMED, *BUSES, *PAGES, *PARALLEL, *MATRIX]
         failed = run_suites(runner)
     print(f"failed: {', '.join(failed)}" if failed else "all checks passed")
     print(f"{len(checks) - len(failed)} passed, {len(failed)} failed")
@@ -232,13 +232,13 @@ def main() -> int:
 def run_quick(runner: Runner) -> None:
     """Run the checks without a bus in two lanes."""
     with tempfile.TemporaryFile("w+", encoding="utf-8") as printed, ThreadPoolExecutor() as pool:
-        beside = Runner(printed)
-        lane = pool.submit(beside.run, QUICK_BESIDE)
+        parallel = Runner(printed)
+        lane = pool.submit(parallel.run, QUICK_BESIDE)
         runner.run(QUICK)
         lane.result()
         printed.seek(0)
         shutil.copyfileobj(printed, sys.stdout)
-    runner.failed += beside.failed
+    runner.failed += parallel.failed
 
 
 def run_suites(runner: Runner) -> list[str]:
@@ -248,8 +248,8 @@ def run_suites(runner: Runner) -> list[str]:
         tempfile.TemporaryFile("w+", encoding="utf-8") as seen,
         ThreadPoolExecutor() as pool,
     ):
-        beside, pages = Runner(idle, AT_IDLE), Runner(seen, BEHIND)
-        lanes = [pool.submit(beside.run, BESIDE)]
+        parallel, pages = Runner(idle, AT_IDLE), Runner(seen, BEHIND)
+        lanes = [pool.submit(parallel.run, PARALLEL)]
         runner.run(TIMED)
         lanes.append(pool.submit(pages.run, PAGES))
         runner.run(BUSES)
@@ -258,14 +258,14 @@ def run_suites(runner: Runner) -> list[str]:
         for printed in (seen, idle):
             printed.seek(0)
             shutil.copyfileobj(printed, sys.stdout)
-    again = [*runner.again, *pages.again, *beside.again]
+    again = [*runner.again, *pages.again, *parallel.again]
     if again:
         alone = Runner(sys.stdout)
         print("== once more, alone", flush=True)
         alone.run(again, last=True)
         runner.failed += alone.failed
     runner.run(MATRIX)
-    return runner.failed + pages.failed + beside.failed
+    return runner.failed + pages.failed + parallel.failed
 
 
 if __name__ == "__main__":

@@ -36,14 +36,14 @@ async def keeping_mode(axis: Axis, session: CyclicSession) -> AsyncIterator[None
     """
     drive = axis.drive
     keys = [] if session.power() is None else await axis.restorable_mode()
-    if not keys or drive.pending_restores.borrows(keys[0]):
+    if not keys or drive.pending_restores.is_temporary(keys[0]):
         yield
         return
     (key,) = keys
     before = await drive.raw(key)
     with (
         axis.granted("motion through the cyclic exchange"),
-        drive.pending_restores.borrowed({key: before}),
+        drive.pending_restores.temporary({key: before}),
     ):
         modes_of_the_loop(drive, session, key)
         try:

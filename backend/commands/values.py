@@ -17,7 +17,7 @@ from drivers.errors import NotAllowed
 from profiles.schema import Raw
 
 
-def tell_missing(data: bytes) -> None:
+def print_missing(data: bytes) -> None:
     """Say on standard error which settings a set that was just made lacks."""
     missing = without(parameter_set.parse(data).not_read)
     if missing:

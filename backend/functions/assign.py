@@ -14,8 +14,8 @@ from backend.axis.axis import Axis
 from backend.axis.restoring import CLEANUP_TIMEOUT_S, shielded
 from backend.drive.readings import Reading
 from backend.drive.terminals import TerminalState, read_terminals
+from backend.motion.alternatives import alternative_of
 from backend.motion.classes import motion_of
-from backend.motion.doors import door_of
 from backend.motion.grant import NotGranted
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
@@ -146,7 +146,7 @@ def _require_setting(axis: Axis, parameter: Parameter) -> None:
     }
     run = {s.key for p in profile.procedures for s in p.steps if s.do == "write"}
     if key in commanded | forced | run:
-        door = door_of(profile, parameter)
+        door = alternative_of(profile, parameter)
         error = NotGranted(
             "functions.command-not-setting",
             drive=drive.name,

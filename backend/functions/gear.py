@@ -66,7 +66,7 @@ async def write_gear(axis: Axis, values: Sequence[GearValue]) -> GearChange:
         before[value.parameter.key] = await drive.raw(value.parameter.key)
     done: list[str] = []
     # For the next server, should this one be killed with half a gear written.
-    with drive.pending_restores.borrowed(before):
+    with drive.pending_restores.temporary(before):
         try:
             await _write_all(axis, values, before, done)
         except BaseException as error:

@@ -43,7 +43,7 @@ class Folder:
     path: Path
     suffixes: tuple[str, ...]
     describe: Callable[[Path], Described]
-    beside: str = ""
+    sidecar: str = ""
 
     def stamps(self) -> dict[str, str]:
         """Names of its files, each with what changes when the file does."""
@@ -55,9 +55,9 @@ class Folder:
                 try:
                     status = path.stat()
                     stamp = f"{status.st_mtime_ns}:{status.st_size}"
-                    beside = path.with_name(path.name + self.beside)
-                    if self.beside and beside.exists():
-                        stamp += f":{beside.stat().st_mtime_ns}"
+                    sidecar = path.with_name(path.name + self.sidecar)
+                    if self.sidecar and sidecar.exists():
+                        stamp += f":{sidecar.stat().st_mtime_ns}"
                 except FileNotFoundError:
                     continue  # deleted at this moment
                 found[path.name] = stamp

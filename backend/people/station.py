@@ -59,7 +59,7 @@ class People:
         With ``recovering`` also where they are gone, which the machine's terminal alone may do.
 
         Raises:
-            AccountsGone: the station has had accounts, and has no administrator now.
+            AccountsMissing: the station has had accounts, and has no administrator now.
             DatabaseFailed: they cannot be read.
         """
         if self.accounts_needed:

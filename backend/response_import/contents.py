@@ -299,7 +299,7 @@ def _names(head: list[str], layout: _Layout) -> tuple[str, ...]:
     ]
     if not fitting:
         return tuple(f"column {i + 1}" for i in range(layout.width))
-    named = next((cells for cells in fitting if _tells(cells)), fitting[-1])
+    named = next((cells for cells in fitting if _has_names(cells)), fitting[-1])
     units = fitting[-1] if fitting[-1] is not named else None
     names = []
     for i, cell in enumerate(named):
@@ -309,7 +309,7 @@ def _names(head: list[str], layout: _Layout) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _tells(cells: list[str]) -> bool:
+def _has_names(cells: list[str]) -> bool:
     """A line of names: words, and not twice the same one throughout."""
     words = [c for c in cells if re.search(r"[^\W\d]", c)]
     return 2 * len(words) >= len(cells) and len(set(words)) > 1

@@ -131,7 +131,7 @@ class SpeedWatch:
         pair = self._then_and_now(over_s)
         return pair is not None and pair[1] < pair[0] * 0.995 - 0.2
 
-    def stands_in_s(self, over_s: float = 0.25) -> float:
+    def time_to_standstill_s(self, over_s: float = 0.25) -> float:
         """Time to rest, should it go on to slow down as it does; infinite where it does not."""
         pair = self._then_and_now(over_s)
         if pair is None or not self.slows(over_s):

@@ -84,16 +84,16 @@ class StopWatch:
         if problem is None and before is not None and self._stood(before, first):
             return self._verdict(Verdict.STOPPED)
         self._until_s = self._began_s + SHORTEST_S
-        await self._know_ramp()
+        await self._read_ramp()
         return await self._follow(problem)
 
-    async def _know_ramp(self) -> None:
+    async def _read_ramp(self) -> None:
         """What was not read before the motion is asked for now, the word being out."""
         axis = self._axis
         if known_settings(axis.drive).ramp_raw() is None:
             try:
                 async with asyncio.timeout(LOOK_S):
-                    await axis.know_stop()
+                    await axis.read_stop_settings()
             except TimeoutError:
                 return
 
@@ -190,7 +190,7 @@ class StopWatch:
     async def _next(self, sample: Sample) -> bool:
         """The time is over: wait on, or do the next thing. False where nothing is left."""
         now, slows = time.monotonic(), self._watch.slows()
-        soon = self._watch.stands_in_s() < _SOON_S
+        soon = self._watch.time_to_standstill_s() < _SOON_S
         if slows and (sample.state in _POWERED or soon) and now - self._began_s < _PATIENCE_S:
             self._until_s = now + _STEP_S / 2
             return True

@@ -953,8 +953,8 @@ class sweep_profile_speed:
     exceeds it. Origin: c71e9acb."""
 
 
-class sweep_quiet_velocity:
-    """`sweep/quiet_velocity.py`."""
+class sweep_velocity_noise:
+    """`sweep/velocity_noise.py`."""
 
     NOISE = (0.2, 0.45)
     """[ratio] Nothing of a slow move is up here, so what is there is noise; shares of the sample

@@ -164,7 +164,7 @@ class JobRunner:
             title_text=as_text(title),
             drive=drive,
             motion=motion,
-            progress=Progress(lambda: self._tell(job)),
+            progress=Progress(lambda: self._notify(job)),
             person=person or acting_person(),
             actor=acting.get(),
             stoppable=stoppable,
@@ -209,7 +209,7 @@ class JobRunner:
             job.state, job.ended = "cancelled", time.time()
             self._changed(job)
 
-    def _tell(self, job: Job) -> None:
+    def _notify(self, job: Job) -> None:
         """Progress at 10 Hz at most; the end is always shown by `_run`."""
         now = time.monotonic()
         if now - self._last_reported.get(job.id, 0.0) >= 0.1:

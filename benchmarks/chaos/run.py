@@ -122,9 +122,9 @@ class Trial:
                 raise task.exception()  # type: ignore[misc]
         await self._quiet(before)
         if len(self.judge.record.violations) > known:
-            await self._tell_log()
+            await self._print_log()
 
-    async def _tell_log(self) -> None:
+    async def _print_log(self) -> None:
         """What the server itself tells of it."""
         anna = self.people[0]
         with contextlib.suppress(httpx.HTTPError, WebSocketException, OSError):

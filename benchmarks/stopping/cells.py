@@ -39,7 +39,7 @@ class Outcome:
     degrees: float
     shaft_rpm_at_answer: float
     steps: tuple[str, ...]
-    speed_said: float | None
+    speed_reported: float | None
 
     @property
     def truthful(self) -> bool:

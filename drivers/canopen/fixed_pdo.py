@@ -104,7 +104,7 @@ def chosen(
         for address, _ in pdo.starts():
             signal = by_place.get((address.index, address.subindex))
             if signal is None and pdo.direction == "rx":
-                signal = _beside(wanted[0], address)
+                signal = _signal_at(wanted[0], address)
             if signal is not None:
                 signals.append(signal)
         left = [s for s in left if s not in signals]
@@ -112,7 +112,7 @@ def chosen(
     return found, left
 
 
-def _beside(known: CyclicSignal, address: Address) -> CyclicSignal:
+def _signal_at(known: CyclicSignal, address: Address) -> CyclicSignal:
     """A signal of the same drive, named like the others."""
     drive, slash, _ = known.channel.rpartition("/")
     key = f"{address.index:04X}:{address.subindex:02X}"

@@ -331,7 +331,7 @@ class RegisterLink:
     def _changed(self, up: bool, text: str) -> None:
         self._line.ring.note(text)
         if self._loop is not None and not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._tell, up, text)
+            self._loop.call_soon_threadsafe(self._notify, up, text)
 
     # --- on the event loop ---
 
@@ -340,7 +340,7 @@ class RegisterLink:
             raise LinkLost("modbus.not-open", url=self.url)
         return await self._thread.run(job, urgent=urgent)
 
-    def _tell(self, up: bool, text: str) -> None:
+    def _notify(self, up: bool, text: str) -> None:
         if self._thread is None:
             return
         event = LinkEvent("back" if up else "lost", None, text)

@@ -25,7 +25,7 @@ drive = "{drive}"
 on = "{url}"
 station = 1
 """
-#: Mode of operation, quick-stop deceleration and the profile ramps: what a sweep borrows.
+#: Mode of operation, quick-stop deceleration and the profile ramps: what a sweep changes.
 MODE, QUICK_STOP, RAMP = "6060:00", "6085:00", "6083:00"
 
 
@@ -78,7 +78,7 @@ class Bench:
             return bool(self.noted().get(key, {}).get("left")) and MODE in self.noted()
 
         try:
-            until(borrowed, HANG_S, "the sweep changes what it borrows")
+            until(borrowed, HANG_S, "the sweep changes what it changes")
         finally:
             os.kill(sweep.pid, signal.SIGKILL)
             sweep.communicate()

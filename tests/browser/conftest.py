@@ -27,7 +27,7 @@ FLAGS = [
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
 ]  # fmt: skip
 #: For what must appear: the tests run beside others, on a computer that has no time to spare. What
-#: must be reported soon is waited for with `driving.TOLD_MS`.
+#: must be reported soon is waited for with `driving.SHOWN_MS`.
 PATIENCE_MS = 15_000
 #: A wide and a narrow screen with a finger, as in the field.
 LAPTOP = {"viewport": {"width": 1280, "height": 800}}

@@ -70,7 +70,7 @@ class Worst:
         )
 
     @property
-    def promised(self) -> Goals:
+    def guaranteed(self) -> Goals:
         """As a promise, after the reserve."""
         db, deg, factor = RESERVE
         return Goals(self.gain_margin_db - db, self.phase_margin_deg - deg, self.ms * factor)

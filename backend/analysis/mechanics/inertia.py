@@ -17,8 +17,8 @@ import scipy
 
 from backend.analysis.mechanics.load_swing import find_swings, lag_of_load, lag_slopes
 from backend.analysis.mechanics.load_terms import (
-    NOTHING_BESIDE,
-    Beside,
+    NO_LOAD_TERMS,
+    FoundTerms,
     Motion,
     Terms,
     find_terms,
@@ -65,7 +65,7 @@ class InertiaResult:
     r2: float
     identifiable: bool
     reasons: tuple[Reason, ...]
-    beside: Beside = NOTHING_BESIDE
+    load_terms: FoundTerms = NO_LOAD_TERMS
     """What the torque depends on beside inertia and friction."""
 
 
@@ -177,7 +177,7 @@ def estimate_inertia(
         matrix[keep], torque[keep], bends[keep], keep,
         round(threshold.ALIKE_S * sample_rate_hz), saturated_share, motor_inertia_kgm2,
     )  # fmt: skip
-    return replace(found, beside=terms.sized(motion, sizes[_RIGID:]))
+    return replace(found, load_terms=terms.sized(motion, sizes[_RIGID:]))
 
 
 def _machine(

@@ -33,7 +33,7 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Beside:
+class FoundTerms:
     """What the terms come to: the largest torque of a fan in the recording, half the span of what
     the machine takes by its place, in Nm; 0 where there is none.
 
@@ -47,7 +47,7 @@ class Beside:
     torque_nm: FloatArray
 
 
-NOTHING_BESIDE = Beside(0.0, 0.0, (), np.empty(0))
+NO_LOAD_TERMS = FoundTerms(0.0, 0.0, (), np.empty(0))
 
 
 @dataclass(frozen=True)
@@ -80,17 +80,17 @@ class Terms:
             return False
         return self.periods_rad == before.periods_rad or self.periods_rad[-1] > COGGING_RAD
 
-    def sized(self, motion: Motion, sizes: FloatArray) -> Beside:
+    def sized(self, motion: Motion, sizes: FloatArray) -> FoundTerms:
         """What they come to; ``sizes`` begins with those of `columns`."""
         columns = self.columns(motion)
         if not columns.shape[1]:
-            return NOTHING_BESIDE
+            return NO_LOAD_TERMS
         made = columns * sizes[: columns.shape[1]]
         at = int(self.fan) + int(self.static_rad_s > 0)
         # What repeats more than twice in a turn is the motor's own cogging, not the machine's.
         reported = [i for i, period in enumerate(self.periods_rad) if period > COGGING_RAD]
         place = sum(made[:, at + 2 * i] + made[:, at + 2 * i + 1] for i in reported)
-        return Beside(
+        return FoundTerms(
             float(np.max(np.abs(made[:, 0]))) if self.fan else 0.0,
             0.5 * float(np.ptp(place)),
             tuple(self.periods_rad[i] for i in reported),

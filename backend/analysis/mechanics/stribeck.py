@@ -105,10 +105,10 @@ class SpeedModel:
             size = np.abs(self.speed[side])
             order = np.argsort(size)
             at = np.geomspace(size.min(), size.max(), threshold.CURVE)
-            beside = np.interp(np.log(at), np.log(size[order]), left[side][order])
+            remainder = np.interp(np.log(at), np.log(size[order]), left[side][order])
             back = slice(None, None, -1 if sign < 0 else 1)
             speeds += (sign * at)[back].tolist()
-            values += (self.best.at(sign * at) + beside)[back].tolist()
+            values += (self.best.at(sign * at) + remainder)[back].tolist()
         return tuple(speeds), tuple(values)
 
 

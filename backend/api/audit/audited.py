@@ -26,7 +26,7 @@ _ACTIONS: dict[str, Action] = {
 }  # fmt: skip
 _DRIVE = "/drives/{drive_id}"
 #: Routes whose changes are recorded where they happen: value by value, as jobs, or as what people
-#: do. `tests/security/test_every_change_is_told.py` asks each of them.
+#: do. `tests/security/test_every_change_is_reported.py` asks each of them.
 REPORTED_THERE = frozenset(
     f"{method} {API}{path}"
     for method, paths in {
@@ -104,7 +104,7 @@ class AuditedAnswers:
         async def when_safe(message: Message) -> None:
             if message["type"] == "http.response.start":
                 if matched is not None and message["status"] < 400:
-                    self._tell(matched, scope, axis, said)
+                    self._notify(matched, scope, axis, said)
                 # While the audit has a problem everybody is informed of it; waiting would not help.
                 if not self._audit.problem:
                     await self._audit.settled(WAIT_S)
@@ -116,7 +116,7 @@ class AuditedAnswers:
         finally:
             asked.reset(token)
 
-    def _tell(self, matched: Matched, scope: Scope, axis: str, said: Asked) -> None:
+    def _notify(self, matched: Matched, scope: Scope, axis: str, said: Asked) -> None:
         """Record a change that nobody else tells."""
         if matched.route in REPORTED_THERE or matched.route in CHANGES_NOTHING:
             return

@@ -237,9 +237,9 @@ class Unattended:
         outcome = ends.get(job.state, "failed")
         await self._note(permission, Attempt(at=at, cause=cause, outcome=outcome, why=why))
         if outcome == "done":
-            await self._tell_changes(permission)
+            await self._log_changes(permission)
 
-    async def _tell_changes(self, permission: Permission) -> None:
+    async def _log_changes(self, permission: Permission) -> None:
         """What has changed stands in the log, as nobody waits for the result."""
         connected = self._bench.connected_drives.get(permission.drive)
         if connected is None:

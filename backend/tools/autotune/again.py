@@ -260,7 +260,7 @@ def _designed(
     """
     axis, check = trials.axis, trials.check
     mark = how.mark if how.mark in candidate.marks else next(iter(candidate.marks), how.mark)
-    goals = goals_for(how.load, mark).with_reserve() if candidate.marks else trials.promised
+    goals = goals_for(how.load, mark).with_reserve() if candidate.marks else trials.guaranteed
     made, sound = judged(
         axis, check.facts, plant, candidate.gains, candidate.notches, candidate.filters, goals
     )
@@ -288,7 +288,7 @@ async def _in_place_of(
     await take_back(axis, first.before)
     check = replace(trials.check, pairs_before=MOST_PAIRS, plant=plant)
     applied = await first_kept(
-        axis, trials.session, check, [second], trials.promised, trials.tried, trials.progress,
+        axis, trials.session, check, [second], trials.guaranteed, trials.tried, trials.progress,
         trials.keep, None, trials.time_left,
     )  # fmt: skip
     if applied is None and fall_back:

@@ -136,7 +136,7 @@ def torque_mode(
     return tuple(Sequence(scaled(e, peak_nm, step_nm)) for e in shapes)
 
 
-def beside_loop(
+def torque_injection(
     rate: float,
     band: Band,
     room: Room,

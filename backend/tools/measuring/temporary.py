@@ -124,7 +124,7 @@ async def put_back_in_time(axis: Axis, before: Mapping[str, Raw]) -> None:
 async def temporary(axis: Axis, values: Mapping[str, int]) -> AsyncIterator[dict[str, int]]:
     """These raw values act inside the block; yields what is put back afterwards."""
     drive = axis.drive
-    with drive.pending_restores.borrowed({key: await drive.raw(key) for key in values}):
+    with drive.pending_restores.temporary({key: await drive.raw(key) for key in values}):
         before = await write_settings(axis, values)
         try:
             yield before

@@ -74,7 +74,9 @@ async def measure_meaning_in_loop(
         setup = replace(setup, by_speed=True, integral_hz=reported.integral_hz)
     plant = measured_plant(mechanics.frf, mechanics.model)
     repeats = repeats or Repeats()
-    player = _Beside(axis, session, settings, setup, plant, await axis.position_raw(), repeats)
+    player = _ClosedLoopTrial(
+        axis, session, settings, setup, plant, await axis.position_raw(), repeats
+    )
     async with temporary(axis, await filters_off(axis, settings)):
         return await tried_with(
             player,
@@ -89,7 +91,7 @@ async def measure_meaning_in_loop(
 
 
 @dataclass
-class _Beside:
+class _ClosedLoopTrial:
     """The speed loop closed, its reference excited."""
 
     axis: Axis

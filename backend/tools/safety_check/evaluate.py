@@ -39,7 +39,7 @@ _DEVIATIONS, _LEAST_PERCENT, _FILTER = 5.0, 0.3, 5
 _DISTINCT = 3.0
 _BEFORE_S = 0.1
 #: With SS1 the power goes at standstill: below this share of the speed.
-_AT_REST = 0.1
+_AT_STANDSTILL = 0.1
 #: Above a speed limit by this share is beyond it; by so much of the test speed it did not react.
 SPEED_MARGIN, _FOLLOWED = 0.05, 0.95
 _POINTS, _SHOWN_BEFORE_S = 400, 0.2
@@ -303,7 +303,7 @@ class _Check:
 
     def _cut(self, at: int, free: int, speed: float) -> bool:
         """It braked by a quick stop at whose beginning our own exchange took the power away."""
-        fast = abs(float(self._speed[free])) > _AT_REST * abs(speed)
+        fast = abs(float(self._speed[free])) > _AT_STANDSTILL * abs(speed)
         return fast and bool(np.any(self._trace.quick_stop[at : free + 1]))
 
     def _exceeded(self, found: Mapping[str, object]) -> tuple[Exceeded, ...]:
@@ -338,7 +338,7 @@ class _Check:
         if (
             settings.function == "ss1" and free is not None and distinct
             and obstacle != "quick_stop_cut"
-            and abs(float(self._speed[free])) > _AT_REST * abs(speed)
+            and abs(float(self._speed[free])) > _AT_STANDSTILL * abs(speed)
         ):  # fmt: skip
             return "power_off_at_speed"
         if exceeded:

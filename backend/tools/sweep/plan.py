@@ -171,7 +171,7 @@ def sequences_of(setup: Setup, settings: SweepSettings) -> tuple[excite.Sequence
                 setup.rate, band, setup.room, speed_injection.FIRST_RAD_S, settings.realisations,
                 settings.excitation, base=settings.base_motion,
             )  # fmt: skip
-        return excite.beside_loop(
+        return excite.torque_injection(
             setup.rate, band, setup.room, setup.torque_step_nm, share=settings.share,
             realisations=settings.realisations, position=setup.loop == "position",
             base=settings.base_motion, waveform=settings.excitation,

@@ -94,7 +94,7 @@ def _sequences(
         )  # fmt: skip
     position = "position" in (settings.loop, settings.kind.removesuffix("_loop"))
     if settings.kind == "mechanics":
-        return excite.beside_loop(
+        return excite.torque_injection(
             rate, band, room, 0.0, share=settings.share, realisations=settings.realisations,
             position=position, base=settings.base_motion, waveform=waveform,
         )  # fmt: skip

@@ -35,7 +35,7 @@ def sequences(
 ) -> tuple[excite.Sequence, ...]:  # fmt: skip
     """All lines alike: above the loop's bandwidth that is a torque that is alike, too.
 
-    ``weight`` [lines] makes them unlike each other, as `telling_weight` finds it.
+    ``weight`` [lines] makes them unlike each other, as `informative_weight` finds it.
 
     Raises:
         ValueError: the room does not suffice.
@@ -81,7 +81,7 @@ def fitting_size(
     return Size(peak, base * float(np.clip(left_nm / taken_nm, threshold.LEAST_BASE, 1.0)))
 
 
-def telling_weight(
+def informative_weight(
     records: tuple[tuple[excite.Sequence, Recording], ...], rate: float
 ) -> FloatArray:
     """Weights of the lines [n] for further realisations: more where the first ones tell less.

@@ -50,22 +50,22 @@ class EthercatCyclic:
         self,
         host: HostProcess,
         profiles: Mapping[int, Profile],
-        tell: Callable[[str, bool], None],
+        notify: Callable[[str, bool], None],
         note: Callable[[str, int | None], None] = lambda _text, _station: None,
     ) -> None:
-        """``tell`` gets a sentence when the exchange breaks off (False) or runs again (True).
+        """``notify`` gets a sentence when the exchange breaks off (False) or runs again (True).
 
         ``note`` gets what is commanded, with its station, for the record of the bus.
         """
         self._note = note
         self._host = host
-        self._tell = tell
+        self._notify = notify
         self._setup: Message = {}
         self._wanted = False
         self._generation = 0
         self._played: dict[int, int] = {}
         self._last_ns = 0
-        self._recovery = Recovery(lambda: self._host.running, self._set_up_again, tell)
+        self._recovery = Recovery(lambda: self._host.running, self._set_up_again, notify)
         self._profiles = profiles
         self._plans: tuple[StationPlan, ...] = ()
         self._cycle_s = 0.001
@@ -327,7 +327,7 @@ class EthercatCyclic:
 
     def _broke_off(self, why: str) -> None:
         self.shut_down()
-        self._tell(
+        self._notify(
             f"the cyclic exchange broke off: {why}; every axis stops, and the exchange is set up"
             " again by itself",
             False,

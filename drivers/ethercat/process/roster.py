@@ -51,7 +51,7 @@ class Roster:
         self._next_open = 0.0
         self._search_due = False
         self._wanted, self._wanted_at = 0, 0.0
-        self._mending: dict[int, tuple[int, float]] = {}
+        self._repairing: dict[int, tuple[int, float]] = {}
         #: Stations whose last control word by mailbox enables: no search may reset them.
         self._powered: set[int] = set()
         self._managers: dict[int, bytes] = {}
@@ -143,11 +143,11 @@ class Roster:
         if station.al_state & ~ERROR_BIT == AlState.INIT and (
             station.al_state & ERROR_BIT or station.mailbox is not None
         ):
-            self._mend(station)
+            self._repair(station)
         else:
-            self._mending.pop(station.number, None)
+            self._repairing.pop(station.number, None)
 
-    def _mend(self, station: Station) -> None:
+    def _repair(self, station: Station) -> None:
         """It fell out of PREOP, as when a frame of the search was lost: nobody could stop it so.
 
         Or it never came there, as when it was switched on again and took longer to start than a
@@ -156,10 +156,10 @@ class Roster:
         number, now = station.number, time.monotonic()
         # No search takes anything from it that it still had.
         self._powered.discard(number)
-        tries, due = self._mending.get(number, (0, now))
+        tries, due = self._repairing.get(number, (0, now))
         if now < due or self.exchange.loop is not None or self.lanes.busy(number, "mailbox"):
             return
-        self._mending[number] = tries + 1, now + _PAUSES_S[min(tries, len(_PAUSES_S) - 1)]
+        self._repairing[number] = tries + 1, now + _PAUSES_S[min(tries, len(_PAUSES_S) - 1)]
         if tries == _MENDINGS:
             self._search_due = True
         elif station.mailbox is not None:
@@ -241,7 +241,7 @@ class Roster:
         else:
             self._powered.discard(number)
 
-    def _want_search(self) -> None:
+    def _request_search(self) -> None:
         """Search again soon, with growing pauses for as long as that does not help."""
         now = time.monotonic()
         if now >= self._wanted_at:
@@ -330,7 +330,7 @@ class Roster:
         if not 1 <= number <= len(self.stations):
             self.attached = self.attached and bool(self.stations)
             # A drive that was without supply, or behind a cut cable, when the others were found.
-            self._want_search()
+            self._request_search()
             raise LinkLost(
                 "ethercat.no-station-found-check-supply",
                 station=number,

@@ -48,7 +48,7 @@ _FIND_TRIES = 3
 """A segment that stands still for a moment answers nothing, or too late and to another question."""
 
 
-class SpoiltMap(ProtocolError):
+class InvalidMap(ProtocolError):
     """SOEM took something else for an answer while it asked for the mapping.
 
     Only a new search helps: SOEM gives every further mapping FMMUs of its own beside those of the
@@ -240,7 +240,7 @@ class Segment:
 
         Raises:
             NotAllowed: more process data than the IO map holds, or no search came before.
-            SpoiltMap: a drive's mapping could not be read; to be searched for and mapped again.
+            InvalidMap: a drive's mapping could not be read; to be searched for and mapped again.
         """
         if expected_bytes > IO_MAP_BYTES:
             raise NotAllowed(
@@ -262,7 +262,7 @@ class Segment:
         except pysoem.ConfigMapError as error:
             self.forget_errors()
             reported = sorted({_mapping_error(item) for item in error.error_list})
-            raise SpoiltMap(
+            raise InvalidMap(
                 "ethercat.process-data-not-mapped", reported="; ".join(reported)
             ) from error
         self.mapped = True

@@ -37,7 +37,7 @@ def read_items(
     dead: DriveError | None = None
     for index, members in groups.items():
         sizes = _sizes_of_whole(station, index, members) if dead is None else {}
-        doubted = index in station.single_only
+        single = index in station.single_only
         if sizes:
             yield Gap()
             whole = yield from _read_whole(station, index, sizes)
@@ -59,7 +59,7 @@ def read_items(
                 results[item] = error
                 if isinstance(error, LinkLost | LinkTimeout):
                     dead = error
-                    if not doubted:
+                    if not single:
                         # It answers nothing: that says nothing about whole objects.
                         station.single_only.discard(index)
         if index in station.to_prove:

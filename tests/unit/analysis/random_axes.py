@@ -122,7 +122,7 @@ def played(case: Case) -> tuple[tuple[excite.Sequence, Recording], ...] | None:
     rate, drive, mechanics = case.rate_hz, case.drive, case.mechanics
     band, step = excite.band_for(rate, 5.0, None), drive.torque_step * drive.rated_nm
     if case.loop_hz:
-        sequences = excite.beside_loop(
+        sequences = excite.torque_injection(
             rate, band, ROOM, step, share=0.35, realisations=2, position=False
         )
     else:

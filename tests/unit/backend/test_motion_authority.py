@@ -113,7 +113,7 @@ async def test_stop_ends_every_grant_but_lets_borrowed_values_go_back(
     x: ConnectedDrive, bench: Bench
 ) -> None:
     drive = x.drive
-    with x.axis.granted("move") as grant, drive.pending_restores.borrowed({MODE: 1}):
+    with x.axis.granted("move") as grant, drive.pending_restores.temporary({MODE: 1}):
         await bench.motion.stop(["x"])
         assert bench.authority.grant_of("x") is None
         with pytest.raises(NotGranted, match="STOP was pressed"):

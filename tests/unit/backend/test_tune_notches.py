@@ -47,7 +47,7 @@ def test_what_shows_and_what_hardly_rises_bounds_nothing_unseen(
 
 
 @pytest.mark.parametrize(
-    ("loop", "scheme", "gravity_nm", "beside"),
+    ("loop", "scheme", "gravity_nm", "holds"),
     [
         ("none", "free", 0.0, False),
         ("none", "free", 0.2, True),
@@ -58,7 +58,7 @@ def test_what_shows_and_what_hardly_rises_bounds_nothing_unseen(
     ],
 )
 async def test_notches_are_tried_beside_a_loop_where_the_mechanics_were(
-    loop: str, scheme: str, gravity_nm: float, beside: bool, monkeypatch: pytest.MonkeyPatch
+    loop: str, scheme: str, gravity_nm: float, holds: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ways: list[bool] = []
 
@@ -78,7 +78,7 @@ async def test_notches_are_tried_beside_a_loop_where_the_mechanics_were(
     monkeypatch.setattr("backend.tools.notch.trials.least_s", lambda _drive: 11.6)
 
     assert await said_of(loop, scheme, gravity_nm) is None
-    assert ways == [beside]
+    assert ways == [holds]
 
 
 async def said_of(

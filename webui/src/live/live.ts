@@ -25,7 +25,7 @@ export const send = (message: FromPage) => post({ kind: 'send', message })
 export const stand = (name: string, message: FromPage | null) =>
   post({ kind: 'stand', name, message })
 export function jogStart(message: JogStart): void {
-  store.askedAnew('jog_start')
+  store.askedAgain('jog_start')
   post({ kind: 'jogStart', message })
 }
 export const jogBeat = (drive: string) => post({ kind: 'jogBeat', drive })

@@ -146,7 +146,7 @@ class Slave:
                 self._show()
                 self.process.skip_to(now_ns)
             else:
-                self._keep_house(min(event, now_ns))
+                self._housekeeping(min(event, now_ns))
         self._now_ns = now_ns
         self.mailbox.at(now_ns)
         self.process.at(now_ns)
@@ -158,7 +158,7 @@ class Slave:
             self.al.retry(now_ns)
             self._show()
 
-    def _keep_house(self, now_ns: int) -> None:
+    def _housekeeping(self, now_ns: int) -> None:
         """Keep the drive alive where no SYNC0 does, once a millisecond at most."""
         self._housekeeping_ns = now_ns + _HOUSEKEEPING_NS
         if self.process.next_tick_ns is None:
