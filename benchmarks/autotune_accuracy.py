@@ -26,14 +26,14 @@ from tests.virtual.tools.rig import WIDE
 async def tuned(
     axis: Axis, session: CyclicSession, spec: MechanicsSpec, scheme: Scheme, budget_s: float
 ) -> str:
-    """Tune an axis and tell the figures; the axis is as before in the end.
+    """Tune an axis and print the figures; the axis is as before in the end.
 
     ``×a/×b`` compares with the same design without notches and with the filters as they were: of
     the speed gain, and of the -3 dB point of the motor's speed. Of each margin the promise, what
     was predicted for the axis as measured, and what was verified.
     """
     began = time.monotonic()
-    # Counted in multiples of the motor by families that do not tell the motor's inertia.
+    # Counted in multiples of the motor by families that do not report the motor's inertia.
     rotor = None if axis.drive.profile.drive == "mms7" else spec.motor.inertia_kgm2
     settings = AutotuneSettings(WIDE, scheme=scheme, motor_inertia_kgm2=rotor, budget_s=budget_s)
     found = await autotune(axis, session, settings, Progress(lambda: None))

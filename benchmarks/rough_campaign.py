@@ -4,7 +4,7 @@
         [--store ROWS.jsonl] [--only CLASS …]
 
 Every axis is drawn: family (an unlisted drive included), mechanics, and one or more nuisances of
-`RoughTorqueSpec`, whose structure the analysis does not assume. The product's own tools run beside
+`RoughTorqueSpec`, whose structure the analysis does not assume. The product's own tools run next to
 the real firmware at accelerated time. Printed are, per class, the errors of the response; the share
 of stated 95 % intervals that hold the truth (magnitude and phase of each line, inertia, friction,
 frequency and damping of modes, margins); and false verdicts of autotune: kept designs whose true
@@ -170,7 +170,7 @@ async def tuned(case: Case, tally: Tally) -> None:
 def every_verification(device: Any, case: Case, tally: Tally) -> Iterator[None]:
     """Compare each design that is verified, kept or not, with its true loop while it is in force.
 
-    A sound one keeps its whole promise at all frequencies. One that hums is rightly taken back,
+    A sound one keeps its whole promise at all frequencies. One that hums is rightly undone,
     whatever its margins.
     """
     verify = verification.verify

@@ -42,7 +42,7 @@ class Address:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """One drive seen by a scan. Fields are None where the link cannot tell."""
+    """One drive seen by a scan. Fields are None where the link cannot show."""
 
     station: int
     vendor_id: int | None = None
@@ -108,7 +108,7 @@ class LinkTraits:
     synchronous: bool = False
     """Setpoints and samples share one instant of every cycle without clocks in the drives."""
     description: Literal["none", "dictionary", "stored_eds"] = "none"
-    """How a drive tells of its own objects: not, by `Link.enumerate`, or by an EDS in 1021h."""
+    """How a drive reports its own objects: not, by `Link.enumerate`, or by an EDS in 1021h."""
     fills_network: bool = False
     """Its frames fill the network of the port that they are sent on."""
     silent: Text = _CHECK_WHEN_SILENT
@@ -147,7 +147,7 @@ class Link(Protocol):
 
     @property
     def doctor(self) -> Examines | None:
-        """What says why a station is not in Operational."""
+        """What states why a station is not in Operational."""
 
     @property
     def frames(self) -> RecordsFrames | None:

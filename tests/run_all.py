@@ -29,8 +29,8 @@ NPM = ["npm"] if shutil.which("npm") else [sys.executable, str(ROOT / "hatch_bui
 
 PYTEST = [sys.executable, "-m", "pytest", "-q", "-rs", "--durations=12"]
 #: Suites with a bus in real time. They wait for most of their time, so that the pages may be tested
-#: beside them, but no more: a master that is kept from its cycle for 30 ms must brake the axis, and
-#: then the test does not see what it wants to see.
+#: next to them, but no more: a master that is kept from its cycle for 30 ms must brake the axis,
+#: and then the test does not see what it wants to see.
 REAL_TIME = [
     "tests/api/test_ethercat.py", "tests/api/test_ethercat_faults.py",
     "tests/api/test_ethercat_segment.py", "tests/api/test_every_family.py",
@@ -70,7 +70,7 @@ class Check(NamedTuple):
 def pytest(name: str, *arguments: str, again: bool = False) -> Check:
     """A suite; each keeps its own note of what failed, as two may run at a time.
 
-    Its report says what ran (see `tests/matrix.py`), that of a run ``again`` beside the first.
+    Its report says what ran (see `tests/matrix.py`), that of a run ``again`` next to the first.
     """
     report = f"{REPORTS}/{name}{' again' if again else ''}.xml"
     noted = ["-o", f"cache_dir=.pytest_cache/{name}", f"--junitxml={report}"]
@@ -97,7 +97,7 @@ QUICK = [
     Check("types", [str(BIN / "mypy")]),
     *(types_on(system) for system in ("win32", "darwin")),
 ]
-#: Checks without a bus as well, beside those of the types: about as long as they.
+#: Checks without a bus as well, next to those of the types: about as long as they.
 QUICK_BESIDE = [
     Check("page: types and lint", [*NPM, "run", "--silent", "check"], ROOT / "webui"),
     Check("page: unit tests", [*NPM, "run", "--silent", "test"], ROOT / "webui"),

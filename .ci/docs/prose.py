@@ -39,7 +39,7 @@ class Finding(NamedTuple):
 
 
 class Line(NamedTuple):
-    """A line of prose and where it stands."""
+    """A line of prose and where it is."""
 
     number: int
     text: str

@@ -55,7 +55,7 @@ async def keeping_mode(axis: Axis, session: CyclicSession) -> AsyncIterator[None
 
 
 def modes_of_the_loop(drive: Drive, session: CyclicSession, key: str) -> None:
-    """What the loop may leave in the borrowed ``key``: it writes past the drive's own methods."""
+    """What the loop may leave in the changed ``key``: it writes past the drive's own methods."""
     for mode in (Mode.PV,) if drive.id in session.by_speed else _CYCLIC:
         drive.pending_restores.commanded(key, int(mode))
 

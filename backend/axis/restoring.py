@@ -1,4 +1,4 @@
-"""Parameters that must be put back, and cleanups that nothing may interrupt."""
+"""Parameters that must be restored, and cleanups that nothing may interrupt."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ async def restoring(drive: Drive, *keys: str) -> AsyncIterator[dict[str, Raw]]:
     """Put these parameters back to what they are now, on every exit.
 
     Raises:
-        RestoreFailed: on leaving, naming what could not be put back.
+        RestoreFailed: on leaving, naming what could not be restored.
     """
     before: dict[str, Raw] = {}
     for key in keys:
@@ -102,7 +102,7 @@ async def shielded(cleanup: Callable[[], Awaitable[None]], timeout_s: float, dri
     """Run a cleanup to its end even when the surrounding task is cancelled again.
 
     Where it is run because something failed (from ``finally`` or ``except``), an error of its own
-    tells of that first.
+    reports that first.
 
     Raises:
         LinkTimeout: the cleanup itself took longer than ``timeout_s``.

@@ -84,7 +84,7 @@ async def serve(
 
     Raises:
         Busy: another server uses the state folder.
-        NotAllowed: the port is taken, the certificate is none, or others could come in without
+        NotAllowed: the port is in use, the certificate is none, or others could come in without
             an account.
     """
     bench.records.claim()
@@ -239,7 +239,7 @@ def _config(
         backlog=BACKLOG,
         timeout_graceful_shutdown=3,
         server_header=False,
-        # Who a proxy speaks for is believed only where one was announced.
+        # Who a proxy speaks for is trusted only where one was announced.
         proxy_headers=bool(serving.behind),
         ssl_certfile=None if certificate is None else str(certificate.certificate),
         ssl_keyfile=None if certificate is None else str(certificate.key),

@@ -86,7 +86,7 @@ class Drive(ReadableDrive):
         return await self._written(parameter, raw, permitted)
 
     async def put_back(self, key: str, raw: Raw) -> Reading:
-        """Write a borrowed value back, of whatever class, by the work that had borrowed it.
+        """Write a temporary value back, of whatever class, by the work that had changed it.
 
         Raises:
             NotGranted: it energises, and the calling work holds no grant.

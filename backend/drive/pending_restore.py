@@ -65,7 +65,7 @@ class PendingRestores:
 
     @contextmanager
     def temporary(self, values: Mapping[str, Raw]) -> Iterator[None]:
-        """Around a motion that changes these raw values and puts them back when it ends."""
+        """Around a motion that changes these raw values and restores them when it ends."""
         temporary = dict(values)
         for key, raw in temporary.items():
             self._temporary.setdefault(key, []).append(raw)
@@ -105,7 +105,7 @@ class PendingRestores:
         return any(entry.unapplied for entry in self._entries.values())
 
     def add(self, values: Mapping[str, Raw], *, unapplied: bool = False) -> None:
-        """These raw values could not be put back, or (``unapplied``) not made to act."""
+        """These raw values could not be restored, or (``unapplied``) not made to act."""
         for key, raw in values.items():
             known = self._entries.get(key)
             left = self._sent.get(key, frozenset())
@@ -134,11 +134,11 @@ class PendingRestores:
         return self._temporary[key][0] if key in self._temporary else raw
 
     def is_temporary(self, key: str) -> bool:
-        """A motion has changed this for its length, and puts it back."""
+        """A motion has changed this for its length, and restores it."""
         return key in self._temporary
 
     def restores(self, key: str, raw: Raw) -> bool:
-        """Whether writing this raw value puts back what a motion has changed."""
+        """Whether writing this raw value restores what a motion has changed."""
         entry = self._entries.get(key)
         return raw in self._temporary.get(key, ()) or (entry is not None and entry.raw == raw)
 

@@ -227,7 +227,7 @@ class Library:
         return entry
 
     def undelete(self, entry_id: int) -> Entry:
-        """Take an entry back that was put aside.
+        """Take an entry back that was archived.
 
         Raises:
             NotInLibrary: no such entry.
@@ -245,7 +245,7 @@ class Library:
         self._record_action("deleted", entry)
 
     def purge(self, before: datetime) -> list[Entry]:
-        """Delete for good what was put aside before this time, with contents nothing else names.
+        """Delete for good what was archived before this time, with contents nothing else names.
 
         Raises:
             DatabaseFailed, BlobFailed: some may remain; calling again goes on.

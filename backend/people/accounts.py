@@ -68,7 +68,7 @@ class Accounts:
     async def set_up(
         self, code: str, name: str, password: str, address: str, client: str
     ) -> tuple[str, LoginSession]:
-        """The first administrator; the code stands in the terminal of the machine.
+        """The first administrator; the code is in the terminal of the machine.
 
         Raises:
             Forbidden: there is one already, or the code is wrong. TooOften: too many tries.
@@ -133,7 +133,7 @@ class Accounts:
         """A new account.
 
         Raises:
-            NotAllowed: the name is taken, or name or password is none.
+            NotAllowed: the name is in use, or name or password is none.
         """
         async with self._changing:
             return await self._add(name, password, role)

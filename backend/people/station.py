@@ -82,7 +82,7 @@ class People:
         try:
             self.accounts.devices = KnownDevices(self._marker.write().key)
         except StorageFailed as error:
-            # Who is to log in can; only that there are accounts stands in one place too few.
+            # Who is to log in can; only that there are accounts is in one place too few.
             log.error("it is not noted beside the database that there are accounts: %s", error)  # noqa: TRY400
 
     def close(self) -> None:

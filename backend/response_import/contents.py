@@ -1,4 +1,4 @@
-"""From a file's bytes to its table: named columns of numbers. Nothing in it is believed.
+"""From a file's bytes to its table: named columns of numbers. Nothing in it is trusted.
 
 Text: comma, semicolon, tab or blanks between the columns, decimal point or comma, any lines before
 the table (makers' scopes write several), UTF-8, UTF-16 or Latin-1, and gzip around it. MATLAB: v4
@@ -33,7 +33,7 @@ _MISSING = {"", "nan", "-nan", "inf", "-inf", "+inf", "null", "n/a", "#n/a", "no
 
 @dataclass(frozen=True)
 class Table:
-    """``columns`` by number as in the file, ``names`` beside them; NaN where nothing stands.
+    """``columns`` by number as in the file, ``names`` next to them; NaN where nothing is written.
 
     ``first_line`` is the line of the file that holds the first row, 0 where there are no lines.
     ``facts`` are pairs that stood before the table, such as a sample time.

@@ -83,7 +83,7 @@ def prepared(table: Table, name: str, settings: ImportSettings) -> Signals:
 
 
 def evaluate_signals(signals: Signals, name: str, settings: ImportSettings) -> dict[str, object]:
-    """The JSON form of a sweep, with what an import says beside it.
+    """The JSON form of a sweep, with what an import says next to it.
 
     Raises:
         BadRecording: the recording supports no answer.

@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 #: Polling period while somebody watches, and while nobody does.
 WATCHED_S = 0.1
 IDLE_S = 1.0
-#: Beside an exchange that brings state and values, everything else is asked for so often.
+#: During an exchange that brings state and values, everything else is asked for so often.
 ASKED_S = 1.0
 #: Option codes and ramps of STOP are asked for so often, while the axis is enabled.
 STOP_ASKED_S = 0.9
@@ -201,7 +201,7 @@ class Monitor:
         return await self._snapshot()
 
     async def _read_what_changes(self) -> Snapshot:
-        """The newest process data instead of questions, as long as they tell nothing new.
+        """The newest process data instead of questions, as long as they show nothing new.
 
         The drive itself is still asked every `ASKED_S`: process data may go on where its mailbox,
         and with it the firmware, is dead. Any change of state or fault has everything asked for.

@@ -1,7 +1,7 @@
 """Watches one axis from STOP to standstill, and does more where the quick stop is not enough.
 
 The first quick-stop word is out when this begins. What follows, each as a `StopStep`: where the
-axis turns without being enabled, what the drive moves by itself is taken back (`stop_clears` of
+axis turns without being enabled, what the drive moves by itself is undone (`stop_clears` of
 its profile); where an enabled axis neither stands nor slows down when its ramp should be over, its
 power goes, the brake first where the bus rules it; and at last the process data end, so that the
 drive's watchdog trips. An axis that slows down on a long ramp keeps its power: to coast is worse.
@@ -43,9 +43,9 @@ _OWN_RAMP_S = 1.0
 _LOOK_EVERY_S = 0.02
 #: Turning without being enabled for this long is not the end of a quick stop.
 _UNPOWERED_S = 0.1
-#: Slower than this part of the speed within that time: it comes to rest. Faster: it falls.
+#: Slower than this part of the speed within that time: it stops. Faster: it falls.
 _RUNS_OUT, _FALLS = 0.95, 1.05
-#: A drive that tells nothing for this long is not reached.
+#: A drive that reports nothing for this long is not reached.
 _SILENT_S = 1.5
 #: A position that was read within this time before STOP shows whether the axis stood; a younger one
 #: than `WINDOW_S` is too young for a speed, and is let grow old enough.
@@ -70,7 +70,7 @@ class StopWatch:
         self._until_s = 0.0
 
     async def run(self, problem: Text | None = None) -> AxisStop:
-        """Until the verdict. ``problem`` says why the first word did not go out."""
+        """Until the verdict. ``problem`` states why the first word did not go out."""
         axis, self._began_s = self._axis, time.monotonic()
         before = self._resting_at()
         try:

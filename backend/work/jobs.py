@@ -99,7 +99,7 @@ class JobRunner:
         self._granted = granted
         self._jobs: dict[str, Job] = {}
         self._numbers = itertools.count(1)
-        # A page outlives a restart of the server: its old jobs must not be taken for new ones.
+        # A page outlives a restart of the server: its old jobs must not be mistaken for new ones.
         self._run_mark = secrets.token_hex(3)
         self._changed = changed
         self._last_reported: dict[str, float] = {}

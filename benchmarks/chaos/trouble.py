@@ -19,7 +19,7 @@ Trouble = Callable[[float], Awaitable[None]]
 
 
 class Troubles:
-    """Makes trouble for some seconds and takes it back."""
+    """Makes trouble for some seconds and undoes it."""
 
     def __init__(
         self, station: TrialStation, judge: Judge, source: random.Random, say: Any, tally: Tally,

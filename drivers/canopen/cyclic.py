@@ -95,7 +95,7 @@ class CanopenCyclic:
         return ""
 
     def watch_nodes_by(self, heard: Callable[[int], bool]) -> None:
-        """How to tell whether a node of this number is on the bus."""
+        """How to determine whether a node of this number is on the bus."""
         self._heard = heard
 
     def send_events_to(self, send: Callable[[LinkEvent], None]) -> None:
@@ -110,7 +110,7 @@ class CanopenCyclic:
             self._without_cyclic_modes.add(station)
 
     def set_fixed_pdos(self, station: int, fixed: Sequence[FixedPdo]) -> None:
-        """PDOs of the drive that it does not let be mapped anew."""
+        """PDOs of the drive that it does not let be mapped again."""
         self._fixed_pdos[station] = tuple(fixed)
 
     def speak(self, station: int, dialect: Dialect) -> None:
@@ -164,7 +164,7 @@ class CanopenCyclic:
 
         Raises:
             NotAllowed: nothing configured, or a drive does not let itself be mapped.
-            LinkTimeout, LinkLost: as for any write; what was changed has been put back.
+            LinkTimeout, LinkLost: as for any write; what was changed has been restored.
         """
         configured = self._configured
         if configured is None:
@@ -235,7 +235,7 @@ class CanopenCyclic:
         return loop.play(motions)
 
     async def _until_seen_enabled(self, loop: SyncLoop, station: int) -> None:
-        """An SDO may tell of Operation enabled a cycle or two before the process data do."""
+        """An SDO may report Operation enabled a cycle or two before the process data do."""
         axis = loop.images.axes[station]
         waited_s = 0.0
         enabled = State.OPERATION_ENABLED

@@ -51,7 +51,7 @@ class FixedPdo:
 
 
 def fixed_pdos(profile: Profile, station: int) -> tuple[FixedPdo, ...]:
-    """The fixed PDOs of a node, of directions in which no PDO can be mapped anew."""
+    """The fixed PDOs of a node, of directions in which no PDO can be mapped again."""
     sets = profile.pdo.sets if profile.pdo is not None else ()
     open_ways = {each.direction for each in sets if not each.fixed}
     found = (
@@ -91,7 +91,7 @@ def chosen(
 ) -> tuple[list[tuple[FixedPdo, tuple[CyclicSignal, ...]]], list[CyclicSignal]]:
     """PDOs that hold these signals, each with its own; and the signals that none holds.
 
-    What an output PDO holds beside them is a signal as well: the drive takes it in every cycle.
+    What an output PDO holds next to them is a signal as well: the drive takes it in every cycle.
     """
     left = list(wanted)
     found = []

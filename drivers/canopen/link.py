@@ -90,7 +90,7 @@ class CanopenLink:
             node: SdoChannel(node, self._request_sender(node)) for node in range(1, 128)
         }
         self._turns = {node: asyncio.Lock() for node in range(1, 128)}
-        #: Writes that wait for their turn: one may be the stop, so batches of reads give way.
+        #: Writes that wait for their turn: one may be the stop, so batches of reads yield.
         self._urgent = dict.fromkeys(range(1, 128), 0)
         self._port = CanPort(self._settings, self._frame, self._event, self._idle, opener)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -394,7 +394,7 @@ class CanopenLink:
             try:
                 self._port.send(Frame(HEARTBEAT + node, remote=True))
             except LinkLost:
-                return  # the receiving thread is about to notice and tell of it
+                return  # the receiving thread is about to notice and report it
 
     @property
     def doctor(self) -> CanopenLink:

@@ -1,4 +1,4 @@
-"""slcan adapters: python-can's client, made to tell of refused frames and of bus-off.
+"""slcan adapters: python-can's client, made to report refused frames and of bus-off.
 
 python-can drops the adapter's BEL (a frame it could not send) and never asks for the status
 flags, so a bus-off would only look like silence. It also reads one byte per system call.

@@ -148,7 +148,7 @@ class SyncLoop:
         return True
 
     def forget_arrivals(self) -> None:
-        """Count anew which input PDOs came."""
+        """Count again which input PDOs came."""
         with self._lock:
             self._came.clear()
 
@@ -330,7 +330,7 @@ class SyncLoop:
         self._statistics.incomplete += not valid
         if not self._rows:
             self._block_cycle = self._sent_cycle
-        # Beside what SYNC called for stands what went out in the same cycle, for the next SYNC.
+        # Next to what SYNC called for stands what went out in the same cycle, for the next SYNC.
         self._rows.append([*self.images.values, *self._sent])
         self._row_valid.append(valid)
         for station, axis in self.images.axes.items():

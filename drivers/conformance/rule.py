@@ -79,7 +79,7 @@ class Rule:
 
     @property
     def title(self) -> Text:
-        """What the clause prescribes, in words."""
+        """What the clause prescribes, as text."""
         return text(self.code)
 
 

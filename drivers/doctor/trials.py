@@ -14,7 +14,7 @@ from profiles.bring_up import BringUp, ClockMode
 from profiles.schema import PdoSet, Profile
 
 MOST = 4
-"""Trials of one station: each takes the drive to Operational anew."""
+"""Trials of one station: each takes the drive to Operational again."""
 
 _ACTIVATES = (0x0300, 0x0000, 0x0700, 0x0330)
 """Values of 0980h that drives in use want: SYNC0, no clock, SYNC0 and SYNC1, SYNC0 on its pin."""

@@ -234,7 +234,7 @@ class EthercatLink:
         """Drive one slave to a state.
 
         Raises:
-            NotAllowed: it refuses; the reason is its AL status code in words.
+            NotAllowed: it refuses; the reason is its AL status code as text.
         """
         await self._call({"op": "state", "station": station, "state": state.name}, _ANSWER_S)
 
@@ -362,7 +362,7 @@ class EthercatLink:
         elif message["event"] == "link":
             kind, station = message["kind"], message["station"]
             if kind == "back" and station is None and self.process_data.trouble:
-                # Who reads everything anew on "back" waits until the drives have been set up.
+                # Who reads everything again on "back" waits until the drives have been set up.
                 kind = "state"
             self._notify(LinkEvent(kind, station, message["text"], message["code"]))
 

@@ -4,7 +4,7 @@ Blocking code; `drivers.modbus.link.RegisterLink` runs it on the bus's thread. N
 repeated here, because only the caller knows whether a repetition is harmless.
 
 After a failed question its answer may still come; see `drivers.modbus.late` for how it is kept
-from being taken for another one.
+from being mistaken for another one.
 """
 
 from __future__ import annotations
@@ -367,7 +367,7 @@ class Line:
     def _outwait(
         self, port: Port, late: LateAnswers, query: Query, timeout_s: float | None
     ) -> None:
-        """Make sure that no late answer can be taken for the one to ``query``.
+        """Make sure that no late answer can be mistaken for the one to ``query``.
 
         Raises:
             LinkTimeout: no answer to the check, or none that proves anything; nothing was asked.

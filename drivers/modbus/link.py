@@ -53,7 +53,7 @@ from profiles.schema import LinkKind, Profile
 
 T = TypeVar("T")
 
-#: A job on the bus's thread gives way to others after this time (and always after a failure).
+#: A job on the bus's thread yields to others after this time (and always after a failure).
 _TURN_S = 0.005
 #: A drive that says that it is busy is asked again after this time, then after twice as long.
 _BUSY_S = 0.05

@@ -88,7 +88,7 @@ class BenchSpec(BaseModel):
 
 
 def load_bench(path: Path = STANDARD_BENCH) -> BenchSpec:
-    """Read a bench file (TOML, or JSON of the same shape); mechanics paths are beside it.
+    """Read a bench file (TOML, or JSON of the same shape); mechanics paths are next to it.
 
     Raises:
         NotAllowed: the file is missing or wrong; the message names the field.

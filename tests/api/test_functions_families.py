@@ -140,7 +140,7 @@ def test_m6l_forces_outputs_only_while_process_data_run(station: Station) -> Non
 
 
 def test_m6l_switches_a_virtual_input_on(station: Station) -> None:
-    """P03.14 switches DI1 to DI9 on beside their pins (000:3276)."""
+    """P03.14 switches DI1 to DI9 on next to their pins (000:3276)."""
     path = "/drives/m6l/io/forcing/simulation"
     station.ok(station.http.post(path, json={"confirmed": True}))
     assert terminals(station, "m6l")["DI9"]["on"] is False

@@ -1,4 +1,4 @@
-"""Commands killed in a measurement (SIGKILL): what they borrowed is known and restored later."""
+"""Commands killed in a measurement (SIGKILL): what they changed is known and restored later."""
 
 from __future__ import annotations
 

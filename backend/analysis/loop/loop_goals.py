@@ -71,7 +71,7 @@ class Worst:
 
     @property
     def guaranteed(self) -> Goals:
-        """As a promise, after the reserve."""
+        """What is guaranteed: these less the reserve."""
         db, deg, factor = RESERVE
         return Goals(self.gain_margin_db - db, self.phase_margin_deg - deg, self.ms * factor)
 

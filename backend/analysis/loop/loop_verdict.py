@@ -61,7 +61,7 @@ class BandVerdict:
 
 @dataclass(frozen=True)
 class Missed:
-    """One figure that is worse than asked for; ``end`` tells which one of its interval."""
+    """One figure that is worse than asked for; ``end`` shows which one of its interval."""
 
     what: Missing
     value: float
@@ -130,7 +130,7 @@ class LoopVerdict:
 
 
 def _short(band: BandVerdict | None, end: End, guaranteed: Goals) -> list[Missed]:
-    """The worst ends of a band's intervals that are too far below a promise."""
+    """The worst ends of a band's intervals that are too far below a guaranteed value."""
     if band is None:
         return []
     found = []
@@ -169,7 +169,7 @@ def judge(
     ``loops`` [m, n] on the dense grid ``frequency_hz`` are all that the loop may be, ``nominal``
     [n] the one that was measured as predicted. ``lines`` None: nothing was measured. ``late_s`` and
     ``size`` (logarithm) are what the measured lines show the loop to have beyond its prediction,
-    each with its deviation; None where they tell nothing. ``alternatives`` [k, n] are loops that no
+    each with its deviation; None where they show nothing. ``alternatives`` [k, n] are loops that no
     design counts on and no measurement excludes above its band: where a raised gain excludes none
     of them either, they widen what is stated there.
     """
@@ -187,7 +187,7 @@ def judge(
     if shown_gain_db is not None:
         more = possible * 10 ** (shown_gain_db / 20.0)
         left = possible[np.asarray(stable(more))]
-        # Where nothing in the set explains what was seen, the set is wrong, and tells nothing.
+        # Where nothing in the set explains what was seen, the set is wrong, and shows nothing.
         contradicted = not left.size
         possible = possible if contradicted else left
     over = np.abs(possible) > 1.0
@@ -292,7 +292,8 @@ def _moved(
 def excluding_db(
     verdict: LoopVerdict, frequency_hz: FloatArray, loops: ComplexArray, guaranteed: Goals
 ) -> float:
-    """The gain that no loop is stable with that misses the promise; 0 where none misses it.
+    """The gain that no loop is stable with that misses the guaranteed margin; 0 where none misses
+    it.
 
     ``loops`` as in `judge`. A loop misses it by more than the worst end of an interval may. A loop
     that is stable with more gain than that, in dB, is none of them.

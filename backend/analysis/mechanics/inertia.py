@@ -66,7 +66,7 @@ class InertiaResult:
     identifiable: bool
     reasons: tuple[Reason, ...]
     load_terms: FoundTerms = NO_LOAD_TERMS
-    """What the torque depends on beside inertia and friction."""
+    """What the torque depends on in addition to inertia and friction."""
 
 
 def _smoothing_kernel(sample_rate_hz: float, cutoff_hz: float) -> FloatArray:
@@ -134,7 +134,7 @@ def estimate_inertia(
 
     ``torque_nm`` is the motor's torque. ``minimum_speed_rad_s`` defaults to 5 % of the peak
     speed. The motion must be smooth between bus cycles (interpolated, or made by the drive's own
-    profile): with a reference that steps every cycle T, the torque sampled beside each step is
+    profile): with a reference that steps every cycle T, the torque sampled next to each step is
     off by half a step, about ω_speed·T/2 of the acceleration torque. ``position_rad`` [n] is the
     motor's; without it the speed is summed up. Samples at the torque limit,
     in gaps (``valid`` False) and within the filter's reach of either are left out.
@@ -184,7 +184,7 @@ def _machine(
     rigid: FloatArray, torque: FloatArray, motion: Motion, keep: BoolArray, rate: float,
     highest_hz: float,
 ) -> tuple[Terms, FloatArray, FloatArray]:  # fmt: skip
-    """What of the machine shows in the torque beside a rigid inertia and friction.
+    """What of the machine shows in the torque in addition to a rigid inertia and friction.
 
     Returns the terms, all columns (the rigid ones, those of the terms, those of loads that
     swing) and how what was searched bends them [n, columns].
@@ -202,7 +202,7 @@ def _machine(
     terms = find_terms(np.column_stack([rigid, *swinging]), torque, motion, keep)
     known = np.column_stack([rigid, terms.columns(motion)])
     if terms != Terms():
-        # Without them they may have been taken for a load that swings.
+        # Without them they may have been mistaken for a load that swings.
         swinging, slopes = lags(known)
     bends = np.column_stack([np.empty((torque.size, 0)), *slopes, *terms.slopes(motion)])
     return terms, np.column_stack([known, *swinging]), bends

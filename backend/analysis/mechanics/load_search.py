@@ -1,6 +1,6 @@
 """Where a chain may have one more load: many ways are tried, images included, and ranked.
 
-Each way is a load at a place of the chain; what only gain and delay tell apart is one way.
+Each way is a load at a place of the chain; what only gain and delay distinguish is one way.
 """
 
 from __future__ import annotations
@@ -202,7 +202,7 @@ def _residuals_of(view: View, found: Found) -> FloatArray:
 
 
 def _new_loads(x: FloatArray, place: int, grid_hz: FloatArray, worst_hz: FloatArray) -> FloatArray:
-    """All loads [n, 4] that are tried at one place: added to what is there, or taken from it.
+    """All loads [n, 4] that are tried at one place: added to what is there, or removed from it.
 
     Where the explanation fails most, there is an antiresonance or a resonance.
     """

@@ -1,9 +1,10 @@
-"""Torques that some machines need beside inertia and friction, shown by the moves themselves.
+"""Torques that some machines need in addition to inertia and friction, shown by the moves
+themselves.
 
 A fan, a pump or a stirrer takes a torque that grows with the square of its speed; a spring, an arm
 or a load out of balance one that depends on the place (`place_torque`); and friction is larger near
 standstill (Stribeck 1902). Left out, they pass for inertia, for play, or turn friction negative. A
-term is taken up only where it clearly explains what the
+term is accepted only where it clearly explains what the
 others leave, so that an axis without it is judged as if there were no such thing.
 """
 
@@ -52,7 +53,7 @@ NO_LOAD_TERMS = FoundTerms(0.0, 0.0, (), np.empty(0))
 
 @dataclass(frozen=True)
 class Terms:
-    """What the torque is made of beside inertia and friction.
+    """What the torque is made of in addition to inertia and friction.
 
     ``static_rad_s`` is the speed within which static friction falls, 0 where there is none;
     ``periods_rad`` are those of torques that depend on the place.
@@ -75,7 +76,7 @@ class Terms:
         return np.column_stack(parts)
 
     def may_hide(self, before: Terms) -> bool:
-        """Whether what these have more than ``before`` is taken up beside noise, too."""
+        """Whether what these have more than ``before`` is accepted next to noise, too."""
         if self.static_rad_s != before.static_rad_s:
             return False
         return self.periods_rad == before.periods_rad or self.periods_rad[-1] > COGGING_RAD
@@ -110,7 +111,7 @@ class Terms:
 
 
 def find_terms(others: FloatArray, torque_nm: FloatArray, motion: Motion, keep: BoolArray) -> Terms:
-    """The terms that the torque [n] shows beside ``others`` [n, columns].
+    """The terms that the torque [n] shows next to ``others`` [n, columns].
 
     The third of ``others`` is the direction of motion, whose size is the Coulomb friction.
     """

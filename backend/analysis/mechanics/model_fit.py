@@ -2,7 +2,7 @@
 
 A chain grows load by load where a search over all ways to add one finds that one is missing, as
 long as the Bayesian information criterion gains (Schwarz, Ann. Statist. 6 (1978) 461). What no
-chain explains (damping elsewhere than beside a spring) a free sum of modes may, from there.
+chain explains (damping elsewhere than next to a spring) a free sum of modes may, from there.
 """
 
 from __future__ import annotations
@@ -191,7 +191,7 @@ def _grown(problem: Problem, start: FloatArray, max_modes: int) -> Found:
 
 
 def _best_end(problem: Problem, now: Found, starts: list[FloatArray]) -> Found:
-    """Where the starts lead: all of them on few lines first, the most promising on all lines."""
+    """Where the starts lead: all of them on few lines first, the best on all lines."""
     coarse = problem.thinned(
         informative_lines(best_view(problem.views), now, threshold.COARSE_LINES)
     )

@@ -3,7 +3,7 @@
 T(v) = Tg + sign(v)·(Tc + Ts·exp(-(|v|/vs)^δ)) + b·v (Armstrong-Hélouvry, Dupont, Canudas de Wit,
 "A survey of models, analysis tools and compensation methods for the control of machines with
 friction", 1994). For each vs and δ of a grid it is linear; the interval of a value spans all
-pairs that the data do not tell from the best one. Any units: torque and speed as given.
+pairs that the data do not distinguish from the best one. Any units: torque and speed as given.
 """
 
 from __future__ import annotations

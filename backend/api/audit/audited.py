@@ -60,7 +60,7 @@ REPORTED_THERE = frozenset(
     for path in paths
 )  # fmt: skip
 #: Routes that compute or read, and change nothing that stays. (Some records of faults are read
-#: through a selector, which is written and put back; each such write is reported as a write.)
+#: through a selector, which is written and restored; each such write is reported as a write.)
 CHANGES_NOTHING = frozenset(
     f"POST {API}{path}"
     for path in (
@@ -95,7 +95,7 @@ class AuditedAnswers:
             await self._app(scope, receive, send)
             return
         matched = next(iter(self._policy.needs(scope["method"], scope["path"])), None)
-        # The name may be gone when the answer comes: a drive that was taken off the bench.
+        # The name may be gone when the answer comes: a drive that was removed from the axis list.
         axis = self._name_of(matched.drive) if matched and matched.drive else ""
         body = _Body(receive)
         query = dict(parse_qsl(scope["query_string"].decode("latin-1")))
@@ -117,7 +117,7 @@ class AuditedAnswers:
             asked.reset(token)
 
     def _notify(self, matched: Matched, scope: Scope, axis: str, said: Asked) -> None:
-        """Record a change that nobody else tells."""
+        """Record a change that nobody else shows."""
         if matched.route in REPORTED_THERE or matched.route in CHANGES_NOTHING:
             return
         path: str = scope["path"]

@@ -140,7 +140,7 @@ class GearPlanInfo(Message):
     range_travel: float = Field(description="travel of 2^31 user increments")
     max_speed: float | None = Field(description="travel per second at the greatest motor speed")
     max_speed_rpm: float | None
-    acts: str = Field(description="when a change acts, in words")
+    acts: str = Field(description="when a change acts, as text")
     notes: str
     source: str
     warnings: list[str]

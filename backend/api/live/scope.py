@@ -2,7 +2,7 @@
 
 A subscription may be carried by several streams: what the cyclic exchange brings with every cycle,
 and what is polled. When an exchange starts or ends, or a drive comes back, the streams are made
-anew by themselves and the page is informed with another ScopeInfo.
+again by themselves and the page is informed with another ScopeInfo.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ SendBytes = Callable[[bytes], Awaitable[None]]
 
 @dataclass(slots=True)
 class _Running:
-    """A subscription. ``signature`` changes when its streams must be made anew."""
+    """A subscription. ``signature`` changes when its streams must be made again."""
 
     request: ScopeStart
     signature: object
@@ -81,7 +81,7 @@ class ScopeStreams:
             ) from error
 
     def bench_changed(self) -> None:
-        """Drives or exchanges changed; streams that this concerns are made anew."""
+        """Drives or exchanges changed; streams that this concerns are made again."""
         if not self._changed:
             self._changed = True
             with contextlib.suppress(asyncio.QueueFull):  # whatever waits there sees it as well

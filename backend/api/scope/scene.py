@@ -95,7 +95,7 @@ async def _until_gone(socket: WebSocket) -> None:
 
 
 def _protocol() -> str:
-    """viser's client and server must be of one version; the subprotocol tells."""
+    """viser's client and server must be of one version; the subprotocol shows."""
     return f"viser-v{version('viser')}"
 
 

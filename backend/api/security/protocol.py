@@ -35,7 +35,7 @@ MOST_PER_ADDRESS = 100
 #: (`backend.api.admission.requests`, `backend.api.security.socket`), so that there always is one.
 MOST_CONNECTIONS = 800
 
-#: Frames beside messages at once, and a second. A page of ours answers a ping every 5 s.
+#: Frames next to messages at once, and a second. A page of ours answers a ping every 5 s.
 _FRAMES = (100.0, 20.0)
 
 _open: Counter[str] = Counter()

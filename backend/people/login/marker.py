@@ -1,4 +1,4 @@
-"""The note beside the database that this station has accounts.
+"""The note next to the database that this station has accounts.
 
 A database file that was emptied, lost or replaced looks like a station that never had any, and
 such a station lets whoever reaches it do everything. So that there are accounts also stands in
@@ -50,7 +50,7 @@ class AccountsMarker:
         """The note, or None where there is none; one that is damaged still says that there is one.
 
         Raises:
-            AccountsMissing: it cannot be read, so that nobody can tell.
+            AccountsMissing: it cannot be read, so that nobody can know.
         """
         try:
             content = json.loads(self.path.read_bytes())
@@ -68,7 +68,7 @@ class AccountsMarker:
             ) from error
 
     def write(self) -> Marker:
-        """Note that there are accounts, unless that is noted; a damaged note is written anew.
+        """Note that there are accounts, unless that is noted; a damaged note is written again.
 
         Raises:
             StorageFailed: it cannot be written.

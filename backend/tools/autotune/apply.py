@@ -41,7 +41,7 @@ async def first_kept(
     guaranteed: Goals, tried: list[Text], progress: Progress, keep: Keep | None,
     softer: Softer | None = None, time_left: TimeLeft | None = None,
 ) -> Applied | None:  # fmt: skip
-    """The first candidate that meets its prediction stays; ``tried`` says why others do not.
+    """The first candidate that meets its prediction stays; ``tried`` states why others do not.
 
     ``candidates`` are tried in their order; what is ``guaranteed`` is what was asked for, which a
     more careful one may keep where it does not reach its own goals. One with torque ripple only

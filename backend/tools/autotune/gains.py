@@ -218,7 +218,7 @@ def _inertia_raw(
 
 
 async def rotor_inertia(axis: Axis, given_kgm2: float | None = None) -> float | None:
-    """The motor's own inertia: given, or from the drive where it tells."""
+    """The motor's own inertia: given, or from the drive where it shows."""
     return given_kgm2 or await si(axis.drive, axis.drive.key("motor_inertia"))
 
 

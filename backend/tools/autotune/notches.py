@@ -45,9 +45,9 @@ async def learn_notches(
     outcome: inertia_evaluation.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
     progress: Progress, time_left: TimeLeft | None = None,
 ) -> Text | None:  # fmt: skip
-    """Measure what no manual prints, where it is worth it: beside the loop where one is needed.
+    """Measure what no manual prints, where it is worth it: with the loop where one is needed.
 
-    A load that pulls needs one, and an axis whose mechanics were measured beside one.
+    A load that pulls needs one, and an axis whose mechanics were measured with one.
 
     Returns why the design goes without notches; None where it does not.
     """

@@ -131,7 +131,7 @@ def judged(
 
 @dataclass
 class Trials:
-    """Everything that is verified on one axis, in turn; ``tried`` says why what failed did."""
+    """Everything that is verified on one axis, in turn; ``tried`` states why what failed did."""
 
     axis: Axis
     session: CyclicSession

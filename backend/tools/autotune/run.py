@@ -81,7 +81,7 @@ class AutotuneResult:
 
     ``before`` holds raw values that undo what was applied, empty when nothing was written, also
     because ``applied`` is what the axis had. ``tried`` says
-    of designs that were taken back why; ``notes`` what the design does without. ``cautious``: no
+    of designs that were undone why; ``notes`` what the design does without. ``cautious``: no
     model could be relied on. ``again``: what was made of a loop that answered otherwise than
     predicted. ``expected`` is the prediction for ``applied``, read where the verification was.
     """

@@ -71,7 +71,7 @@ def sharp_lines(frf: Frf) -> Lines | None:
 def reported_lines(frf: Frf) -> Lines | None:
     """The lines that noise hardly moves, up to the first gap; None where there are too few.
 
-    Of a slow loop they lie above its crossover: they tell its size and its delay all the same,
+    Of a slow loop they lie above its crossover: they show its size and its delay all the same,
     though not the margins of that crossover.
     """
     use = frf.in_band & (frf.coherence > COHERENT) & ~(frf.std_deg > BLURRED_DEG)

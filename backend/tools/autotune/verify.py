@@ -1,4 +1,4 @@
-"""Whether a tuned axis keeps what its design guaranteed: measured, not believed."""
+"""Whether a tuned axis keeps what its design guaranteed: measured, not trusted."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ HUM_PERCENT = threshold.HUM_PERCENT
 
 @dataclass(frozen=True)
 class Verified:
-    """The speed loop as measured after applying, beside what was predicted.
+    """The speed loop as measured after applying, compared with what was predicted.
 
     ``hum_percent`` is set where nothing but a hum is wrong, in % of the rated torque.
     """
@@ -108,7 +108,7 @@ async def verify(
     """Stand still, measure the closed speed loop, make a step; ``reported``: a progress each.
 
     The loop is measured once more, with as many pairs of realisations as ``time_left`` allows,
-    where the first pair tells too little, or another bandwidth than was predicted.
+    where the first pair shows too little, or another bandwidth than was predicted.
 
     Raises:
         NotAllowed: it does not stand still, or the envelope or a fault ended it.
@@ -286,7 +286,7 @@ def worse_than(guaranteed: Goals, found: dict[str, float | bool | None]) -> list
 def otherwise(verified: Verified) -> Text | None:
     """That a tuned loop answers otherwise than predicted, though it keeps its margins; else None.
 
-    An axis with play does: how much of the time its gap is open depends on how it is driven.
+    An axis with backlash does: how much of the time its gap is open depends on how it is driven.
     """
     predicted, measured = verified.predicted_bandwidth_hz, verified.measured_bandwidth_hz
     if _as_predicted(predicted, measured):
@@ -298,7 +298,7 @@ def unseen(last_hz: float | None, verified: Verified) -> Text | None:
     """That the last crossover possible lies above what was verified; else None.
 
     The motor of a soft axis is alone above its resonances, and lighter: its loop may cross 0 dB
-    for the last time where the samples of this exchange tell nothing.
+    for the last time where the samples of this exchange show nothing.
     """
     verdict = verified.verdict
     if verdict is not None:

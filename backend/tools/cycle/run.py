@@ -118,7 +118,7 @@ async def _facts(axis: Axis, units: AxisUnits, settings: CycleSettings) -> Cycle
 
 
 async def _readable(axis: Axis, role: str) -> str | None:
-    """The key of what may be read beside torque and speed, where this drive has it."""
+    """The key of what may be read in addition to torque and speed, where this drive has it."""
     key = axis.drive.key(role)
     if key is None or axis.drive.unreachable_why(axis.drive.parameter(key)):
         return None

@@ -54,7 +54,7 @@ class InertiaOutcome:
     ends_rev: tuple[float, float] | None
     motion_s: float
     ratio_against: RatioReference | None
-    """What the load ratio compares with, in words; empty where there is no ratio."""
+    """What the inertia ratio compares with, as text; empty where there is no ratio."""
 
 
 def evaluate(recording: Recording, settings: InertiaSettings, facts: AxisFacts) -> InertiaResult:
@@ -91,7 +91,8 @@ def uncertainty_of(result: InertiaResult) -> float:
 
 
 def oscillation_hz(recording: Recording, result: InertiaResult) -> float | None:
-    """Where the torque swings beside what inertia and friction explain; None where it hardly does.
+    """Where the torque swings compared with what inertia and friction explain; None where it hardly
+    does.
 
     Under its speed loop the motor follows and the load swings behind the coupling, at the
     mechanics' antiresonance.
@@ -121,7 +122,7 @@ def _reference_inertia(facts: AxisFacts) -> float | None:
 
 
 def ratio_against(facts: AxisFacts, settings: InertiaSettings) -> RatioReference | None:
-    """What the load ratio compares with; None where there is no ratio."""
+    """What the inertia ratio compares with; None where there is no ratio."""
     if settings.motor_inertia_kgm2:
         return "given"
     if facts.motor_inertia_kgm2:

@@ -27,13 +27,15 @@ FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 #: A speed below this share of the commanded one is a sign, once it has lasted this long.
 _LEFT, _LASTS_S = 0.9, 0.01
-#: The commanded speed must have been constant for this long, so that no run-up is taken for a sign.
+#: The commanded speed must have been constant for this long, so that no run-up is mistaken for a
+#: sign.
 STEADY_S = 0.15
-#: The speed by position is taken over this time; slower than the greater of these is standing.
+#: The speed by position is calculated over this time; slower than the greater of these is standing.
 _WINDOW_S, _STANDS_SHARE, _STANDS_RPM = 0.02, 0.02, 3.0
 #: Rest is where no more of the way is left than this share of it, or this many revolutions.
 _SETTLED, _RESOLVED_REV = 0.002, 2e-4
-#: The noise of the torque is known without power; deviations, and the least that is told apart [%].
+#: The noise of the torque is known without power; deviations, and the least that is distinguished
+#: [%].
 _DEVIATIONS, _LEAST_PERCENT, _FILTER = 5.0, 0.3, 5
 #: Torque before the trigger must be so many times that, or its end cannot be told.
 _DISTINCT = 3.0
@@ -82,7 +84,7 @@ class Trace:
         return {name: getattr(self, name) for name in _ARRAYS}
 
     def facts(self) -> dict[str, object]:
-        """For storage, beside the arrays."""
+        """For storage, with the arrays."""
         return {
             "sample_rate_hz": self.sample_rate_hz, "asked_until": self.asked_until,
             "measured_at": self.measured_at, "reports": list(self.reports),
@@ -137,7 +139,7 @@ def digest(arrays: Arrays, meta: Meta, person: str, signed: str, notes: str) -> 
 
 
 def signed(arrays: Arrays, meta: Meta, person: str, when: str, notes: str) -> dict[str, object]:
-    """What is kept beside the raw data when a person signs them.
+    """What is kept next to the raw data when a person signs them.
 
     Raises:
         ValueError: they are none of a safety check, or are signed already.

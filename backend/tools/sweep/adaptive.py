@@ -1,4 +1,4 @@
-"""A speed loop's realisations, each pair as the one before shows that it tells most.
+"""A speed loop's realisations, each pair as the one before shows that it shows most.
 
 A soft loop moves a heavy axis little at high frequencies, and a coarse encoder hides what it does.
 What noise leaves open after the first pair gets the energy of those that follow.
@@ -54,7 +54,7 @@ async def play_informative(
 def _more_informative(
     first: Records, further: tuple[excite.Sequence, ...], settings: SweepSettings, setup: Setup
 ) -> tuple[excite.Sequence, ...]:
-    """Further realisations, as large as the first pair became, with weights that it tells."""
+    """Further realisations, as large as the first pair became, with weights that it shows."""
     sent = first[0][0]
     base = np.zeros(1) if sent.base is None else sent.base
     peak = float(np.max(np.abs(sent.excitation.samples - base)))

@@ -1,7 +1,7 @@
 """What a frequency response would play, before anything moves.
 
 The axis is felt before the true excitation is made, so inertia and friction are here what the
-drive tells; the true one is scaled to what was felt and stays within the same envelope.
+drive reports; the true one is scaled to what was felt and stays within the same envelope.
 """
 
 from __future__ import annotations

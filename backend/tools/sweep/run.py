@@ -1,6 +1,6 @@
 """Frequency response of an axis over a bus with cyclic process data.
 
-*mechanics*: torque to velocity, either with no loop (CST) or by torque offsets beside a closed
+*mechanics*: torque to velocity, either with no loop (CST) or by torque offsets added to a closed
 speed (CSV) or position loop (CSP), as a vertical or limited axis needs. *speed_loop* and
 *position_loop*: from the loop's own reference to what the axis does.
 """
@@ -57,7 +57,7 @@ async def sweep(
 
     Raises:
         OutOfRange: settings that make no sense; nothing has moved.
-        NotAllowed: the axis cannot be measured so, or the envelope ended it; says why.
+        NotAllowed: the axis cannot be measured so, or the envelope ended it; states the reason.
         LinkLost: samples were lost; nothing is concluded from the rest.
     """
     check(settings)

@@ -1,7 +1,7 @@
 """Setting the cyclic exchange up again after it broke off, without anybody asking.
 
 An exchange that somebody started stays wanted until somebody ends it. When its process died, its
-interface vanished or the loop gave up, it is configured and started anew as soon as the segment
+interface vanished or the loop gave up, it is configured and started again as soon as the segment
 can be reached, with growing pauses. Every axis comes back disabled: nothing here enables, and
 motions that ran before have ended.
 """
@@ -33,7 +33,7 @@ class Recovery:
         self._notify = notify
         self._task: asyncio.Task[None] | None = None
         self.trouble = ""
-        """Why the exchange does not run although it is wanted, in words; else empty."""
+        """Why the exchange does not run although it is wanted, as text; else empty."""
 
     @property
     def active(self) -> bool:

@@ -44,7 +44,7 @@ def load(
     EEPROM names mailboxes for it.
 
     Raises:
-        Rejected, NotAllowed: the drive refused, in words; it is back in PREOP if it can be.
+        Rejected, NotAllowed: the drive refused, as text; it is back in PREOP if it can be.
         LinkTimeout, LinkLost: the transfer broke off; the message says how far it came.
     """
     boot = yield from sii.boot_mailbox(clock)

@@ -26,14 +26,14 @@ _FIND_TRIES = 5
 _PAUSES_S = (1.0, 3.0, 10.0)
 """Between tries to mend what a search left out, or left wrong: each costs the others a moment."""
 _MENDINGS = 2
-"""After so many tries on its own a station is searched for anew: what is known may be wrong."""
+"""After so many tries on its own a station is searched for again: what is known may be wrong."""
 _ENABLES = 0x0F
 
 Send = Callable[[Message], None]
 
 
 class Roster:
-    """Knows which stations there are and how they are; tells of every change."""
+    """Knows which stations there are and how they are; reports every change."""
 
     def __init__(self, segment: Segment, lanes: Lanes, ring: Ring, send: Send) -> None:
         self.segment = segment
@@ -204,14 +204,14 @@ class Roster:
             self.lanes.submit(station.number, "mailbox", steps, _ignore)
 
     def al_words(self, station: Station) -> str:
-        """AL state and status of a station in words."""
+        """AL state and status of a station as text."""
         words = f"station {station.number} is in {state_name(station.al_state)}"
         if station.al_state & ERROR_BIT:
             words += f": {al_status_text(station.al_code)}"
         return words
 
     def event(self, kind: str, station: int | None, text: str, code: int | None = None) -> None:
-        """Tell the server; the figures go first, so that who looks at them sees the same."""
+        """Inform the server; the figures go first, so that who looks at them sees the same."""
         self._send({"event": "status"} | self.status())
         self._send({"event": "link", "kind": kind, "station": station, "text": text, "code": code})
 
@@ -306,7 +306,7 @@ class Roster:
         for _ in range(_FIND_TRIES):
             managers = managers or self.segment.read(number, 0x800, 16)
         if managers is None:
-            # Not a device without mailbox: one that does not answer. It is taken up when it does.
+            # Not a device without mailbox: one that does not answer. It is accepted when it does.
             self._search_due = True
             station.notes.append("it did not answer while it was being found")
         else:

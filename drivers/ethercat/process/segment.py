@@ -6,12 +6,12 @@ descriptor 0 and a second one closes a stranger's; a failed open leaks its socke
 than the slave's overwrite memory; the IO map of 4096 bytes is not checked; errors of earlier
 calls stay in a global queue and are raised by later ones.
 
-And SOEM tells answers apart by an index of four bits alone: when 16 late frames lie in the
+And SOEM distinguishes answers by an index of four bits alone: when 16 late frames lie in the
 socket, each request is at once answered by one that is 16 frames old, for ever. So late frames
 are thrown away before anything is sent, and registers are read and written by frames of our own.
 
-SOEM believes that slaves of the same vendor, product and revision have the same EEPROM, and reads
-only the first one's. Drives that tell nothing of themselves all have 0, whatever they are.
+SOEM assumes that slaves of the same vendor, product and revision have the same EEPROM, and reads
+only the first one's. Drives that show nothing of themselves all have 0, whatever they are.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _FIND_TRIES = 3
 class InvalidMap(ProtocolError):
     """SOEM took something else for an answer while it asked for the mapping.
 
-    Only a new search helps: SOEM gives every further mapping FMMUs of its own beside those of the
+    Only a new search helps: SOEM gives every further mapping FMMUs of its own next to those of the
     one that failed, which then go on writing outputs and reading inputs at the wrong places, and
     the third mapping is beyond the end of its list.
     """

@@ -228,7 +228,7 @@ def stopped_first() -> NotAllowed:
 
 
 def settle(box: Mailbox, *, force: bool = False) -> Steps[None]:
-    """Make sure that no late answer can be taken for the next one.
+    """Make sure that no late answer can be mistaken for the next one.
 
     A slave answers in order. After a time-out a harmless read of another object is asked first:
     when its answer is here, everything older has come and been dropped.

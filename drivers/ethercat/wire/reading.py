@@ -164,7 +164,7 @@ def _prove(station: Station, index: int, sizes: dict[int, int], singles: dict[in
 def enumerate_objects(
     station: Station, on_progress: Callable[[int, int], None]
 ) -> Steps[list[Described]]:
-    """Every object and entry that the drive's own dictionary tells of."""
+    """Every object and entry that the drive's own dictionary lists."""
     indices = yield from information.list_objects(station.box)
     found: list[Described] = []
     for number, index in enumerate(indices):

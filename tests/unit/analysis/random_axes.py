@@ -33,7 +33,7 @@ class Case:
     rate_hz: float
     loop_hz: float = 0.0
     known_lag: bool = True
-    """Whether the drive tells its current loop and its speed filter."""
+    """Whether the drive reports its current loop and its speed filter."""
 
 
 @dataclass(frozen=True)

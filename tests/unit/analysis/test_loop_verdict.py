@@ -121,7 +121,7 @@ def test_the_worst_end_of_an_interval_counts_as_well() -> None:
 
 
 def test_a_worst_gain_margin_below_the_promise_keeps_no_design() -> None:
-    """A set that holds a loop of 6.8 dB beside the nominal 10 dB; 8 dB were guaranteed."""
+    """A set that holds a loop of 6.8 dB next to the nominal 10 dB; 8 dB were guaranteed."""
     crossover_hz, guaranteed = 60.0, Goals(8.0, 30.0, 2.5)
 
     def delay_for(gain_db: float) -> float:
@@ -228,7 +228,7 @@ def delayed(crossover_hz: float, late_s: float, factor: float) -> tuple[float, f
 
 
 def test_a_raised_gain_keeps_only_loops_that_no_line_told_but_are_sound() -> None:
-    """A loop late by up to 200 µs and 1.5 dB stronger: no line tells it, its gain is raised.
+    """A loop late by up to 200 µs and 1.5 dB stronger: no line shows it, its gain is raised.
 
     It oscillates above its true gain margin. 300 loops, of which most miss the goals.
     """

@@ -322,7 +322,7 @@ def test_the_search_for_an_end_is_weak_both_ways(now: int, allowed: int) -> None
 
 
 async def test_a_motion_that_a_fault_ended_names_the_fault(x: ConnectedDrive, servo: Servo) -> None:
-    """The loop sees only that the drive left Operation enabled; 603Fh says why (004: 3230h)."""
+    """The loop sees only that the drive left Operation enabled; 603Fh states why (004: 3230h)."""
     servo.enable()
 
     async def motion() -> None:

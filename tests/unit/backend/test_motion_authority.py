@@ -211,7 +211,7 @@ def an_m6l() -> tuple[Axis, FirmwareLink]:
 
 async def test_an_input_that_is_on_gets_no_function() -> None:
     """M6-L 2003:02 = 17 is "forward jog" of DI2: it turned with a status word "disabled", and the
-    drive lets the function not be taken away while it turns."""
+    drive lets the function not be removed while it turns."""
     axis, link = an_m6l()
     link.device.inject("di2", 1.0)
     start = link.angle_rad

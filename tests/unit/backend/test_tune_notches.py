@@ -1,4 +1,4 @@
-"""What a design without notches is commanded to be for, and beside which loop notches are tried."""
+"""The reason that is given for a design without notches, and with which loop notches are tried."""
 
 from __future__ import annotations
 
@@ -51,9 +51,9 @@ def test_what_shows_and_what_hardly_rises_bounds_nothing_unseen(
     [
         ("none", "free", 0.0, False),
         ("none", "free", 0.2, True),
-        # Friction ruled, so that its mechanics were measured beside a loop.
+        # Friction ruled, so that its mechanics were measured with a closed loop.
         ("speed", "free", 0.0, True),
-        # It trembles where it stands; the loop was closed for its travel alone.
+        # It trembles where it is; the loop was closed for its travel alone.
         ("speed", "limited", 0.0, False),
     ],
 )

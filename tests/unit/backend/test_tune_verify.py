@@ -1,4 +1,4 @@
-"""When a verified design is taken back: by its margins, and by a torque that hums."""
+"""When a verified design is undone: by its margins, and by a torque that hums."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def test_lines_above_the_crossover_tell_the_loop_but_not_its_margins() -> None:
     assert reported is not None
     assert reported.frequency_hz[0] == pytest.approx(80.0)
     assert sharp_lines(frf) is not None
-    # Ten lines tell neither.
+    # Ten lines show neither.
     few = replace(frf, std_deg=np.where(np.arange(frf.frequency_hz.size) < 70, 10.0, 1.0))
     assert reported_lines(few) is None
 
@@ -202,7 +202,7 @@ async def verified_of(
 async def test_another_bandwidth_than_predicted_is_measured_with_more_realisations(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A single pair cannot tell the distortion of play from the response."""
+    """A single pair cannot distinguish the distortion of play from the response."""
     first, more = loop_swept(1.0), loop_swept(1.0, 66.0)
     found, pairs = await verified_of(monkeypatch, 70.0, [first, more])
     assert pairs == [1, 4]
@@ -212,7 +212,7 @@ async def test_another_bandwidth_than_predicted_is_measured_with_more_realisatio
     # Margins are read from the first, and all motion is counted.
     assert found.sweep.margins["crossover_hz"] == sharp_margins(first)["crossover_hz"]
     assert found.sweep.motion_s == first.motion_s + more.motion_s
-    # What is known of the response is what all of them tell.
+    # What is known of the response is what all of them show.
     assert found.seen is more.frf
 
 

@@ -82,5 +82,5 @@ def test_a_straight_line_across_lost_samples_is_no_contradiction() -> None:
     place, speed = (np.interp(rows, good, x[good]) for x in (position, velocity))
     assert disagreement_of(place, speed, CYCLE_S, SCALE) is not None
     assert disagreement_of(place, speed, CYCLE_S, SCALE, valid) is None
-    # A wrong scale shows beside the gaps.
+    # A wrong scale shows next to the gaps.
     assert disagreement_of(place, 0.5 * speed, CYCLE_S, SCALE, valid) is not None

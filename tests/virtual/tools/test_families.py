@@ -92,7 +92,7 @@ async def test_inertia_between_ends_that_are_found() -> None:
 
 @pytest.mark.parametrize("drive", ["mms7", "m6l", "r6l", "el7"])
 async def test_autotune_of_a_family_and_back(drive: str) -> None:
-    # M6-L does not tell its motor's inertia, which its load ratio counts in.
+    # M6-L does not report its motor's inertia, which its inertia ratio counts in.
     settings = AutotuneSettings(WIDE, motor_inertia_kgm2=None if drive == "mms7" else 5e-5)
     async with direct(ONE, 5e-4, drive=drive) as b:
         result = await autotune(b.axis, b.session, settings, silent())

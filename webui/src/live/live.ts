@@ -49,7 +49,7 @@ export function askScope<Kind extends QuestionKind>(
 }
 
 /**
- * Fetch what the websocket only tells about when it changes. The list of drives is not among
+ * Fetch what the websocket only shows about when it changes. The list of drives is not among
  * it: every connection begins with one, and an answer fetched here could be older.
  */
 async function refresh(): Promise<void> {

@@ -99,7 +99,7 @@ export class ScopeStore {
     const old = this.subscriptions.get(drive)
     if (old && old.keys.join() === keys.join() && period === this.period) return
     this.held = false
-    // A number of its own, so that blocks of the earlier choice are not taken for these.
+    // A number of its own, so that blocks of the earlier choice are not mistaken for these.
     const number = ++this.count
     if (old) this.ports.stop(old.number)
     this.subscriptions.set(drive, {
@@ -191,7 +191,7 @@ export class ScopeStore {
     if (before !== undefined && block.sequence > before + 1) {
       this.losses.blocks += block.sequence - before - 1
     }
-    // A sequence that begins anew is of another stream, with perhaps other channels.
+    // A sequence that begins again is of another stream, with perhaps other channels.
     if (before !== undefined && block.sequence <= before) subscription.source = []
     subscription.sequences.set(block.stream, block.sequence)
     this.losses.dropped += block.dropped

@@ -39,7 +39,7 @@ export interface Field {
 }
 
 /**
- * Shows where the others point on a plot and tells them of this page's pointer, in the data's own
+ * Shows where the others point on a plot and shows them of this page's pointer, in the data's own
  * coordinates. `draw` is to be called when the data or their places change.
  */
 function shareCursors(

@@ -46,7 +46,7 @@ function rawsOf(drive: string, keys: string[]): Record<string, number> {
 }
 
 /**
- * A few parameters as a form, in words where the manual has words. Typed values are marked and
+ * A few parameters as a form, as text where the manual has words. Typed values are marked and
  * written together; each is read back.
  */
 export function ParameterFields({

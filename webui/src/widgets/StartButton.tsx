@@ -5,8 +5,8 @@ import { useT } from '../i18n'
 const SHOWN_MS = 12000
 
 /**
- * Starts what moves an axis. What is in the way, in words, or null: the button is then dim, and a
- * press says why nothing began. A drive that misses one answer would otherwise swallow a press
+ * Starts what moves an axis. What is in the way, as text, or null: the button is then dim, and a
+ * press states why nothing began. A drive that misses one answer would otherwise swallow a press
  * unseen.
  */
 export function StartButton({

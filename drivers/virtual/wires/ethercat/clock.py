@@ -12,8 +12,9 @@ class WireClock(Protocol):
     def arrival(self, process_data: bool, cycle_ns: int, age_ns: int = 0) -> int:
         """Time of the frame being handled now; never before the last one.
 
-        ``process_data`` tells frames with logical datagrams from all others, ``cycle_ns`` is the
-        cycle of the segment (0 while there is none), ``age_ns`` how long ago the kernel saw it.
+        ``process_data`` distinguishes frames with logical datagrams from all others, ``cycle_ns``
+        is the cycle of the segment (0 while there is none), ``age_ns`` how long ago the kernel saw
+        it.
         """
 
     def now(self, until_ns: int | None = None) -> int:

@@ -48,7 +48,7 @@ BOOT_LAYOUT = (
 
 @dataclass(frozen=True, slots=True)
 class SlaveIdentity:
-    """What tells two drives of one family apart."""
+    """What distinguishes two drives of one family."""
 
     serial: int = 0
     alias: int = 0
@@ -188,7 +188,7 @@ class Slave:
     def _show(self) -> None:
         self.controller.show_state(self.al.status, self.al.code)
 
-    # -- what the controller tells --------------------------------------------------------------
+    # -- what the controller reports --------------------------------------------------------------
 
     def state_requested(self, control: int, now_ns: int) -> None:
         """The master has written AL control."""

@@ -1,6 +1,6 @@
 import type { Quality } from '../../api/schema'
 
-/** The pictures of the segment tell these, and a counter above tells the repeats. */
+/** The pictures of the segment show these, and a counter above shows the repeats. */
 const SHOWN_ELSEWHERE = /^(cyclic_(?!bus_load)|late_below_|mailbox_repeats$)/
 const UNITS: Record<string, string> = { us: 'µs', ms: 'ms', percent: '%', hz: 'Hz' }
 const FIXED: Record<string, string> = { baudrate: 'Bd' }

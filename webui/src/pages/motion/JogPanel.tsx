@@ -51,7 +51,10 @@ export function JogPanel({
     const timer = setTimeout(() => setTold(null), SHOWN_MS)
     return () => clearTimeout(timer)
   }, [reported])
-  /** A press that begins nothing says why: a lost answer of the drive is soon over and unseen. */
+  /**
+   * A press that begins nothing states the reason: a lost answer of the drive is soon over and
+   * unseen.
+   */
   const begin = (towards: -1 | 1): boolean => {
     if (hold.held !== null) return press(towards) // which ends it
     const begun = obstacle === null && press(towards)

@@ -27,7 +27,7 @@ export function InertiaPanel({
   drive: string
   state: AxisState | null
   limits: Limits | null
-  /** What is in the way of a measurement, in words. */
+  /** What is in the way of a measurement, as text. */
   obstacle: string | null
   cycleMs: number
 }) {
