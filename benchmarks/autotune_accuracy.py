@@ -29,8 +29,8 @@ async def tuned(
     """Tune an axis and print the figures; the axis is as before in the end.
 
     ``×a/×b`` compares with the same design without notches and with the filters as they were: of
-    the speed gain, and of the -3 dB point of the motor's speed. Of each margin the promise, what
-    was predicted for the axis as measured, and what was verified.
+    the speed gain, and of the -3 dB point of the motor's speed. Of each margin the guaranteed
+    value, what was predicted for the axis as measured, and what was verified.
     """
     began = time.monotonic()
     # Counted in multiples of the motor by families that do not report the motor's inertia.

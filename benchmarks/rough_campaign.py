@@ -8,7 +8,7 @@ Every axis is drawn: family (an unlisted drive included), mechanics, and one or 
 the real firmware at accelerated time. Printed are, per class, the errors of the response; the share
 of stated 95 % intervals that hold the truth (magnitude and phase of each line, inertia, friction,
 frequency and damping of modes, margins); and false verdicts of autotune: kept designs whose true
-margins (analytic loop, all frequencies) are more than 5° or 1 dB below the promise, stated
+margins (analytic loop, all frequencies) are more than 5° or 1 dB below the guaranteed value, stated
 figures above the truth by more than their interval, and sound designs (the true loop keeps the
 whole promise) that were rejected, of all verifications of sound ones. It ends after ``--minutes``
 with what it has; 90 to 99 % is aimed at, and what misses is marked ``!``. With ``--store`` each
@@ -170,8 +170,8 @@ async def tuned(case: Case, tally: Tally) -> None:
 def every_verification(device: Any, case: Case, tally: Tally) -> Iterator[None]:
     """Compare each design that is verified, kept or not, with its true loop while it is in force.
 
-    A sound one keeps its whole promise at all frequencies. One that hums is rightly undone,
-    whatever its margins.
+    A sound one has all guaranteed margins at all frequencies. One that oscillates is rightly
+    undone, whatever its margins.
     """
     verify = verification.verify
 
@@ -192,7 +192,7 @@ def every_verification(device: Any, case: Case, tally: Tally) -> Iterator[None]:
 
 
 def judged(found: AutotuneResult, device: Any, case: Case, tally: Tally) -> None:
-    """A kept design's promise and stated figures against the loop that it really has."""
+    """Guaranteed margins and stated figures of a kept design against the loop that it has."""
     verified = found.verified
     if verified is None or verified.verdict is None:
         return

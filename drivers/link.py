@@ -1,6 +1,6 @@
 """The seam between drives and buses.
 
-A `Link` is one opened bus. It moves bytes and knows nothing of units or meaning. Values travel
+A `Link` is one opened bus. It moves bytes and interprets neither units nor meaning. Values travel
 in CANopen byte order (little endian, CiA 301 clause 7.1.4) on every kind of link; a serial link
 converts to and from its registers. Links are asynchronous outside; each runs its blocking code
 on one thread of its own, so that there is one transaction at a time per bus.

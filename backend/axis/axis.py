@@ -44,7 +44,7 @@ class Axis(ScaledAxis):
         #: The page by which it was left enabled; None where it was no page.
         self.enabled_by: str | None = None
         self._standing: Grant | None = None
-        #: Called with the reason when the axis must not stay enabled; power is to be taken off.
+        #: Called with the reason when the axis must not stay enabled; power must be switched off.
         self.unattended: Callable[[Text], None] = lambda _why: None
 
     @property
@@ -260,7 +260,7 @@ class Axis(ScaledAxis):
             raise error
 
     async def _name_fault(self, error: NotAllowed) -> None:
-        """The loop knows only that the drive left Operation enabled; the drive knows why."""
+        """The loop sees only that the drive left Operation enabled; the drive has the reason."""
         try:
             if await self.state() not in (State.FAULT, State.FAULT_REACTION):
                 return

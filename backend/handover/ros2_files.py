@@ -89,7 +89,7 @@ def ros2(axis: AxisHandover) -> bytes:
 
 
 def _channel(axis: AxisHandover, entry: MappedEntry) -> str:
-    # It knows no real number in process data: such an entry keeps its place without an interface.
+    # It has no real number in process data: such an entry keeps its place without an interface.
     gap = entry.type is None or entry.type == "REAL32"
     kind = f"bit{entry.bits}" if gap or entry.type is None else entry.type.lower()
     kind = "bool" if entry.type == "BOOL" else kind

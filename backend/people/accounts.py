@@ -190,7 +190,7 @@ class Accounts:
         await self._end(s.id for s in self.directory.sessions(account_id) if s.id != keep)
 
     async def require_password(self, account_id: int, password: str, address: str) -> None:
-        """The present password, before something that a borrowed screen must not do.
+        """The present password, before something that another person at this screen must not do.
 
         Raises:
             Forbidden: it is wrong. TooOften: too many tries.

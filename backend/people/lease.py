@@ -168,7 +168,7 @@ class Leases:
         if to == connection:
             return
         until = None if time_s is None else self._ticks() + time_s
-        # Back to whoever gave it first: a chain of loans would end nobody knows where.
+        # Back to whoever gave it first: a chain of transfers would have no known end.
         giver = None if time_s is None else holder.giver or holder
         self._set(drive, Holder(to, person, time.time(), until, giver))
         self._notify(to, drive, "given", holder.person)

@@ -101,5 +101,5 @@ class Facts:
     trouble: tuple[str, ...] = ()
     handed_over: tuple[HandedOverFile, ...] = ()
     condition: Condition | None = None
-    #: Whether the drive was asked; a report of files alone knows nothing of its settings.
+    #: Whether the drive was asked; a report of files alone has no data of its settings.
     live: bool = True

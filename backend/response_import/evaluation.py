@@ -307,5 +307,5 @@ def _refuted(wrong: Contradiction) -> Text:
 
 
 def _numbers(values: FloatArray) -> list[float | None]:
-    """JSON knows no NaN."""
+    """JSON has no NaN."""
     return [float(v) if np.isfinite(v) else None for v in values]

@@ -31,7 +31,7 @@ class AxisUnits:
 
     To show a raw value is always possible: without a certain scale it is shown as it is, under its
     raw name. To make a raw value of one in engineering units raises `ScaleUnknown` then, so that
-    no tool can move by a unit that nobody knows.
+    no tool can move by a unit that is unknown.
     """
 
     spec: UnitSpec

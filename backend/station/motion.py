@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 
 class Motion:
-    """For one bench: what holds an axis still, STOP for all of them, and the power taken off."""
+    """For one bench: what holds an axis still, STOP for all, and switching the power off."""
 
     def __init__(self, bench: Bench) -> None:
         self._bench = bench

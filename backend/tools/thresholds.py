@@ -30,8 +30,8 @@ class autotune_again:
 class autotune_apply:
     """`autotune/apply.py`."""
 
-    # SOFTENED, QUIETER: So often a candidate that hums is made softer, and to this share of the hum
-    # that is permitted.
+    # SOFTENED, QUIETER: So often a candidate that oscillates is made softer, and to this share of
+    # the hum that is permitted.
     SOFTENED = 2
     """[count] Origin: 33aa8ae7."""
     QUIETER = 0.85
@@ -250,8 +250,8 @@ class brake_evaluate:
     """[ratio] Origin: ca58f5df."""
     OF_LIMIT = 0.05
     """[ratio] Origin: ca58f5df."""
-    # PARTS, STIFF_QUANTILE: Parts of the ramp that a compliance is taken of; a slipping part is
-    # softer than an elastic one.
+    # PARTS, STIFF_QUANTILE: Parts of the ramp that a compliance is calculated from; a slipping part
+    # is softer than an elastic one.
     PARTS = 8
     """[count] Origin: ca58f5df."""
     STIFF_QUANTILE = 0.3
@@ -645,7 +645,7 @@ class measuring_excite:
     ba28e55a."""
     BASE_GLADLY = 0.25
     """[ratio] Share of the speed that it takes where torque affords it: a load that swings moves
-    the motor more than a rigid one, by how much nobody knows before. Origin: 2f3875f1 with
+    the motor more than a rigid one, by an amount that is unknown before. Origin: 2f3875f1 with
     benchmarks/analysis_comparison."""
     # RISE_HZ, RISE_MOST: Without a loop, lines rise from this frequency on, up to this factor.
     RISE_HZ = 120.0
@@ -991,8 +991,8 @@ class sweep_speed_injection:
     """[ratio] Origin: 3fdbbd99 with docs/tuning-accuracy.md."""
     LEAST_BASE = 0.4
     """[ratio] Origin: 3fdbbd99 with docs/tuning-accuracy.md."""
-    # WEIGHTS, BY_DOUBT: Deviations of lines are taken to differ by so much, relative to the median;
-    # and the power of it.
+    # WEIGHTS, BY_DOUBT: Deviations of lines are assumed to differ by so much, relative to the
+    # median; and the power of it.
     WEIGHTS = (0.1, 4.0)
     """[ratio] Origin: 3fdbbd99 with docs/tuning-accuracy.md."""
     BY_DOUBT = 0.5

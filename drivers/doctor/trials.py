@@ -97,7 +97,7 @@ def _without_command(cause: Cause, profile: Profile) -> Iterator[Trial]:
 
 
 def _other_clock(_cause: Cause, profile: Profile) -> Iterator[Trial]:
-    """Operation modes of the file before values that other drives want."""
+    """Operation modes of the file before values that other drives need."""
     rules = _rules(profile)
     used = rules.clock_mode
     before = 0x0300 if used is None else used.assign_activate

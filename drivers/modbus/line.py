@@ -282,7 +282,7 @@ class Line:
             own_echo_due = self.echo and not self._echo_taken
             if not own_echo_due and _looks_damaged(buffer, query, answer):
                 left = min(left, self.settings.gap_s)
-            # What came while this computer stood still is taken all the same.
+            # What came while this computer stood still is accepted all the same.
             data = port.read(max(left, 0.0)) if left > -_BABBLE_S else b""
             if not data:
                 return answer, bytes(buffer)

@@ -53,7 +53,7 @@ def raw(station: Station, family: str, key: str) -> Any:
 
 
 def put(station: Station, family: str, key: str, value: int) -> None:
-    """Through the door that the parameter's motion class has."""
+    """By the route that the parameter's motion class has."""
     moves = load_profile(family).by_key[key].motion == "energises"
     door = "motion-settings" if moves else "parameters"
     station.ok(station.http.put(f"/drives/{family}/{door}/{key}", json={"raw": value}))

@@ -1,4 +1,4 @@
-"""Objects that can energise the motor: no field in the table, and the door that sets them."""
+"""Objects that can energise the motor: no field in the table, and where they are set."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ class OwnTime:
 
 
 def within(limit_s: float, condition: Callable[[], object], what: str = "") -> Any:
-    """`until`, where the product promises it after ``limit_s`` of `OwnTime` at most."""
+    """`until`, where the product has to do it within ``limit_s`` of `OwnTime` at most."""
     with OwnTime(with_children=True) as took:
         value = until(condition, what=what)
     assert took.s < limit_s, f"it took {took.s:.2f} s: {what}"

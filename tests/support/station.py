@@ -24,7 +24,7 @@ from backend.people.station import People
 from backend.station.bench import Bench
 from backend.station.demo import DemoBench
 
-#: What takes longer hangs. It is no check of the product: where that promises a time, a test says
+#: What takes longer hangs. It is no check of the product: where that guarantees a time, a test says
 #: so with a time of its own.
 HANG_S = 60.0
 

@@ -61,7 +61,7 @@ _HOLDS: tuple[Hold, ...] = ("zero", "linear")
 class Identification:
     """Everything about one measurement of the mechanics.
 
-    ``direct`` is the estimate with only hold, current loop and delay divided out and its honest
+    ``direct`` is the estimate with only hold, current loop and delay divided out and its
     band (0.25 of the sample rate); ``corrected`` has the folded images removed as well and holds
     to 0.4; ``fit`` is the model that did it. When no model fits (``trusted`` False), both are the
     plain estimate with a band of 0.1 of the sample rate. Where ``distortion`` shows play, the
@@ -167,7 +167,7 @@ def _by_motion(
     A torque that is reported late, or a copy of the demand, shows another path than the one to the
     mechanics. Collocated mechanics are passive, which the model's are by construction: a lag that
     is not there leaves them unexplained. So both holds are tried with ordinary paths that the
-    motion alone moves, and taken where that explains the motion clearly better. The last value
+    motion alone moves, and used where that explains the motion clearly better. The last value
     shows whether they were.
 
     A path that is odd by itself is tried from the motion's mechanics first: a search from nothing

@@ -33,7 +33,7 @@ from backend.analysis.thresholds import load_search as threshold
 
 
 def with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
-    """The most promising starts with one more load, by trying very many on some lines."""
+    """The best starts with one more load, by trying very many on some lines."""
     view = best_view(problem.views)
     lines = informative_lines(view, found)
     f = view.f[lines]

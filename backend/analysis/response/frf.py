@@ -114,7 +114,7 @@ def estimate_periodic(
 ) -> Frf:
     """Period-synchronous estimate over all realisations and periods.
 
-    With ``position`` the velocity is taken from the records' position: no speed filter lies in
+    With ``position`` the velocity is calculated from the records' position: no speed filter lies in
     the way, images arrive weaker, and the noise is that of the encoder.
 
     ``coulomb_nm`` is friction whose torque is subtracted (units of the torque; the response must

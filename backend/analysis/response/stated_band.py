@@ -77,7 +77,7 @@ def distorted(frf: Frf, share: FloatArray) -> Frf:
 def pooled(parts: list[Frf]) -> Frf:
     """Each line by what is known best; the errors of two views of one motion may be the same.
 
-    A third view is made of the other two, and taken where it is better than both together.
+    A third view is made of the other two, and used where it is better than both together.
     """
     if len(parts) == 1:
         return parts[0]

@@ -62,7 +62,7 @@ class LibraryPage(Message):
 
     entries: list[LibraryEntry]
     total: int
-    problems: list[str] = Field(description="files that could not be taken into the library")
+    problems: list[str] = Field(description="files that could not be added to the library")
     shared: bool = Field(description="other stations may have the same library")
 
 

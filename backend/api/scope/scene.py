@@ -1,6 +1,6 @@
 """The 3D scene from our own origin: viser's page, and its websocket passed through.
 
-viser listens on loopback only and knows no log-in, so nobody reaches it but through here. Nothing
+viser listens on loopback only and has no log-in, so nobody reaches it but through here. Nothing
 that a page sends is passed on: the scene is for looking, and viser would open a tunnel to a server
 on the internet for who asks for one.
 """

@@ -55,7 +55,7 @@ def _beginnings() -> Beginnings:
 
 
 class AcceptingConfig(uvicorn.Config):
-    """With the listening sockets, which want to know when a connection has begun."""
+    """With the listening sockets, which need to know when a connection has begun."""
 
     accepting: Sequence[AcceptingSocket] = ()
 

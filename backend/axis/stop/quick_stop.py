@@ -62,7 +62,7 @@ async def raise_quick_stop_from(
     if pair is None or pair[0].unit != units.spec.acceleration:
         return
     if not units.scales.acceleration.certain:
-        # Nobody knows what a larger number would do; the drive's own ramp stays.
+        # It is not known what a larger number would do; the drive's own ramp stays.
         return
     quick, needed = before.get(pair[0].key), units.acceleration_raw(speed_rpm / STOP_S)
     if isinstance(quick, int) and quick < needed:

@@ -41,7 +41,7 @@ class GainState:
 
 
 def spec_of(drive: Drive) -> GainSpec:
-    """Raises NotAllowed where the profile knows no gains."""
+    """Raises NotAllowed where the profile has no gains."""
     if drive.profile.gains is None:
         raise NotAllowed(
             "autotune.profile-not-name-gains", drive=drive.name, profile_title=drive.profile.title

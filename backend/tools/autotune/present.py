@@ -60,7 +60,7 @@ class Present:
         )
 
     def reported(self, design: Candidate, tried: bool) -> Text | None:
-        """That a design is slower than what the axis had, and why it is taken all the same."""
+        """That a design is slower than what the axis had, and why it is accepted all the same."""
         if not self.slower(design) or not self.speed_nms:
             return None
         share = design.gains.speed_nms / self.speed_nms

@@ -80,12 +80,12 @@ async def run(run: Run, settings: CycleSettings) -> CycleResult:
 
     Raises:
         NotAllowed: the drive or the recording has no torque or no speed, or too few samples came.
-        ScaleUnknown: nobody knows the unit of the speed.
+        ScaleUnknown: the unit of the speed is unknown.
         LinkLost: the bus is gone.
     """
     axis = run.axis
     units = await axis.units()
-    # Speeds in a unit that nobody knows say nothing about power: this refuses them.
+    # Speeds in a unit that is unknown say nothing about power: this refuses them.
     units.velocity_raw(1.0)
     facts = await _facts(axis, units, settings)
     keys = {role: axis.drive.require(role) for role in _NEEDED}

@@ -30,7 +30,7 @@ def aligned(
 
     The last m columns of each run repeat the setpoints that went out. Rows next to a gap, rows
     that were lost and rows whose setpoints differ are not valid. Where the setpoints stand
-    still over a gap and cannot show, the loop is taken to have skipped the cycles, which is what
+    still over a gap and cannot show, the loop is assumed to have skipped the cycles, which is what
     happens on a computer that is busy. With ``ended_early`` the rows end where the sequence was
     broken off.
 

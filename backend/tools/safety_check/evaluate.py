@@ -37,7 +37,7 @@ _SETTLED, _RESOLVED_REV = 0.002, 2e-4
 #: The noise of the torque is known without power; deviations, and the least that is distinguished
 #: [%].
 _DEVIATIONS, _LEAST_PERCENT, _FILTER = 5.0, 0.3, 5
-#: Torque before the trigger must be so many times that, or its end cannot be told.
+#: Torque before the trigger must be so many times that, or its end cannot be determined.
 _DISTINCT = 3.0
 _BEFORE_S = 0.1
 #: With SS1 the power goes at standstill: below this share of the speed.
@@ -175,7 +175,7 @@ class _Check:
         self._sign: Sign | None = None if found is None else found[1]
 
     def _torque_noise(self) -> float:
-        """Below it no torque can be told: of the time before the axis was enabled."""
+        """Below it torque is not distinguished from noise; of the time before enabling."""
         enabled = np.flatnonzero(self._trace.enabled)
         quiet = self._trace.torque_percent[: enabled[0]] if enabled.size else np.empty(0)
         scatter = float(np.std(quiet)) if quiet.size > _FILTER else 0.0

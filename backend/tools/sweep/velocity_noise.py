@@ -2,7 +2,7 @@
 
 A coarse encoder (2500 lines on DS_C) makes a reported speed noisy, while the positions beneath it
 are off by a fraction of an increment at most. Noise in the speed makes a regression's inertia too
-small (errors in the variables), so the quieter of the two is taken.
+small (errors in the variables), so the quieter of the two is used.
 """
 
 from __future__ import annotations

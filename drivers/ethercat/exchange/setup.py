@@ -185,7 +185,7 @@ def _has_them_anyway(station: Station, assign: int, assigned: Assigned) -> Steps
 
 
 def reads_whole(station: Station) -> Steps[bool]:
-    """Whether the drive knows complete access, asked with the object that SOEM begins with."""
+    """Whether the drive has complete access, asked with the object that SOEM begins with."""
     try:
         yield from coe.upload(station.box, 0x1C00, 0, complete=True)
     except DriveError:

@@ -209,7 +209,8 @@ class Segment:
         scrap = memoryview(self._scrap)
         try:
             ear.send(sent, MSG_DONTWAIT)
-            # What has come is taken however late it is: this process may have stood still itself.
+            # What has come is accepted however late it is: this process may have stood still
+            # itself.
             for _ in range(_MOST_STRAY):
                 left_s = max(deadline - time.monotonic(), 0.0)
                 if not select.select((ear,), (), (), left_s)[0]:

@@ -1,6 +1,6 @@
 """CANopen over EtherCAT: SDO transfers and complete access.
 
-Generators over `Mailbox`; no I/O. Source: ETG.1000.6 clause 5.6.2. Aborts are taken with any low
+Generators over `Mailbox`; no I/O. Source: ETG.1000.6 clause 5.6.2. Aborts are accepted with any low
 command bits and under either service number: several makers' stacks differ there.
 """
 

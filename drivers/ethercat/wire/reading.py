@@ -134,7 +134,7 @@ def _read_whole(station: Station, index: int, sizes: dict[int, int]) -> Steps[di
 
 
 def _is_all_there_is(station: Station, index: int, sizes: dict[int, int]) -> Steps[bool]:
-    """Whether the drive's own dictionary knows no other subindices than these.
+    """Whether the drive's own dictionary has no other subindices than these.
 
     An answer as long as all of them together then holds each of them: one question instead of
     reading every entry once more.

@@ -79,7 +79,7 @@ class HoldingBrake:
         if self._bus is not None:
             return False
         if self._without_current():
-            # The drive knows nothing of it, and takes commands against a closed brake.
+            # The drive has no data of it, and takes commands against a closed brake.
             self._axis.close_brake(True)
             return False
         late_s = self._axis.spec.rough_feedback.brake_opens_s

@@ -205,7 +205,7 @@ class DeviceControl:
             self._command(decode(self.control_word))
 
     def _hold_stopped(self) -> None:
-        # Torque modes know no position lock where 6087h has taken the torque back (000:3020).
+        # Torque modes have no position lock where 6087h has reduced the torque (000:3020).
         if not (self._traits.stops.slope_in_torque and self.modes.mode in (PT, CST)):
             self._axis.hold()
 

@@ -1,4 +1,4 @@
-"""Designs against the closed loop they promise, simulated and by python-control."""
+"""Designs against the closed loop they predict, simulated and by python-control."""
 
 from dataclasses import replace
 from functools import cache

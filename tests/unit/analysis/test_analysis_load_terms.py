@@ -1,6 +1,6 @@
 """Machines that need torque torque_of inertia and friction: springs, arms, imbalance, fans.
 
-Torque is worked out from the moves themselves (inverse dynamics), which knows no estimator.
+Torque is worked out from the moves themselves (inverse dynamics), which has no estimator.
 """
 
 import numpy as np

@@ -208,7 +208,7 @@ def stop_pending(connected: ConnectedDrive) -> bool:
 async def test_a_motion_whose_loop_does_not_take_its_halt_owes_a_stop(
     x: ConnectedDrive, servo: Servo
 ) -> None:
-    """Nobody knows what still moves: the drive is shown by itself as soon as it can be."""
+    """It is not known what still moves: the drive is shown by itself as soon as it can be."""
     loop, hold = Loop(x), Hold()
     loop.broken = True
     servo.enable()

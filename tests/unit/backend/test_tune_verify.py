@@ -1,4 +1,4 @@
-"""When a verified design is undone: by its margins, and by a torque that hums."""
+"""When a verified design is undone: by its margins, and by a torque that oscillates."""
 
 from __future__ import annotations
 

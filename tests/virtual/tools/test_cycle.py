@@ -63,7 +63,7 @@ def torques_nm(time_s: FloatArray, speed_rpm: FloatArray) -> FloatArray:
 
 
 async def machine(bench: DirectBench, cycles: int) -> None:
-    """The controller: it moves the axis and knows nothing of who reads."""
+    """The controller: it moves the axis and has no data of who reads."""
     facts = await read_facts(bench.axis)
     await speed_move(
         bench.axis, bench.session, np.tile(speeds(), cycles), ROOM, facts, lambda _x: None

@@ -7989,7 +7989,7 @@ export interface components {
             entries: components["schemas"]["LibraryEntry"][];
             /**
              * Problems
-             * @description files that could not be taken into the library
+             * @description files that could not be added to the library
              */
             problems: string[];
             /**

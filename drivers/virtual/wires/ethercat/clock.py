@@ -98,7 +98,7 @@ class LockstepClock:
         return self._now
 
     def ahead_s(self, wire_ns: int) -> float | None:
-        """Nobody knows."""
+        """Unknown."""
         del wire_ns
         return None
 
@@ -153,7 +153,7 @@ class SteadyClock:
         return self._now
 
     def ahead_s(self, wire_ns: int) -> float | None:
-        """Nobody knows while process data flow, and without them there is nothing to wait for."""
+        """Unknown while process data flow, and without them there is nothing to wait for."""
         del wire_ns
         return None
 

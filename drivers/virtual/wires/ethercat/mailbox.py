@@ -86,7 +86,7 @@ class Mailbox:
         self._queue.clear()
 
     def at(self, now_ns: int) -> None:
-        """Time of the access that comes next; sync managers know no time."""
+        """Time of the access that comes next; sync managers have no time."""
         self._now_ns = now_ns
 
     def run(self, now_ns: int) -> None:
