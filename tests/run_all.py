@@ -48,7 +48,7 @@ PATIENT = [
 ]  # fmt: skip
 #: Runs only while nothing else wants to (SCHED_IDLE), so that no bus is kept waiting for it.
 AT_IDLE = ["chrt", "--idle", "0"]
-#: Gives way to the buses in real time, and still gets what they leave.
+#: Yields to the buses in real time, and still gets what they leave.
 BEHIND = ["nice", "-n", "10"]
 
 

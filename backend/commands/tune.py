@@ -20,7 +20,7 @@ _OPTIONS: dict[str, tuple[Any, object]] = {
     "apply": (
         Annotated[
             bool,
-            typer.Option("--apply", help="write the design, verify it, and take it back"),
+            typer.Option("--apply", help="write the design, verify it, and undo it"),
         ],
         False,
     ),

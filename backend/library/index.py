@@ -36,7 +36,7 @@ class Described:
 class Folder:
     """A folder that is indexed. ``describe`` may raise NotAllowed for a file that is damaged.
 
-    ``beside`` is the ending of a file next to each, whose change counts as well.
+    ``sidecar`` is the ending of a file next to each, whose change counts as well.
     """
 
     kind: Kind

@@ -83,7 +83,7 @@ class People:
             self.accounts.devices = KnownDevices(self._marker.write().key)
         except StorageFailed as error:
             # Who is to log in can; only that there are accounts is in one place too few.
-            log.error("it is not noted beside the database that there are accounts: %s", error)  # noqa: TRY400
+            log.error("the note that accounts exist is missing next to the database: %s", error)  # noqa: TRY400
 
     def close(self) -> None:
         """Let go of the database."""

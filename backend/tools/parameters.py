@@ -144,7 +144,7 @@ async def load_set(
         try:
             report.append(await _write_verified(drive, key, raw))
         except LinkLost as error:
-            # Half a set is in force now: which half, and how to take it back.
+            # Half a set is in force now: which half, and how to undo it.
             error.text = text(
                 "set.written-in-part", cause=error.text, written=number, rows=len(chosen), key=key,
                 backup=backup,

@@ -215,7 +215,7 @@ class CanopenCyclic:
         try:
             await self.stop()
         except DriveError as error:
-            self._send_event(LinkEvent("fault", None, f"the PDOs could not be put back: {error}"))
+            self._send_event(LinkEvent("fault", None, f"the PDOs could not be restored: {error}"))
 
     async def play(self, trajectories: Sequence[Trajectory]) -> int:
         """Play trajectories in step; returns the cycle counter of the first value.

@@ -169,7 +169,7 @@ class NodeWatch:
             return LinkEvent(
                 "boot",
                 record.node,
-                f"node {record.node} restarted: values that were not saved are gone, read it anew",
+                f"node {record.node} restarted: values that were not saved are gone, read it again",
             )
         return LinkEvent("boot", record.node, f"node {record.node} started")
 

@@ -22,7 +22,7 @@ class Verdict(Enum):
 
     @property
     def text(self) -> Text:
-        """In words."""
+        """The verdict as text."""
         return text(_VERDICTS[self])
 
 

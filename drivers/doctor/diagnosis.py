@@ -52,7 +52,7 @@ class Cause:
 
     @property
     def text(self) -> CauseText:
-        """In words."""
+        """The cause as text."""
         return catalogue()[self.code]
 
 

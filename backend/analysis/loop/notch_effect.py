@@ -128,7 +128,7 @@ def fit_effect_in_loop(
     if np.count_nonzero(good) < threshold.LEAST_LINES:
         raise ValueError(
             f"only {np.count_nonzero(good)} lines are known to {threshold.KNOWN_TO:.0%} "
-            "beside the loop"
+            "with the loop closed"
         )
     scale = np.abs(forward[good])
     seen = _Seen(

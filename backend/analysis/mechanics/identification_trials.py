@@ -164,8 +164,8 @@ class Task:
                 self.records, self.quantity, last.fit, friction_nm, lag_s
             )
             task = replace(self, records=reported)
-            anew = n == 0 and _hidden_by_friction(trial)
-            last = task.trial(trial.path, None, motion, None if anew else last.solution)
+            fresh = n == 0 and _hidden_by_friction(trial)
+            last = task.trial(trial.path, None, motion, None if fresh else last.solution)
             least = best[1].views.velocity.scatter_left
             if last.views.velocity.scatter_left < threshold.AS_ALIKE * least:
                 best = task, last

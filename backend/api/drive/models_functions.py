@@ -153,7 +153,7 @@ class GearPlanInfo(Message):
 class GearWritten(Message):
     """The gear as written."""
 
-    before: dict[str, int] = Field(description="raw values that take it back")
+    before: dict[str, int] = Field(description="raw values that undo it")
     waits: dict[str, str] = Field(description="key to what must happen before it acts")
 
 

@@ -204,7 +204,7 @@ def _samples(
         parameter = axis.drive.parameter(keys[role])
         return np.asarray((values - parameter.offset) / parameter.scale)
 
-    def beside(role: str) -> FloatArray:
+    def reading(role: str) -> FloatArray:
         return columns[role][1] if role in columns else np.empty(0)
 
     begin = torque_s[0] if torque_s.size else 0.0
@@ -213,7 +213,7 @@ def _samples(
             torque_s - begin, raw("torque_actual", torque) * units.torque(1.0),
             raw("velocity_actual", speed) * units.velocity(1.0),
         ),
-        beside("dc_voltage"), beside("load_ratio"),
+        reading("dc_voltage"), reading("load_ratio"),
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Settings for the length of a measurement: written, made effective, and put back on every exit."""
+"""Settings for the length of a measurement: written, made effective, and restored on every exit."""
 
 from __future__ import annotations
 

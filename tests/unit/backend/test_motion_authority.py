@@ -109,7 +109,7 @@ async def test_work_that_keeps_its_axis_still_has_no_grant(bench: Bench) -> None
 # --- when it ends -----------------------------------------------------------------------
 
 
-async def test_stop_ends_every_grant_but_lets_borrowed_values_go_back(
+async def test_stop_ends_every_grant_but_lets_temporary_values_be_restored(
     x: ConnectedDrive, bench: Bench
 ) -> None:
     drive = x.drive

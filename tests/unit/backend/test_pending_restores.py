@@ -96,7 +96,7 @@ async def motion_in_a_motion(x: ConnectedDrive, servo: Servo, *, again: bool) ->
     return reported.value
 
 
-async def test_a_value_that_two_motions_borrowed_is_named_as_it_was_before_both(
+async def test_a_value_that_two_motions_changed_is_named_as_it_was_before_both(
     x: ConnectedDrive, servo: Servo
 ) -> None:
     reported = await motion_in_a_motion(x, servo, again=False)

@@ -6306,7 +6306,7 @@ export interface components {
         GearWritten: {
             /**
              * Before
-             * @description raw values that take it back
+             * @description raw values that undo it
              */
             before: {
                 [key: string]: number;

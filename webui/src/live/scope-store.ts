@@ -127,8 +127,8 @@ export class ScopeStore {
     return found.ring
   }
 
-  private compute(wanted: ScopeConfig['maths'], anew: boolean): void {
-    const old = anew ? [] : this.maths
+  private compute(wanted: ScopeConfig['maths'], newly: boolean): void {
+    const old = newly ? [] : this.maths
     this.maths = []
     for (const { id, expression } of wanted) {
       const kept = old.find((each) => each.id === id && each.expression === expression)

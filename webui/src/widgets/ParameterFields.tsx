@@ -34,7 +34,7 @@ async function readKeys(drive: string, keys: string[]): Promise<void> {
   )
 }
 
-/** Raw values as they are before a write, to take it back. */
+/** Raw values as they are before a write, to undo it. */
 function rawsOf(drive: string, keys: string[]): Record<string, number> {
   const readings = contents.readings.get(drive)
   const found: Record<string, number> = {}

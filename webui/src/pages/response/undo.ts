@@ -2,7 +2,7 @@ import { useSyncExternalStore } from 'react'
 import type { Problem } from '../../api/schema'
 import { publish } from '../../live/store'
 
-/** What a write answers: raw values that take it back, and those that it left. */
+/** What a write answers: raw values that undo it, and those that it left. */
 export interface Written {
   before: Record<string, number>
   after?: Record<string, number> | null
