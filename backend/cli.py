@@ -118,7 +118,7 @@ COMMANDS = {
     ),
     "recompute": (
         "report:recompute",
-        "Evaluate a stored measurement anew from its raw signals. Nothing moves.",
+        "Evaluate a stored measurement again from its raw signals. Nothing moves.",
     ),
     "report": (
         "report:report",

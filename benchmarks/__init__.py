@@ -1,1 +1,1 @@
-"""Benchmarks beside their peers; ``make bench`` runs them all."""
+"""Benchmarks compared with their peers; ``make bench`` runs them all."""

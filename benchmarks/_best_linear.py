@@ -1,10 +1,10 @@
-"""What the response of an axis with play truly is: its best linear approximation.
+"""What the response of an axis with backlash truly is: its best linear approximation.
 
-With play no linear system is the truth. What a measurement with random phases converges to is the
-best linear approximation for its class of excitations, E{Y·R*}/E{U·R*} over realisations with the
-same amplitudes (Pintelon & Schoukens, *System Identification*, 2012, section 3.4). Here it comes
-from a simulation without noise, bus, encoder or drive, made of nothing that the product uses: the
-chain by Runge-Kutta in steps of 12.5 µs, contacts that cannot pull, friction as a short bristle
+With backlash no linear system is the truth. What a measurement with random phases converges to is
+the best linear approximation for its class of excitations, E{Y·R*}/E{U·R*} over realisations with
+the same amplitudes (Pintelon & Schoukens, *System Identification*, 2012, section 3.4). Here it
+comes from a simulation without noise, bus, encoder or drive, made of nothing that the product uses:
+the chain by Runge-Kutta in steps of 12.5 µs, contacts that cannot pull, friction as a short bristle
 (Dahl), and U as the torque that friction leaves of the motor's.
 """
 
@@ -26,7 +26,7 @@ Raw = tuple[dict[str, npt.NDArray[np.generic]], dict[str, object]]
 _STEP_S = 12.5e-6
 #: Torque and speed are averaged over so many steps; their ratio does not care.
 _AVERAGED = 4
-#: Twist over which dry friction builds up, in rad; short beside all motion.
+#: Twist over which dry friction builds up, in rad; short next to all motion.
 _BRISTLE_RAD = 2e-6
 _CURRENT_RAD_S = 2 * np.pi * 1000.0
 #: Pairs of realisations, numbered from where no measurement gets to.

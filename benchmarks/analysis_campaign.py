@@ -48,7 +48,7 @@ def _bands(case: Case, result: SweepResult) -> list[tuple[str, Frf, float, float
 
 
 def _judged(case: Case, result: SweepResult) -> tuple[str, bool, bool, list[str]]:
-    """What was measured in words, whether accuracy and coverage are met, and missed modes."""
+    """What was measured as text, whether accuracy and coverage are met, and missed modes."""
     words, accurate, covered = [], result.trusted, True
     for name, frf, low, high, db, deg in _bands(case, result):
         e = errors(frf, case.mechanics, low, high)

@@ -1,4 +1,4 @@
-"""The analysis beside other methods on axes of known truth, and the time that it takes.
+"""The analysis compared with other methods on axes of known truth, and the time that it takes.
 
     python -m benchmarks.analysis_comparison [NAME …]
 

@@ -1,4 +1,4 @@
-"""One axis tuned automatically: what was promised, what was measured, and what notches gain."""
+"""One axis tuned automatically: what was guaranteed, what was measured, and what notches gain."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from tests.virtual.tools.rig import WIDE
 async def tuned(
     axis: Axis, session: CyclicSession, spec: MechanicsSpec, scheme: Scheme, budget_s: float
 ) -> str:
-    """Tune an axis and tell the figures; the axis is as before in the end.
+    """Tune an axis and print the figures; the axis is as before in the end.
 
     ``×a/×b`` compares with the same design without notches and with the filters as they were: of
-    the speed gain, and of the -3 dB point of the motor's speed. Of each margin the promise, what
-    was predicted for the axis as measured, and what was verified.
+    the speed gain, and of the -3 dB point of the motor's speed. Of each margin the guaranteed
+    value, what was predicted for the axis as measured, and what was verified.
     """
     began = time.monotonic()
-    # Counted in multiples of the motor by families that do not tell the motor's inertia.
+    # Counted in multiples of the motor by families that do not report the motor's inertia.
     rotor = None if axis.drive.profile.drive == "mms7" else spec.motor.inertia_kgm2
     settings = AutotuneSettings(WIDE, scheme=scheme, motor_inertia_kgm2=rotor, budget_s=budget_s)
     found = await autotune(axis, session, settings, Progress(lambda: None))
@@ -42,7 +42,7 @@ async def tuned(
     applied, verified = found.applied, found.verified
     if applied is None or verified is None:
         return "nothing applied"
-    m, p, n = verified.sweep.margins, verified.promised, applied.nominal
+    m, p, n = verified.sweep.margins, verified.guaranteed, applied.nominal
     pm, gm = m.get("phase_margin_deg"), m.get("gain_margin_db")
     assert found.expected is not None
     deg, db = found.expected.phase_margin_deg, found.expected.gain_margin_db
@@ -91,24 +91,24 @@ def _corners(applied: Candidate) -> str:
 
 
 def _kept(
-    promised: float, predicted: float | None, found: float | bool | None, slack: float, off: float,
-    here: float | None = None,
+    guaranteed: float, predicted: float | None, found: float | bool | None, slack: float,
+    off: float, here: float | None = None,
 ) -> str:  # fmt: skip
-    """Promise, prediction and measurement; the smaller a number is the worse.
+    """Guarantee, prediction and measurement; the smaller a number is the worse.
 
     The prediction is that of the whole loop, and in brackets where it is another one the prediction
     ``here``, on the lines that were verified, which the measurement is held to. ``!``: the promise
     is missed by more than ``slack``; ``?``: the prediction by more than ``off``.
     """
-    before = f"{abs(promised):.3g}→{'–' if predicted is None else f'{abs(predicted):.3g}'}"
+    before = f"{abs(guaranteed):.3g}→{'–' if predicted is None else f'{abs(predicted):.3g}'}"
     if here is not None:
         if predicted is None or abs(here - predicted) > 0.5:
             before += f" ({here:.3g})"
         predicted = here
     if not isinstance(found, float):
         return f"{before}→–"
-    found = found if promised > 0 else -found
-    missed = "!" if found < promised - slack else ""
+    found = found if guaranteed > 0 else -found
+    missed = "!" if found < guaranteed - slack else ""
     if predicted is not None and abs(found - predicted) > off:
         missed += "?"
     return f"{before}→{abs(found):.3g}{missed}"

@@ -1,4 +1,5 @@
-"""When motors of other physics than the tool assumes are too warm, beside what the tool says.
+"""When motors of other physics than the tool assumes are too warm, compared with what the tool
+says.
 
 Four motors of four bodies each (`tests.support.warm_motor`), whose rated torque and time constant
 are measured on them as a maker does, under five cycles. Aims: the moment lies in the stated range,

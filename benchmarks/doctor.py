@@ -1,7 +1,7 @@
 """How often the doctor's first cause is the injected one: ``python -m benchmarks.doctor``.
 
 Each cause is injected into a virtual slave in a private network, or a virtual node on a CAN bus
-(`benchmarks.doctor_canopen`), the slave is taken to
+(`benchmarks.doctor_canopen`), the slave is brought to
 Operational as `servodeck doctor` does it, and the first diagnosis is compared. ``how`` says
 whether the trouble is a real one of the wire or the configuration ("real"), or the slave was
 only made to refuse with the AL status code that the cause has in ETG.1020 ("code").

@@ -1,7 +1,7 @@
-"""Cyclic jitter, overruns and CPU use of the EtherCAT host beside a bare pysoem loop.
+"""Cyclic jitter, overruns and CPU use of the EtherCAT host compared with a bare pysoem loop.
 
 For every rate and number of slaves, one after the other in one run: a bare pysoem loop that does
-nothing but sleep, send and receive, and our host with scope streaming; each with a server beside
+nothing but sleep, send and receive, and our host with scope streaming; each with a server next to
 it that is idle, and with one that is busy (a thread computing spectra, as a web client's analysis
 would).
 

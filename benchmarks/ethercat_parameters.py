@@ -1,4 +1,5 @@
-"""All parameters of a drive over EtherCAT: our Link beside a plain loop of pysoem ``sdo_read``.
+"""All parameters of a drive over EtherCAT: our Link compared with a plain loop of pysoem
+``sdo_read``.
 
 Both read the same virtual drives, which take 1 ms for every answer, alternately in one run: one
 drive, and then several at once, as "read all" of a machine does. Aim: at least three times as

@@ -1,6 +1,6 @@
-"""Hand-over: every drive family in every controller's format, taken by its reader and replayed.
+"""Hand-over: every drive family in every controller's format, accepted by its reader and replayed.
 
-Needs the tests beside it. Prints the table of docs/handover.md; it aims at every value taken.
+Needs the tests next to it. Prints the table of docs/handover.md; it aims at every value taken.
 """
 
 from __future__ import annotations

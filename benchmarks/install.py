@@ -3,8 +3,9 @@
     python -m benchmarks.install [DIST]
 
 Everything is installed into scratch folders, without the network where this process may take it
-away (``unshare --net``). A way that cannot be gone on this computer says why; no figure is made up.
-Aims (issue 23): pipx 2 min, Debian package 1 min, unpacked folder 10 s, its cold start 5 s.
+away (``unshare --net``). A way that cannot be gone on this computer states the reason; no figure is
+made up. Aims (issue 23): pipx 2 min, Debian package 1 min, unpacked folder 10 s, its cold start 5
+s.
 """
 
 from __future__ import annotations

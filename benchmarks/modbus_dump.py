@@ -3,7 +3,7 @@
 A virtual DS_C, in a process of its own, answers at an emulated 115200 baud (8N1, 10 bits a
 character). The dump is `Drive.read_many` of every register that can be read, as the page and the
 command line do it. The aim is four times the speed of one request for each value; pymodbus'
-synchronous client, one request for each value, stands beside.
+synchronous client, one request for each value, is shown next to them.
 
 Run it: ``python -m benchmarks modbus_dump``.
 """

@@ -100,7 +100,7 @@ def needed(down: Iterable[Arrow]) -> list[Arrow]:
 
 
 def figures(graph: Graph) -> str:
-    """Floors and arrows of ``backend``, beside the aims of the floor plan."""
+    """Floors and arrows of ``backend``, compared with the aims of the floor plan."""
     rooms = [room for room in graph.floors if _is_in(room, "backend")]  # from the top
     inside = graph.within("backend")
     up = [a for a in inside if a in graph.up]

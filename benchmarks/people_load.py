@@ -169,7 +169,7 @@ def main() -> None:
 
 
 def begin_exchange(station: Station, drives: list[str]) -> bool:
-    """Cyclic exchange beside it, where this computer allows a virtual segment."""
+    """Cyclic exchange next to it, where this computer allows a virtual segment."""
     try:
         drives.append(station.add(1, SEGMENT, name="Z"))
         body = {"url": SEGMENT, "cycle_us": 2000}

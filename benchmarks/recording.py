@@ -1,4 +1,5 @@
-"""Recorder throughput beside the disk's own and beside plain rerun over gRPC, on the same data.
+"""Recorder throughput next to the disk's own and compared with plain rerun over gRPC, on the same
+data.
 
 16 channels of four axes in blocks of 40 ms at 4 kHz, as fast as each takes them. The disk's figure
 is one process that writes the same bytes and syncs every half second. rerun's is ``send_columns``

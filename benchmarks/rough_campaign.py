@@ -4,11 +4,11 @@
         [--store ROWS.jsonl] [--only CLASS …]
 
 Every axis is drawn: family (an unlisted drive included), mechanics, and one or more nuisances of
-`RoughTorqueSpec`, whose structure the analysis does not assume. The product's own tools run beside
+`RoughTorqueSpec`, whose structure the analysis does not assume. The product's own tools run next to
 the real firmware at accelerated time. Printed are, per class, the errors of the response; the share
 of stated 95 % intervals that hold the truth (magnitude and phase of each line, inertia, friction,
 frequency and damping of modes, margins); and false verdicts of autotune: kept designs whose true
-margins (analytic loop, all frequencies) are more than 5° or 1 dB below the promise, stated
+margins (analytic loop, all frequencies) are more than 5° or 1 dB below the guaranteed value, stated
 figures above the truth by more than their interval, and sound designs (the true loop keeps the
 whole promise) that were rejected, of all verifications of sound ones. It ends after ``--minutes``
 with what it has; 90 to 99 % is aimed at, and what misses is marked ``!``. With ``--store`` each
@@ -170,15 +170,15 @@ async def tuned(case: Case, tally: Tally) -> None:
 def every_verification(device: Any, case: Case, tally: Tally) -> Iterator[None]:
     """Compare each design that is verified, kept or not, with its true loop while it is in force.
 
-    A sound one keeps its whole promise at all frequencies. One that hums is rightly taken back,
-    whatever its margins.
+    A sound one has all guaranteed margins at all frequencies. One that oscillates is rightly
+    undone, whatever its margins.
     """
     verify = verification.verify
 
     async def compared(*args: Any, **given: Any) -> Verified:
         verified = await verify(*args, **given)
-        true, promised = true_margins(device), verified.promised
-        sound = true.meets(promised) and verified.hum_percent is None
+        true, guaranteed = true_margins(device), verified.guaranteed
+        sound = true.meets(guaranteed) and verified.hum_percent is None
         tally.sound += sound
         if sound and not verified.kept:
             tally.rejected.append(
@@ -192,18 +192,18 @@ def every_verification(device: Any, case: Case, tally: Tally) -> Iterator[None]:
 
 
 def judged(found: AutotuneResult, device: Any, case: Case, tally: Tally) -> None:
-    """A kept design's promise and stated figures against the loop that it really has."""
+    """Guaranteed margins and stated figures of a kept design against the loop that it has."""
     verified = found.verified
     if verified is None or verified.verdict is None:
         return
     tally.kept += 1
-    true, promised, verdict = true_margins(device), verified.promised, verified.verdict
-    short_deg = promised.phase_margin_deg - true.phase_margin_deg
-    short_db = promised.gain_margin_db - true.gain_margin_db
+    true, guaranteed, verdict = true_margins(device), verified.guaranteed, verified.verdict
+    short_deg = guaranteed.phase_margin_deg - true.phase_margin_deg
+    short_db = guaranteed.gain_margin_db - true.gain_margin_db
     if not true.stable or short_deg > 5.0 or short_db > 1.0:
         tally.false.append(
-            f"{case.number} {case.drive}: promised {promised.phase_margin_deg:.0f}° "
-            f"{promised.gain_margin_db:.0f} dB, true {true.phase_margin_deg:.0f}° "
+            f"{case.number} {case.drive}: guaranteed {guaranteed.phase_margin_deg:.0f}° "
+            f"{guaranteed.gain_margin_db:.0f} dB, true {true.phase_margin_deg:.0f}° "
             f"{true.gain_margin_db:.1f} dB Ms {true.ms:.2f}"
         )
     worst, most = verdict.worst, float("inf")

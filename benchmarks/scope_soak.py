@@ -2,7 +2,7 @@
 
 A station with four EtherCAT axes in a process of its own records 16 channels, and two Chromium
 show them on the Scope page; the second one is stopped (SIGSTOP, as a closed lid does) for the
-middle third. ``SERVODECK_SCOPE_SOAK_S`` sets the length; 1800 s are the half hour promised.
+middle third. ``SERVODECK_SCOPE_SOAK_S`` sets the length; 1800 s are the half hour required.
 On a computer that is busy with other things ``SERVODECK_SCOPE_SOAK_STEADY=1`` lets the segment's
 time follow the frames: no cycle is left out, they only come more slowly. Where this program may,
 it grants what a station grants, and says so.

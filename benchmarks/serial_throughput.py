@@ -1,4 +1,4 @@
-"""Parameters per second over a serial line, beside minimalmodbus and pymodbus.
+"""Parameters per second over a serial line, compared with minimalmodbus and pymodbus.
 
 The same virtual MMS7, in a process of its own, answers all clients one after the other in one
 run: at the full speed of the pty, and with the wire time of 115200 baud and of 2.5 Mbaud emulated

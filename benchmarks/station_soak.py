@@ -1,8 +1,8 @@
 """A station under load: four EtherCAT axes at 1 kHz on the scope, one of them jogging.
 
 Counts every cycle that did not arrive at the browser's side, and times the interface meanwhile.
-``SERVODECK_SOAK_S`` sets the length; 600 s are the ten minutes that the product promises. Aims:
-every missing cycle counted, API p99 below 50 ms, memory flat. The segment's time is that of
+``SERVODECK_SOAK_S`` sets the length; 600 s are the ten minutes that are required of the product.
+Aims: every missing cycle counted, API p99 below 50 ms, memory flat. The segment's time is that of
 ``make run``: a cycle that a busy computer begins late is late, but not skipped, so a loaded machine
 shows in the cycles per second. With ``SERVODECK_SOAK_REAL_TIME=1`` late cycles are skipped and
 counted, as with real drives; that needs a machine that does nothing else.

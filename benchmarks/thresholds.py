@@ -5,7 +5,7 @@
 The axes, their drives and buses are drawn by `tests/unit/analysis/random_axes.py` and simulated by
 a program that shares nothing with the product's drives. Each number of `backend/analysis/
 thresholds.py` that is read meanwhile is halved and doubled in a process of its own (counts are
-rounded and stay at least 1), and the response is evaluated and a loop designed anew. Printed are
+rounded and stay at least 1), and the response is evaluated and a loop designed again. Printed are
 the figures that changed. ``--table`` writes them into the table; a number that is not read on
 these axes stays without them.
 """
@@ -37,7 +37,7 @@ ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "unit" / "analysis")]
 
 TABLE = ROOT / "backend" / "analysis" / "thresholds.py"
-#: Seed and sample rate: close resonances, hardly damped ones, and a vertical axis beside its speed
+#: Seed and sample rate: close resonances, hardly damped ones, and a vertical axis next to its speed
 #: loop. The loop is designed for the first of them.
 AXES = ((1, 1000.0), (2, 1000.0), (3, 1000.0))
 Name = tuple[str, str]
@@ -46,7 +46,7 @@ _WIDTH = 96
 
 @dataclass(frozen=True)
 class Figures:
-    """Means over the axes, beside the design of one of them; empty `failed` where all went well."""
+    """Means over the axes, and the design of one of them; an empty `failed` means all went well."""
 
     magnitude_db: float
     phase_deg: float
@@ -58,8 +58,8 @@ class Figures:
     notches: int
     failed: str = ""
 
-    def beside(self, base: Figures) -> str:
-        """What is different, in words."""
+    def compared_with(self, base: Figures) -> str:
+        """What is different, as text."""
         if self.failed:
             return self.failed
         shown = (
@@ -252,9 +252,9 @@ def main() -> None:
             continue
         value = getattr(getattr(thresholds, space), name)
         known[full] = [
-            run(packed, ((space, name), changed(value, factor)), results, options.limit)[0].beside(
-                base
-            )
+            run(packed, ((space, name), changed(value, factor)), results, options.limit)[
+                0
+            ].compared_with(base)
             for factor in (0.5, 2.0)
         ]
         print(f"{full} = {value}  ½: {known[full][0]}  ×2: {known[full][1]}", flush=True)

@@ -5,11 +5,11 @@
 
 Against the analytic response of the chain; the limits are those of the design (tuning.md,
 sections 2, 3 and 5). *lockstep* and *real-time* go over EtherCAT frames; *none* plays the
-product's own cycle beside the firmware, which no busy computer disturbs. An axis with play is held
-to its best linear approximation under the excitation that was played (`benchmarks._best_linear`);
-how far it is from the chain without play is printed beside it. ``--random`` adds
-mechanics drawn by their number. DS_C and the drive of CiA 402 alone go over CANopen frames with
-SYNC in virtual time, DS_C with the encoder that it has.
+product's own cycle next to the firmware, which no busy computer disturbs. An axis with backlash is
+held to its best linear approximation under the excitation that was played
+(`benchmarks._best_linear`); how far it is from the chain without backlash is printed next to it.
+``--random`` adds mechanics drawn by their number. DS_C and the drive of CiA 402 alone go over
+CANopen frames with SYNC in virtual time, DS_C with the encoder that it has.
 """
 
 from __future__ import annotations
@@ -167,7 +167,7 @@ def _reported(name: str, part: Errors, limits: tuple[float, float]) -> str:
 
 
 def _rated(rig: Rig, spec: MechanicsSpec) -> float | None:
-    """From the nameplate where the drive does not tell it on this bus (DS_C: Modbus only)."""
+    """From the nameplate where the drive does not report it on this bus (DS_C: Modbus only)."""
     return spec.motor.rated_torque_nm if rig.drive in _CANOPEN else None
 
 

@@ -17,7 +17,7 @@ from profiles.schema import LinkKind
 
 @dataclass(frozen=True, slots=True)
 class BusUrl:
-    """A bus URL taken apart. ``place`` is the adapter: device path, interface or CAN channel."""
+    """A bus URL split into its parts. ``place``: device path, interface or CAN channel."""
 
     scheme: LinkKind
     place: str

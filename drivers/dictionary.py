@@ -1,4 +1,4 @@
-"""What a drive's own dictionary tells of its objects."""
+"""What a drive's own dictionary reports of its objects."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class EntryDescription:
 
     ``access`` is the bit field of ETG.1000.6 table 49: 0–2 readable and 3–5 writable in PREOP,
     SAFEOP and OP, 6 RxPDO, 7 TxPDO. ``unit``, ``default``, ``minimum`` and ``maximum`` are None
-    where the drive tells none.
+    where the drive reports none.
     """
 
     index: int

@@ -11,7 +11,7 @@
     ├── OutOfRange       the value does not fit the parameter; nothing was sent
     ├── NotAllowed       access, state or permission forbids it; nothing was sent
     │   ├── NotInUse     the drive's own count leaves this entry out
-    │   └── MotionHalted the cyclic loop ended the motion by force; ``halt`` says why
+    │   └── MotionHalted the cyclic loop ended the motion by force; ``halt`` states why
     │       └── EnvelopeExceeded  a limit of the envelope was passed
     └── Busy             somebody or something else holds the axis or the bus
 
@@ -206,7 +206,7 @@ class NotAllowed(DriveError):
 
 
 class NotInUse(NotAllowed):
-    """An entry of a list beyond the count that the drive tells: there is nothing to be read."""
+    """An entry of a list beyond the count that the drive reports: there is nothing to be read."""
 
     kind = "not-in-use"
 

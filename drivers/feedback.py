@@ -1,4 +1,4 @@
-"""Whether 606Ch and the differences of 6064h tell of the same motion.
+"""Whether 606Ch and the differences of 6064h report the same motion.
 
 Both are compared over windows of time, so that a 606Ch that lags, is a mean over some cycles or is
 coarsely rounded agrees, while one in another unit, of another sign, or that stands still does not.
@@ -59,7 +59,7 @@ class FeedbackScale:
 
 @dataclass(frozen=True, slots=True)
 class Contradiction:
-    """What each tells, in raw units of 606Ch: ``reported`` by 606Ch, ``seen`` by the position."""
+    """What each shows, in raw units of 606Ch: ``reported`` by 606Ch, ``seen`` by the position."""
 
     kind: Disagreement
     reported: float
@@ -125,7 +125,7 @@ class FeedbackWatch:
         self._newest.clear()
 
     def interrupt(self) -> None:
-        """The position was set anew (homing), or samples are missing: begin a new window."""
+        """The position was set again (homing), or samples are missing: begin a new window."""
         self._parts.clear()
         self._newest.clear()
         self._open, self._samples, self._votes, self._last = _Part(), 0, 0, None

@@ -1,6 +1,6 @@
 """The seam between drives and buses.
 
-A `Link` is one opened bus. It moves bytes and knows nothing of units or meaning. Values travel
+A `Link` is one opened bus. It moves bytes and interprets neither units nor meaning. Values travel
 in CANopen byte order (little endian, CiA 301 clause 7.1.4) on every kind of link; a serial link
 converts to and from its registers. Links are asynchronous outside; each runs its blocking code
 on one thread of its own, so that there is one transaction at a time per bus.
@@ -42,7 +42,7 @@ class Address:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """One drive seen by a scan. Fields are None where the link cannot tell."""
+    """One drive seen by a scan. Fields are None where the link cannot show."""
 
     station: int
     vendor_id: int | None = None
@@ -108,7 +108,7 @@ class LinkTraits:
     synchronous: bool = False
     """Setpoints and samples share one instant of every cycle without clocks in the drives."""
     description: Literal["none", "dictionary", "stored_eds"] = "none"
-    """How a drive tells of its own objects: not, by `Link.enumerate`, or by an EDS in 1021h."""
+    """How a drive reports its own objects: not, by `Link.enumerate`, or by an EDS in 1021h."""
     fills_network: bool = False
     """Its frames fill the network of the port that they are sent on."""
     silent: Text = _CHECK_WHEN_SILENT
@@ -147,7 +147,7 @@ class Link(Protocol):
 
     @property
     def doctor(self) -> Examines | None:
-        """What says why a station is not in Operational."""
+        """What states why a station is not in Operational."""
 
     @property
     def frames(self) -> RecordsFrames | None:

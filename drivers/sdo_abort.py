@@ -1,4 +1,4 @@
-"""SDO abort codes in words, shared by CANopen and CANopen over EtherCAT.
+"""SDO abort codes as text, shared by CANopen and CANopen over EtherCAT.
 
 Source: CiA 301 v4.2.0 clause 7.2.4.3.17 table 22; codes 06010003h to 06010006h are from
 ETG.1000.6 table 41.

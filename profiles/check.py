@@ -53,7 +53,7 @@ def _check_motion(profile: Profile) -> list[Finding]:
     """Every writable object has a motion class from exactly one rule, and no rule is left over.
 
     A profile made from a maker's file has objects that nobody has classified yet; that is its
-    normal state and the count tells how many.
+    normal state and the count shows how many.
     """
     findings: list[Finding] = []
     if not profile.from_description:
@@ -75,7 +75,7 @@ def _check_motion(profile: Profile) -> list[Finding]:
 
 
 def _check_chapters(profile: Profile) -> list[Finding]:
-    """No line of the manual outside a chapter, and none without records unless it says why."""
+    """No line of the manual outside a chapter, and none without records or a reason."""
     findings: list[Finding] = []
     expected = 1
     for chapter in profile.manual_chapters:

@@ -27,7 +27,7 @@ class ParameterGroup(Frozen):
 class GainBlock(Frozen):
     """Parameters that sit at one place of the control loops.
 
-    ``set_number`` tells apart the gain sets between which a drive switches.
+    ``set_number`` distinguishes the gain sets between which a drive switches.
     """
 
     block: Literal[

@@ -3,7 +3,7 @@
 A family is a folder ``profiles/<drive>/`` of ``*.yaml`` files. Each file holds a mapping whose
 keys are fields of `Profile`; lists of the same field in several files are joined in file-name
 order, so that a long parameter list can be one file per chapter. The parsed result is cached
-beside the user's other caches, keyed by the content of every file and of the schema.
+next to the user's other caches, keyed by the content of every file and of the schema.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def drive_names() -> tuple[str, ...]:
 
 
 def load_profile(drive: str) -> Profile:
-    """Load one family. A profile of the user's own is loaded anew when its files have changed.
+    """Load one family. A profile of the user's own is loaded again when its files have changed.
 
     Raises:
         ProfileError: unknown drive, broken YAML, or a record that the schema refuses.

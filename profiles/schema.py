@@ -550,7 +550,7 @@ class Conflict(Frozen):
 
 
 class Chapter(Frozen):
-    """A chapter of the manual by its lines, so that the check can count what was taken from it."""
+    """A chapter of the manual by its lines, so that the check can count what was used of it."""
 
     title: str
     first_line: int = Field(ge=1)

@@ -30,7 +30,7 @@ def pytest_configure(config: pytest.Config) -> None:
     # Tests share two cores: a second BLAS thread waits for the first. Child processes inherit it.
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    # Virtual drives and the masters beside them keep their time however busy the computer is.
+    # Virtual drives and the masters next to them keep their time however busy the computer is.
     os.environ[VIRTUAL_PRIORITY] = "20"
     for name in ("SERVODECK_PROFILES", "SERVODECK_CACHE", "SERVODECK_SERVER"):
         os.environ.pop(name, None)

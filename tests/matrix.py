@@ -25,7 +25,7 @@ BEGIN, END = "<!-- made by tests/matrix.py: begin -->\n", "<!-- made by tests/ma
 SYSTEMS = ("Linux x86_64", "Linux aarch64", "Windows", "macOS")
 TESTED, IMPORTED, TYPED = "tested here", "tested by import and types only", "types only"
 UNTESTED, ABSENT = "not tested", "not available"
-#: Starts the server and imports every module with what Windows lacks taken away.
+#: Starts the server and imports every module with what Windows lacks removed.
 OTHER_SYSTEM = "tests/unit/computer/test_other_system.py"
 
 
@@ -33,7 +33,7 @@ OTHER_SYSTEM = "tests/unit/computer/test_other_system.py"
 class Row:
     """A function on a bus, and the test files that show it; without files nothing does.
 
-    ``lacking`` are systems that do not have it, which the program says in words.
+    ``lacking`` are systems that do not have it, which the program says as text.
     """
 
     bus: str
@@ -160,7 +160,7 @@ def table(cells: Mapping[tuple[Row, str], str]) -> str:
 
 
 def written() -> str:
-    """The table as it stands in the documentation."""
+    """The table as it is in the documentation."""
     found = re.search(f"{re.escape(BEGIN)}(.*?){re.escape(END)}", PAGE.read_text("utf-8"), re.S)
     return found[1] if found else ""
 
@@ -185,7 +185,7 @@ def read_table(text: str) -> dict[tuple[Row, str], str]:
 def overstated(cells: Mapping[tuple[Row, str], str], ran: Mapping[str, Ran]) -> list[str]:
     """What the table says and the tests have not shown.
 
-    A test that was skipped here has said why; that is no reason to doubt where it ran.
+    A test that was skipped here has stated the reason; that is no reason to doubt where it ran.
     """
     found = []
     for (row, system), said in cells.items():

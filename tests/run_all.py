@@ -29,8 +29,8 @@ NPM = ["npm"] if shutil.which("npm") else [sys.executable, str(ROOT / "hatch_bui
 
 PYTEST = [sys.executable, "-m", "pytest", "-q", "-rs", "--durations=12"]
 #: Suites with a bus in real time. They wait for most of their time, so that the pages may be tested
-#: beside them, but no more: a master that is kept from its cycle for 30 ms must brake the axis, and
-#: then the test does not see what it wants to see.
+#: next to them, but no more: a master that is kept from its cycle for 30 ms must brake the axis,
+#: and then the test does not see what it wants to see.
 REAL_TIME = [
     "tests/api/test_ethercat.py", "tests/api/test_ethercat_faults.py",
     "tests/api/test_ethercat_segment.py", "tests/api/test_every_family.py",
@@ -48,7 +48,7 @@ PATIENT = [
 ]  # fmt: skip
 #: Runs only while nothing else wants to (SCHED_IDLE), so that no bus is kept waiting for it.
 AT_IDLE = ["chrt", "--idle", "0"]
-#: Gives way to the buses in real time, and still gets what they leave.
+#: Yields to the buses in real time, and still gets what they leave.
 BEHIND = ["nice", "-n", "10"]
 
 
@@ -70,7 +70,7 @@ class Check(NamedTuple):
 def pytest(name: str, *arguments: str, again: bool = False) -> Check:
     """A suite; each keeps its own note of what failed, as two may run at a time.
 
-    Its report says what ran (see `tests/matrix.py`), that of a run ``again`` beside the first.
+    Its report says what ran (see `tests/matrix.py`), that of a run ``again`` next to the first.
     """
     report = f"{REPORTS}/{name}{' again' if again else ''}.xml"
     noted = ["-o", f"cache_dir=.pytest_cache/{name}", f"--junitxml={report}"]
@@ -97,7 +97,7 @@ QUICK = [
     Check("types", [str(BIN / "mypy")]),
     *(types_on(system) for system in ("win32", "darwin")),
 ]
-#: Checks without a bus as well, beside those of the types: about as long as they.
+#: Checks without a bus as well, next to those of the types: about as long as they.
 QUICK_BESIDE = [
     Check("page: types and lint", [*NPM, "run", "--silent", "check"], ROOT / "webui"),
     Check("page: unit tests", [*NPM, "run", "--silent", "test"], ROOT / "webui"),
@@ -113,7 +113,7 @@ TIMED = [
 ]
 BUSES = [pytest("EtherCAT tests", *REAL_TIME)]
 PAGES = [pytest("browser tests", "-m", "browser", "tests/browser")]
-BESIDE = [
+PARALLEL = [
     # Workers write to a pipe: tests of full disks bound the length of files. At idle priority a
     # test may stand still for minutes, which is no hanging.
     pytest("patient tests", *TWO, "--timeout=900", *PATIENT),
@@ -222,7 +222,7 @@ def main() -> int:
     run_quick(runner)
     checks, failed = [*QUICK, *QUICK_BESIDE], runner.failed
     if "--fast" not in sys.argv:
-        checks += [*TIMED, *BUSES, *PAGES, *BESIDE, *MATRIX]
+        checks += [*TIMED, *BUSES, *PAGES, *PARALLEL, *MATRIX]
         failed = run_suites(runner)
     print(f"failed: {', '.join(failed)}" if failed else "all checks passed")
     print(f"{len(checks) - len(failed)} passed, {len(failed)} failed")
@@ -232,13 +232,13 @@ def main() -> int:
 def run_quick(runner: Runner) -> None:
     """Run the checks without a bus in two lanes."""
     with tempfile.TemporaryFile("w+", encoding="utf-8") as printed, ThreadPoolExecutor() as pool:
-        beside = Runner(printed)
-        lane = pool.submit(beside.run, QUICK_BESIDE)
+        parallel = Runner(printed)
+        lane = pool.submit(parallel.run, QUICK_BESIDE)
         runner.run(QUICK)
         lane.result()
         printed.seek(0)
         shutil.copyfileobj(printed, sys.stdout)
-    runner.failed += beside.failed
+    runner.failed += parallel.failed
 
 
 def run_suites(runner: Runner) -> list[str]:
@@ -248,24 +248,24 @@ def run_suites(runner: Runner) -> list[str]:
         tempfile.TemporaryFile("w+", encoding="utf-8") as seen,
         ThreadPoolExecutor() as pool,
     ):
-        beside, pages = Runner(idle, AT_IDLE), Runner(seen, BEHIND)
-        # These leave nothing of two processors: whoever runs at idle priority would stand still.
+        parallel, pages = Runner(idle, AT_IDLE), Runner(seen, BEHIND)
+        # This leaves nothing of two processors: a suite at idle priority would not advance.
         runner.run(TIMED)
-        lanes = [pool.submit(pages.run, PAGES), pool.submit(beside.run, BESIDE)]
+        lanes = [pool.submit(pages.run, PAGES), pool.submit(parallel.run, PARALLEL)]
         runner.run(BUSES)
         for lane in lanes:
             lane.result()
         for printed in (seen, idle):
             printed.seek(0)
             shutil.copyfileobj(printed, sys.stdout)
-    again = [*runner.again, *pages.again, *beside.again]
+    again = [*runner.again, *pages.again, *parallel.again]
     if again:
         alone = Runner(sys.stdout)
         print("== once more, alone", flush=True)
         alone.run(again, last=True)
         runner.failed += alone.failed
     runner.run(MATRIX)
-    return runner.failed + pages.failed + beside.failed
+    return runner.failed + pages.failed + parallel.failed
 
 
 if __name__ == "__main__":

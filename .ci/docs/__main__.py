@@ -21,7 +21,7 @@ def check() -> int:
     known = terms.load()
     found = [
         *prose.words_in_pages(known), *prose.words_in_messages(known), *prose.words_on_page(known),
-        *prose.words_elsewhere(known),
+        *prose.words_elsewhere(known), *prose.words_in_code(),
         *prose.long_sentences(), *prose.long_texts(), *prose.missing_pictures(),
     ]  # fmt: skip
     for finding in found:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import re
+import tokenize
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -15,6 +17,17 @@ PAGE_TEXTS = ROOT / "webui" / "src" / "i18n" / "texts"
 #: Texts of the report in both languages, and Chinese ones in YAML (`--help`, profiles).
 REPORT = ROOT / "backend" / "report" / "texts.py"
 CHINESE = (ROOT / "drivers" / "texts" / "help.zh.yaml", *(ROOT / "profiles").glob("*/zh/*.yaml"))
+#: Turns of phrase that comments, docstrings and pages must not use, and the plain word for each.
+UNCLEAR = (
+    ("anew", "again"), ("in words", "as text"), ("told apart", "distinguished"),
+    ("tell apart", "distinguish"), ("tells apart", "distinguishes"), ("says why", "states why"),
+    ("gives way", "yields"), ("is believed", "is trusted"), ("are believed", "are trusted"),
+    ("borrowed", "changed temporarily"), ("nobody tells", "nothing states"),
+    ("takes it back", "undoes it"), ("taken back", "undone"), ("by another door", "in another way"),
+    ("beside a loop", "with a closed loop"), ("beside the loop", "with the loop closed"),
+)  # fmt: skip
+#: Where comments and docstrings are read.
+CODE = ("backend", "drivers", "profiles", "benchmarks", "tests")
 #: Words that a sentence may have outside of reference pages.
 LONGEST = 30
 #: Pages that are looked up and not read: their sentences may be longer.
@@ -39,7 +52,7 @@ class Finding(NamedTuple):
 
 
 class Line(NamedTuple):
-    """A line of prose and where it stands."""
+    """A line of prose and where it is."""
 
     number: int
     text: str
@@ -105,6 +118,32 @@ def words_elsewhere(terms: Sequence[Term]) -> Iterator[Finding]:
     ]:
         lines = (Line(n, line) for n, line in enumerate(file.read_text("utf-8").splitlines(), 1))
         yield from _words(file, lines, rules)
+
+
+def words_in_code() -> Iterator[Finding]:
+    """`UNCLEAR` in comments and docstrings of Python modules and in English pages."""
+    rules = [
+        Banned(re.compile(rf"\b{re.escape(word)}\b", re.IGNORECASE), word, better)
+        for word, better in UNCLEAR
+    ]
+    for folder in CODE:
+        for file in sorted((ROOT / folder).rglob("*.py")):
+            yield from _words(file, remarks(file.read_text("utf-8")), rules)
+    for page in pages():
+        if not page.is_relative_to(DOCS / "zh"):
+            yield from _words(page, prose(page.read_text("utf-8")), rules)
+
+
+def remarks(source: str) -> Iterator[Line]:
+    """The lines of the comments and docstrings of a module, without quoted code."""
+    before = tokenize.NEWLINE
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        alone = before in {tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT}
+        if token.type == tokenize.COMMENT or (token.type == tokenize.STRING and alone):
+            for number, line in enumerate(token.string.splitlines(), token.start[0]):
+                yield Line(number, re.sub(r"`[^`]*`", "`code`", line))
+        if token.type not in {tokenize.COMMENT, tokenize.NL}:
+            before = token.type
 
 
 def _words(file: Path, lines: Iterable[Line], rules: Sequence[Banned]) -> Iterator[Finding]:

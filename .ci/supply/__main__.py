@@ -1,9 +1,9 @@
 """What servodeck is built from: locked versions with hashes, a bill of materials, a notice.
 
-    python .ci/supply            make them anew (the locks ask a package index)
+    python .ci/supply            make them again (the locks ask a package index)
     python .ci/supply --check    fail where one of them is not what the project says; no network
 
-``run.txt``, ``dev.txt`` and ``build.txt`` beside this file lock the packages of CPython 3.11
+``run.txt``, ``dev.txt`` and ``build.txt`` next to this file lock the packages of CPython 3.11
 to 3.13 on every system, each with the hashes of its files. ``sbom.cdx.json`` (CycloneDX 1.6) and
 ``NOTICE`` follow from these, from ``webui/package-lock.json`` and from ``licences.json``, which
 keeps what the packages say of their licence.

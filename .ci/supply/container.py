@@ -1,4 +1,4 @@
-"""What a container needs beside the self-contained folder: C library, a name for root, places.
+"""What a container needs next to the self-contained folder: C library, a name for root, places.
 
     python .ci/supply/container.py WHEELS OUTPUT [x86_64|aarch64]
 

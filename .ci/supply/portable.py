@@ -5,7 +5,7 @@
 WHEELS is what ``debian.py`` takes. For another processor than this computer's the packages are
 those of the lock (`foreign`), and apt reads that architecture's lists in a folder of its own. The
 interpreter is the one of Debian's packages, fetched by ``apt-get download`` (apt checks their
-signatures) for the CPython version that builds it. It finds its library beside itself, wherever
+signatures) for the CPython version that builds it. It finds its library next to itself, wherever
 the folder lies; its shared libraries are found by a search path relative to the interpreter
 (DT_RPATH, set by patchelf). Modules whose libraries are not carried along (`_LEFT_OUT`) are left
 out. Only the C library, libstdc++ and libgcc_s come from the computer; the oldest C library that

@@ -108,7 +108,7 @@ def put_interpreter(cpython: Path, folder: Path, python: str) -> None:
 
 
 def put_runtime(site: Path, folder: Path) -> None:
-    """The C++ runtime beside the interpreter, whose file has only the C runtime.
+    """The C++ runtime next to the interpreter, whose file has only the C runtime.
 
     numba asks for it by its plain name; llvmlite, of the same makers, brings it under another.
 

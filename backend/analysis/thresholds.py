@@ -135,7 +135,7 @@ class loop_verdict:
     logarithm of a size for each octave above the last line. Sampling, filters and the current loop
     are assumed there: of a drive with another loop period (62.5 to 250 µs) it was 5 dB off two
     octaves above. Origin: 2e0d8856."""
-    # UNSEEN, UNSEEN_S: Where no line tells it: loop periods of 62.5 to 250 µs, where 50 µs are
+    # UNSEEN, UNSEEN_S: Where no line shows it: loop periods of 62.5 to 250 µs, where 50 µs are
     # assumed, and 1.5 dB.
     UNSEEN = 0.17
     """[log] Origin: 17b160fe."""
@@ -143,8 +143,8 @@ class loop_verdict:
     """[s] Origin: 17b160fe."""
     FEW = 6
     """[count] Fewer lines say nothing of margins. Origin: 17b160fe."""
-    # WORST_DEG, WORST_DB: The worst end of an interval is no more than this below a promise:
-    # degrees, dB, and that many dB as a factor of the sensitivity.
+    # WORST_DEG, WORST_DB: The worst end of an interval is no more than this below a guaranteed
+    # value: degrees, dB, and that many dB as a factor of the sensitivity.
     WORST_DEG = 5.0
     """[deg] Origin: 886716e8."""
     WORST_DB = 1.0
@@ -185,7 +185,7 @@ class notch_effect:
     NO_EFFECT = 0.93
     """[ratio] A ratio that nowhere falls below this shows no notch. Origin: e15b4fe3 with
     docs/tuning-accuracy.md."""
-    # KNOWN_TO, LEAST_LINES, EXPLAINED: Lines beside a closed loop whose ratio is known to this (one
+    # KNOWN_TO, LEAST_LINES, EXPLAINED: Lines with a closed loop whose ratio is known to this (one
     # deviation) are used; at least so many of them within an octave of the centre, and the notch
     # must explain their median to this.
     KNOWN_TO = 0.1
@@ -195,7 +195,7 @@ class notch_effect:
     EXPLAINED = 0.06
     """[ratio] Origin: e15b4fe3 with docs/tuning-accuracy.md."""
     ALIKE_LINES = 7
-    """[count] Noise of neighbouring lines is alike: so many are taken together. Origin: e15b4fe3
+    """[count] Noise of neighbouring lines is alike: so many are combined. Origin: e15b4fe3
     with docs/tuning-accuracy.md."""
 
 
@@ -203,9 +203,10 @@ class fit_problem:
     """`mechanics/fit_problem.py`."""
 
     USUAL_DELAY_S = 60e-6
-    """[s] Delays that no path tells are small: this one standard deviation, in s, beside the lines.
+    """[s] Delays that no path shows are small: this one standard deviation, in s, next to the
+    lines.
     Origin: 53a42117."""
-    # USUAL_CORNER, CORNER_SPREAD: A speed filter that nobody tells, log of Hz and its standard
+    # USUAL_CORNER, CORNER_SPREAD: A speed filter that nothing states, log of Hz and its standard
     # deviation.
     CORNER_SPREAD = 1.0
     """[ratio] Origin: 06d2dd3d with benchmarks/analysis_speed."""
@@ -245,7 +246,7 @@ class friction:
     """[ratio] Lines up to this multiple of the lowest are where friction rules, whatever else is
     nonlinear. Origin: d9add0c8 with benchmarks/tune_accuracy."""
     WORTH_TAKING = 0.9
-    """[ratio] Friction is taken out where that leaves less than this share of the scatter. Origin:
+    """[ratio] Friction is removed where that leaves less than this share of the scatter. Origin:
     06d2dd3d with benchmarks/analysis_speed."""
     # NOISE_ONLY, BY_NO_CHANCE: Where all scatter is noise (up to this multiple of it) friction is
     # there, however little it makes of it, once what it explains is so many times what a number
@@ -263,7 +264,7 @@ class identify:
     """[ratio] A model whose median relative misfit is larger, and larger than the noise, corrects
     nothing. Origin: 2c4e86b8."""
     LEFT_LATE = 0.3
-    """[cycles] A path that leaves more cycles of delay than this is doubtful: others are tried.
+    """[cycles] A path that leaves more cycles of delay than this is uncertain: others are tried.
     Origin: 52e73817 with docs/tuning-accuracy.md."""
     UNDECIDED = 80.0
     """[criterion] Paths whose criteria differ by less are both possible. Origin: 2730b30d."""
@@ -300,7 +301,7 @@ class identify:
     """[ratio] Origin: 04cd1261."""
     LONGEST_STEP = 0.1
     """[ratio] Origin: 04cd1261."""
-    # BY_MOTION, CLEARLY: A path by the motion alone is taken where the criterion is better by so
+    # BY_MOTION, CLEARLY: A path by the motion alone is used where the criterion is better by so
     # much and the misfit is smaller than this share: chosen by hand on a few axes of
     # `benchmarks.rough_campaign`, where filtered or copied torques left about 1.4 to 10 times the
     # misfit. Those that leave less than 1.3 times are not noticed by this; what right ones leave
@@ -309,8 +310,8 @@ class identify:
     """[criterion] Origin: ed1a5f9a with benchmarks/rough_campaign."""
     CLEARLY = 0.77
     """[ratio] Origin: ed1a5f9a with benchmarks/rough_campaign."""
-    # BY_FAR, FAR_CLEARLY: So much better, and so much smaller, it is taken before the path by the
-    # torque is fitted anew.
+    # BY_FAR, FAR_CLEARLY: So much better, and so much smaller, it is used before the path by the
+    # torque is fitted again.
     BY_FAR = 600.0
     """[criterion] Origin: bf47af74."""
     FAR_CLEARLY = 0.4
@@ -368,8 +369,8 @@ class inertia:
     FEWEST = 20
     """[count] Fewer samples give no regression. Origin: 0f3c9bfa."""
     DISTINGUISHED = 0.01
-    """[ratio] Share of the Coulomb friction that may have been taken for viscous friction. Origin:
-    f9af5d30 with benchmarks/chaos/run."""
+    """[ratio] Share of the Coulomb friction that may have been mistaken for viscous friction.
+    Origin: f9af5d30 with benchmarks/chaos/run."""
 
 
 class inertia_by_place:
@@ -444,7 +445,7 @@ class load_terms:
     PLAIN = 0.5
     """[ratio] A term that takes this share of the power that is left is there, whatever the noise.
     Origin: 6673eb21."""
-    # SHARE, F: Beside noise a smaller share counts for a fan and for the machine's place, which
+    # SHARE, F: Next to noise a smaller share counts for a fan and for the machine's place, which
     # bend inertia most: least share, and least ratio of variances (F) for the three things that are
     # fitted.
     SHARE = 0.15
@@ -502,7 +503,7 @@ class model_fit:
     """[count] Origin: 9fb66904."""
     FINISHED = 4
     """[count] Origin: 9fb66904."""
-    # LEAST_COHERENCE, FLOOR: Lines with less coherence take no part, and none is believed to be
+    # LEAST_COHERENCE, FLOOR: Lines with less coherence take no part, and none is trusted to be
     # more accurate than this.
     LEAST_COHERENCE = 0.6
     """[ratio] Origin: 2f3875f1 with benchmarks/analysis_comparison."""
@@ -555,7 +556,7 @@ class reversals:
     """`mechanics/reversals.py`."""
 
     # ROUGH, LEAST_WEIGHT: Where the balance is off by more than this (one deviation, of the Coulomb
-    # torque) the sampled speed tells more. It tells an interval to 0.3; but errors of the balance
+    # torque) the sampled speed shows more. It shows an interval to 0.3; but errors of the balance
     # are those of speeds at samples, which cancel from one interval to the next, so that it is
     # better on the lower lines.
     ROUGH = 0.4
@@ -625,8 +626,8 @@ class collocated:
 class distortion:
     """`response/distortion.py`."""
 
-    # REACH, FEWEST: Empty bins that a level is taken over, to each side, and the fewest that tell
-    # anything.
+    # REACH, FEWEST: Empty bins that a level is calculated over, to each side, and the fewest that
+    # show anything.
     REACH = 6
     """[count] Origin: fa2afbb4."""
     FEWEST = 12
@@ -665,7 +666,8 @@ class distortion:
     LEAST_TIME = 0.01
     """[ratio] Origin: d9add0c8 with benchmarks/tune_accuracy."""
     ABOVE_NOISE = 4.0
-    """[ratio] Power on the empty bins over that of the noise in it, from which on it tells of play.
+    """[ratio] Power on the empty bins over that of the noise in it, from which on it indicates
+    backlash.
     Origin: fa2afbb4."""
     # HIGHEST, FAR_ABOVE_NOISE: Where noise rules below, play may show above this share of the
     # sample rate, where it moves the motor alone; so much above the noise there.
@@ -748,14 +750,14 @@ class foreign:
     """[ratio] Lines less coherent than this are left out of the fit, and end the band. Origin:
     855a6a86."""
     FEWEST_EMPTY = 8
-    """[count] Empty lines that tell distortion, at least. Origin: 855a6a86."""
+    """[count] Empty lines that show distortion, at least. Origin: 855a6a86."""
 
 
 class frf:
     """`response/frf.py`."""
 
     # BY_SPEED, BY_BALANCE, EACH_BY_BALANCE: What friction did to a line is off by this share where
-    # only the speed tells its direction, and where the balance of torques does at reversals: all
+    # only the speed shows its direction, and where the balance of torques does at reversals: all
     # lines alike, as too little or too much friction makes them, and each line by itself, in size
     # and phase.
     BY_SPEED = 0.2
@@ -821,7 +823,7 @@ class path_fit:
     WHOLE = 0.06
     """[cycles] A delay so near to whole cycles is one of whole cycles. Origin: 95cec73e."""
     # STEADY, UNSTEADY, REPORTED, UNTOLD: Deviations of delays (cycles) and of corners (logarithm)
-    # where nothing but habit tells them.
+    # where nothing but habit shows them.
     STEADY = 0.02
     """[ratio] Origin: f9af5d30 with benchmarks/chaos/run."""
     UNSTEADY = 0.1
@@ -980,7 +982,7 @@ class sampling:
     """[s] A drive interpolates in the steps of its own loop (50 µs) and so is half a step ahead of
     a line. Origin: 53a42117."""
     USUAL_CURRENT_HZ = 1000.0
-    """[Hz] An ordinary current loop's corner, where nobody tells one. Origin: 4d353715."""
+    """[Hz] An ordinary current loop's corner, where nothing states one. Origin: 4d353715."""
 
 
 class stated_band:
@@ -993,7 +995,7 @@ class stated_band:
     """[deg] One standard deviation of the phase that hold, lag and delay leave unexplained. Origin:
     099fcd55."""
     IMAGES_LEFT = 0.08
-    """[ratio] So much of what is taken out as images may be wrong beside what the model's
+    """[ratio] So much of what is removed as images may be wrong compared with what the model's
     uncertainty says. Origin: 04cd1261."""
     # KNOWN_DB, KNOWN_DEG, CI95: By a model, an answer holds while 95 of 100 cases lie within these
     # limits of it.

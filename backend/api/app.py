@@ -122,7 +122,7 @@ def make_app(
     """The application over a bench. ``hosts`` are the Host names that it answers to.
 
     Without ``people`` whoever reaches it is the one user: for the machine's own loopback. For
-    ``behind`` and ``own_addresses`` see `Addresses`; ``strict_transport`` tells browsers to come
+    ``behind`` and ``own_addresses`` see `Addresses`; ``strict_transport`` shows browsers to come
     by HTTPS only.
     """
 

@@ -19,7 +19,7 @@ from backend.station.connected_drive import ConnectedDrive
 from drivers.errors import NotAllowed
 
 #: Sent by the page with every change: the id of its live connection, which may hold a lease. The
-#: gate takes away one that is not of the same session, so a route may believe it.
+#: gate takes away one that is not of the same session, so a route may trust it.
 CONNECTION_HEADER = "X-Servodeck-Connection"
 
 

@@ -12,8 +12,8 @@ from backend.api.sets import models as models_sets
 from backend.api.station import models as models_bench
 from backend.drive.drive import Drive
 from backend.drive.readings import Reading
+from backend.motion.alternatives import alternative_of
 from backend.motion.classes import motion_of
-from backend.motion.doors import door_of
 from backend.parameters.set_file import Difference
 from backend.people.elapsed import moment_of
 from backend.station.bench import Bench
@@ -231,7 +231,7 @@ def parameter_row(
     """Description and value of a parameter."""
     why = drive.unreachable_why(parameter)
     energises = motion_of(parameter) == "energises"
-    door = door_of(drive.profile, parameter) if energises else None
+    door = alternative_of(drive.profile, parameter) if energises else None
     return models_parameters.ParameterRow.model_construct(
         key=parameter.key,
         number=parameter.number,

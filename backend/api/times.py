@@ -8,7 +8,7 @@ from drivers.errors import OutOfRange
 
 
 def in_utc(moment: datetime | None) -> datetime | None:
-    """The moment in UTC; one without a zone is taken as UTC.
+    """The moment in UTC; one without a zone is treated as UTC.
 
     Raises:
         OutOfRange: there is no such time in UTC (at the ends of the calendar).

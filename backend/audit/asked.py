@@ -1,4 +1,4 @@
-"""What a request or message asks for, so that the audit tells it without every route's help."""
+"""What a request or message asks for, so that the audit shows it without every route's help."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def settings_now() -> dict[str, Value]:
 
 
 def note_before(**values: object) -> None:
-    """Tell the audit what a change replaces."""
+    """Report to the audit what a change replaces."""
     if (now := asked.get()) is not None:
         now.before = values
 

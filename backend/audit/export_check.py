@@ -11,7 +11,7 @@ from drivers.errors import NotAllowed
 
 
 def check_lines(lines: Iterable[str], anchor: Anchor | None = None) -> Verdict:
-    """Check lines as `Trail.export` writes them; whether the end is missing only an anchor tells.
+    """Check lines as `Trail.export` writes them; whether the end is missing only an anchor shows.
 
     Raises:
         NotAllowed: a line is no entry of an audit.

@@ -1,4 +1,4 @@
-"""What happens on the bench, as the audit tells it. Each kind of event enters in one place."""
+"""What happens on the bench, as the audit shows it. Each kind of event enters in one place."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class Axis(ScaledAxis):
         #: The page by which it was left enabled; None where it was no page.
         self.enabled_by: str | None = None
         self._standing: Grant | None = None
-        #: Called with the reason when the axis must not stay enabled; power is to be taken off.
+        #: Called with the reason when the axis must not stay enabled; power must be switched off.
         self.unattended: Callable[[Text], None] = lambda _why: None
 
     @property
@@ -72,7 +72,7 @@ class Axis(ScaledAxis):
             NotAllowed: the drive stays where it is, or STOP was pressed meanwhile.
         """
         await self.require_stop_delivered()
-        # In a running exchange the loop keeps the setpoints where the axis stands.
+        # In a running exchange the loop keeps the setpoints where the axis is.
         aims = self.cyclic_power() is None
         with self.granted(f"to “{goal.value}”"):
             if mode is not None:
@@ -142,7 +142,7 @@ class Axis(ScaledAxis):
             )
 
     async def standstill(self, timeout_s: float) -> bool:
-        """Whether the axis came to rest (position unchanged over 30 ms) within the time.
+        """Whether the axis stopped (position unchanged over 30 ms) within the time.
 
         Two readings are compared at least: a busy computer or a slow bus may take longer for one.
         """
@@ -164,7 +164,7 @@ class Axis(ScaledAxis):
         """Put these parameters back to what they are now, on every exit.
 
         Raises:
-            RestoreFailed: on leaving, naming what could not be put back.
+            RestoreFailed: on leaving, naming what could not be restored.
         """
         return restoring.restoring(self.drive, *keys)
 
@@ -174,7 +174,7 @@ class Axis(ScaledAxis):
 
         STOP brakes at least as hard meanwhile as the profile's deceleration that was set before.
 
-        On leaving, the axis is brought to rest, and back to the power state and mode it was
+        On leaving, the axis is stopped, and back to the power state and mode it was
         in. The mode is set before enabling, at standstill, as some families demand.
 
         Raises:
@@ -260,7 +260,7 @@ class Axis(ScaledAxis):
             raise error
 
     async def _name_fault(self, error: NotAllowed) -> None:
-        """The loop knows only that the drive left Operation enabled; the drive knows why."""
+        """The loop sees only that the drive left Operation enabled; the drive has the reason."""
         try:
             if await self.state() not in (State.FAULT, State.FAULT_REACTION):
                 return
@@ -367,7 +367,7 @@ class Axis(ScaledAxis):
             await self.halt_and_wait(CLEANUP_TIMEOUT_S / 2)
             state = await self.state()
         if before is State.OPERATION_ENABLED and state is State.OPERATION_ENABLED:
-            # Halt is released only onto a setpoint that is where the axis stands, in this
+            # Halt is released only onto a setpoint that is where the axis is, in this
             # mode and in the one that comes back.
             for aimed in dict.fromkeys((mode, previous)):
                 await self.aim_here(aimed)

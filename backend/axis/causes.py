@@ -1,4 +1,4 @@
-"""What may keep an axis from being enabled beside what its status word says: for a refusal.
+"""What may keep an axis from being enabled in addition to what its status word says: for a refusal.
 
 These are hints from what the drive reports at this moment. They are read only after a change
 of state was refused, when a person looks for the reason.

@@ -65,7 +65,7 @@ class CyclicSession:
         """Map the signals of all drives and begin.
 
         Raises:
-            NotAllowed: a drive refuses; the reason is in words.
+            NotAllowed: a drive refuses; the reason is as text.
             Busy: it runs already.
         """
         if self.state is not None:

@@ -36,14 +36,14 @@ async def keeping_mode(axis: Axis, session: CyclicSession) -> AsyncIterator[None
     """
     drive = axis.drive
     keys = [] if session.power() is None else await axis.restorable_mode()
-    if not keys or drive.pending_restores.borrows(keys[0]):
+    if not keys or drive.pending_restores.is_temporary(keys[0]):
         yield
         return
     (key,) = keys
     before = await drive.raw(key)
     with (
         axis.granted("motion through the cyclic exchange"),
-        drive.pending_restores.borrowed({key: before}),
+        drive.pending_restores.temporary({key: before}),
     ):
         modes_of_the_loop(drive, session, key)
         try:
@@ -55,7 +55,7 @@ async def keeping_mode(axis: Axis, session: CyclicSession) -> AsyncIterator[None
 
 
 def modes_of_the_loop(drive: Drive, session: CyclicSession, key: str) -> None:
-    """What the loop may leave in the borrowed ``key``: it writes past the drive's own methods."""
+    """What the loop may leave in the changed ``key``: it writes past the drive's own methods."""
     for mode in (Mode.PV,) if drive.id in session.by_speed else _CYCLIC:
         drive.pending_restores.commanded(key, int(mode))
 

@@ -35,11 +35,11 @@ def history_of(drive: Drive) -> FaultHistory | None:
 async def read_history(axis: Axis) -> list[PastFault]:
     """All remembered faults, newest first where the manual says which that is.
 
-    A record that is reached through a selector is selected by a write; the selector is put back.
+    A record that is reached through a selector is selected by a write; the selector is restored.
 
     Raises:
         NotAllowed: the drive keeps no record that can be read.
-        DriveError: the link is gone, or the selector could not be put back.
+        DriveError: the link is gone, or the selector could not be restored.
     """
     drive = axis.drive
     history = history_of(drive)

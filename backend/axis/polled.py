@@ -49,5 +49,5 @@ class PolledGuard:
             )  # fmt: skip
 
     def interrupt(self) -> None:
-        """The position was set anew, as homing does."""
+        """The position was set again, as homing does."""
         self._guard.interrupt()

@@ -173,7 +173,7 @@ class PowerState:
             return
         if goal is State.OPERATION_ENABLED:
             await self.require_stop_delivered()
-            await self.know_stop()
+            await self.read_stop_settings()
         if self.stopped and goal is State.OPERATION_ENABLED:
             raise NotAllowed("axis.stop-pressed", drive=self.drive.name)
         if goal is State.OPERATION_ENABLED and await self.state() is State.FAULT:
@@ -221,7 +221,7 @@ class PowerState:
             await self.go_to_cyclic(self.session, goal, None, timeout_s)
             return goal
         if goal is State.OPERATION_ENABLED:
-            await self.know_stop()
+            await self.read_stop_settings()
         deadline = time.monotonic() + timeout_s
         state = await self.state()
         while (word := cia402.next_control_word(state, goal, self.control_word)) is not None or (
@@ -392,7 +392,7 @@ class PowerState:
             raise
         self.stop_pending = False
 
-    async def know_stop(self) -> None:
+    async def read_stop_settings(self) -> None:
         """Read how the drive brakes on STOP, so that STOP itself need not ask; never raises."""
         with contextlib.suppress(DriveError):
             await self.drive.read_many(settings_keys(self.drive))

@@ -1,4 +1,4 @@
-"""What the bench remembers of one axis beside its connection: mechanics, watch list, scales.
+"""What the bench remembers of one axis next to its connection: mechanics, watch list, scales.
 
 One small file per axis in the state folder, written whole or not at all.
 """

@@ -1,4 +1,4 @@
-"""Parameters that must be put back, and cleanups that nothing may interrupt."""
+"""Parameters that must be restored, and cleanups that nothing may interrupt."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ async def restoring(drive: Drive, *keys: str) -> AsyncIterator[dict[str, Raw]]:
     """Put these parameters back to what they are now, on every exit.
 
     Raises:
-        RestoreFailed: on leaving, naming what could not be put back.
+        RestoreFailed: on leaving, naming what could not be restored.
     """
     before: dict[str, Raw] = {}
     for key in keys:
         reading = await drive.read(key)
         if reading.raw is not None:
             before[key] = reading.raw
-    with drive.pending_restores.borrowed(before):
+    with drive.pending_restores.temporary(before):
         try:
             yield before
         except BaseException as error:
@@ -57,7 +57,7 @@ async def _put_back(drive: Drive, before: dict[str, Raw], earlier: BaseException
             error = RestoreFailed(
                 "axis.perhaps-not-restored", drive=name, values=values, cause=error.text
             )
-        _tell_first(earlier, error)
+        _put_first_error_first(earlier, error)
         raise error from earlier
 
 
@@ -87,7 +87,7 @@ async def _restore(drive: Drive, before: dict[str, Raw]) -> None:
         )
 
 
-def _tell_first(earlier: BaseException | None, late: DriveError) -> None:
+def _put_first_error_first(earlier: BaseException | None, late: DriveError) -> None:
     """A cleanup that fails must not hide why it was due: that comes first in its words."""
     if not isinstance(earlier, DriveError) or earlier is late:
         return
@@ -102,7 +102,7 @@ async def shielded(cleanup: Callable[[], Awaitable[None]], timeout_s: float, dri
     """Run a cleanup to its end even when the surrounding task is cancelled again.
 
     Where it is run because something failed (from ``finally`` or ``except``), an error of its own
-    tells of that first.
+    reports that first.
 
     Raises:
         LinkTimeout: the cleanup itself took longer than ``timeout_s``.
@@ -112,7 +112,7 @@ async def shielded(cleanup: Callable[[], Awaitable[None]], timeout_s: float, dri
     try:
         await _to_its_end(cleanup, timeout_s, drive)
     except DriveError as late:
-        _tell_first(earlier, late)
+        _put_first_error_first(earlier, late)
         raise
 
 

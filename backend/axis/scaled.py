@@ -1,4 +1,4 @@
-"""The scales of one axis: read once, and read anew when what they rest on changes."""
+"""The scales of one axis: read once, and read again when what they rest on changes."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class ScaledAxis(PowerState):
         self._units = None
 
     def _units_may_have_changed(self, readings: list[Reading]) -> None:
-        """Whoever wrote the gearing (a page, a set, the panel): units are read anew."""
+        """Whoever wrote the gearing (a page, a set, the panel): units are read again."""
         for reading in readings:
             known = self._unit_raws.get(reading.key)
             if known is not None and reading.raw is not None and reading.raw != known:

@@ -9,7 +9,7 @@ from backend.scales.units_found import nearest_unit
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts import limits
 
-#: Revolutions that an eye can tell; fewer are a guess.
+#: Revolutions that a person can distinguish; fewer are a guess.
 _LEAST_REV = 0.05
 _MOST_REV = 1e6
 

@@ -30,7 +30,7 @@ def conformance(
 ) -> None:
     """Which rules of the public standards a slave keeps. Never enables; nothing moves.
 
-    Opens an EtherCAT or CANopen bus that no server holds. An EtherCAT slave is taken to Init and
+    Opens an EtherCAT or CANopen bus that no server holds. An EtherCAT slave is brought to Init and
     Pre-Op and left in Pre-Op. What is written are present values, in part in a wrong length; a
     drive that is powered is only read. Ends with 1 where a rule has failed.
     """

@@ -11,7 +11,7 @@ from profiles.schema import Raw
 
 
 class Terminal(NamedTuple):
-    """One terminal as it is; None where the drive does not tell."""
+    """One terminal as it is; None where the drive does not report."""
 
     name: str
     direction: str

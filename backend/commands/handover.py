@@ -56,7 +56,7 @@ def export(
         typer.Argument(metavar="SET...", help="parameter set; several are a segment, by cable"),
     ],
     form: Annotated[str, typer.Option("--format", help="|".join(get_args(Format)))],
-    out: Annotated[Path, typer.Option(help="file to write; what belongs to it lies beside it")],
+    out: Annotated[Path, typer.Option(help="file to write; what belongs to it lies next to it")],
     only: Annotated[str, typer.Option(help="keys, separated by commas")] = "",
     tuned: Annotated[bool, typer.Option("--tuned", help="gains, filters and notches")] = False,
     not_default: Annotated[
@@ -70,7 +70,7 @@ def export(
         typer.Option(help="the drives' ESI files, for an ENI that a master can run"),
     ] = None,
 ) -> None:
-    """Write a start-up list, with a sheet of the scaling beside it."""
+    """Write a start-up list, with a sheet of the scaling next to it."""
 
     async def work() -> None:
         chosen = _format(form)

@@ -84,7 +84,7 @@ def repeat(
             known = await at.ask("GET", f"/drives/{drive.id}/health", AxisHealth)
             if known.baseline is None:
                 raise NotAllowed("health.no-baseline", axis=axis)
-            # Consent is given for one motion: that of the baseline is not taken over.
+            # Consent is given for one motion: that of the baseline is not adopted.
             body = {**known.baseline.settings, "rounds": CHECKS, "consent": consent}
             found = await at.result(f"/drives/{drive.id}/jobs/health", body)
             now = await at.ask("GET", f"/drives/{drive.id}/health", AxisHealth)

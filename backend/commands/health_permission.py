@@ -147,7 +147,7 @@ def _show(axis: str, found: HealthPermissionInfo | None, as_json: bool) -> None:
 
 
 def lines_of(axis: str, found: HealthPermissionInfo | None) -> list[str]:
-    """A permission and its newest attempts, in words."""
+    """A permission and its newest attempts, as text."""
     if found is None:
         return [text("health.permission-none", axis=axis).words(language())]
     until = f"{found.until:%Y-%m-%d %H:%M} UTC"

@@ -97,9 +97,7 @@ def restore(
     database: Database = None,
     replace_: Annotated[
         bool,
-        typer.Option(
-            "--replace", help="the present state folder is kept beside under another name"
-        ),
+        typer.Option("--replace", help="the present state folder is kept under another name"),
     ] = False,
 ) -> None:
     """Put a backup in place, after checking it as a whole. End the server first."""
@@ -273,9 +271,9 @@ def purge(
     config: Config = None,
     database: Database = None,
     blobs: BlobPlace = None,
-    days: Annotated[float, typer.Option(min=0, help="put aside longer ago than this")] = 30.0,
+    days: Annotated[float, typer.Option(min=0, help="archived longer ago than this")] = 30.0,
 ) -> None:
-    """Delete for good what was put aside, and contents that nothing names any more."""
+    """Delete for good what was archived, and contents that nothing names any more."""
     records = _existing(config, database, blobs)
     gone = records.library.purge(datetime.now(UTC) - timedelta(days=days))
     records.audit.close()

@@ -61,7 +61,7 @@ async def dump(
         write_atomically(out, data)
         count = sum(r.raw is not None for r in readings.values())
         print_text("printed.parameters-in-file", file=str(out), count=count)
-    values.tell_missing(data)
+    values.print_missing(data)
 
 
 async def save(place: Place) -> None:

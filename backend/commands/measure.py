@@ -148,7 +148,7 @@ def measure(
 def show(
     answer: Answer, out: Path | None, reported: Callable[[Answer], list[str]], *, as_json: bool
 ) -> None:
-    """Write a result to ``out``, and print it as JSON or in words."""
+    """Write a result to ``out``, and print it as JSON or as text."""
     if out is not None:
         write_atomically(out, json.dumps(answer, indent=1).encode())
     if as_json:

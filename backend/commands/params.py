@@ -126,7 +126,7 @@ def restore(
     ] = False,
     server: Server = None,
 ) -> None:
-    """Restore what a motion borrowed and left, because its command or server was cut off."""
+    """Restore what a motion changed and left, because its command or server was cut off."""
 
     async def work() -> None:
         where = place(url, station, profile, server)

@@ -10,7 +10,7 @@ from drivers.texts.message import Param, language, text
 
 
 def words_of(code: str, /, **params: Param) -> str:
-    """A message of the catalogue in words."""
+    """A message of the catalogue as text."""
     return text(code, **params).words(language())
 
 
@@ -20,7 +20,7 @@ def print_text(code: str, /, **params: Param) -> None:
 
 
 def note(code: str, /, **params: Param) -> None:
-    """Print a message of the catalogue beside the output of the command."""
+    """Print a message of the catalogue in addition to the output of the command."""
     print(words_of(code, **params), file=sys.stderr)
 
 

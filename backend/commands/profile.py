@@ -191,7 +191,7 @@ def classify_object(
     """Say whether writing an object of an imported profile can cause motion.
 
     Nobody has said so of a maker's objects in an imported file, and so each counts as one that
-    can. The decision is kept beside the profile and written down in the station's audit.
+    can. The decision is kept next to the profile and written down in the station's audit.
     """
     if motion not in (*get_args(Motion), "forget"):
         raise NotAllowed(

@@ -86,7 +86,7 @@ async def dump(
     else:
         write_atomically(out, data)
         print_text("printed.also-kept", file=str(out), name=kept.file)
-    values.tell_missing(data)
+    values.print_missing(data)
 
 
 async def diff(place: Place, file: Path, *, as_json: bool) -> bool:

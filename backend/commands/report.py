@@ -1,4 +1,4 @@
-"""``servodeck report`` and ``servodeck recompute``: what stored measurements tell, as files."""
+"""``servodeck report`` and ``servodeck recompute``: what stored measurements show, as files."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def recompute(
     file: Annotated[Path, typer.Argument(metavar=f"FILE{SUFFIX}")],
     out: Annotated[Path | None, typer.Option(help="JSON file for the result")] = None,
 ) -> None:
-    """Evaluate a stored measurement anew from its raw signals. Nothing moves."""
+    """Evaluate a stored measurement again from its raw signals. Nothing moves."""
 
     async def work() -> None:
         try:

@@ -65,7 +65,7 @@ async def stop_what_was_moved(axis: Axis, pending: Pending) -> None:
 
 
 def require_own_values(drive: Drive) -> None:
-    """Borrowed values must not be stored as the drive's own.
+    """Temporary values must not be stored as the drive's own.
 
     Raises:
         NotAllowed: something is pending.

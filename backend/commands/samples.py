@@ -1,4 +1,4 @@
-"""Scope blocks of the live connection, taken apart; `backend.api.live.messages` has the form."""
+"""Scope blocks of the live connection, decoded; `backend.api.live.messages` has the form."""
 
 from __future__ import annotations
 

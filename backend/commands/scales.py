@@ -204,7 +204,7 @@ async def _teach_here(
 
 
 def _turned(increments: int) -> float | None:
-    """How far the shaft turned as a person saw it; None: too little to tell, move further."""
+    """How far the shaft turned as a person saw it; None: too little to decide, move further."""
     question = words_of("printed.how-far", increments=increments)
     answer = str(typer.prompt(question, default="", show_default=False))
     return float(answer.replace(",", ".")) if answer.strip() else None

@@ -84,7 +84,7 @@ async def serve(
 
     Raises:
         Busy: another server uses the state folder.
-        NotAllowed: the port is taken, the certificate is none, or others could come in without
+        NotAllowed: the port is in use, the certificate is none, or others could come in without
             an account.
     """
     bench.records.claim()
@@ -114,10 +114,10 @@ async def _serve_claimed(
             await ready()
         port = listening.getsockname()[1]
         shown = _address(serving, certificate, port)
-        _tell(shown, people, certificate)
+        _print_addresses(shown, people, certificate)
         if people.setup_needed and not serving.on_loopback:
-            _tell_phone(phone_address(serving.host, port))
-        _tell_problems(bench)
+            _print_phone_address(phone_address(serving.host, port))
+        _print_problems(bench)
         if serving.open_page:
             webbrowser.open(shown)
         async with _known_by_name(box, serving, port):
@@ -137,7 +137,7 @@ def _box(folder: Path) -> Box | None:
         return None
 
 
-def _tell_phone(address: str) -> None:
+def _print_phone_address(address: str) -> None:
     print_text("printed.scan-code", url=address)
     print(scan_code(address), flush=True)
 
@@ -175,7 +175,7 @@ async def accounts_needed(folder: Path, serving: Serving) -> bool:
 
     Raises:
         NotAllowed: they would not have to where others could reach the server.
-        AccountsGone: they have had to, and there are no accounts any more.
+        AccountsMissing: they have had to, and there are no accounts any more.
         DatabaseFailed: it cannot be known.
     """
     reachable = not serving.on_loopback or bool(serving.behind)
@@ -239,7 +239,7 @@ def _config(
         backlog=BACKLOG,
         timeout_graceful_shutdown=3,
         server_header=False,
-        # Who a proxy speaks for is believed only where one was announced.
+        # Who a proxy speaks for is trusted only where one was announced.
         proxy_headers=bool(serving.behind),
         ssl_certfile=None if certificate is None else str(certificate.certificate),
         ssl_keyfile=None if certificate is None else str(certificate.key),
@@ -262,7 +262,7 @@ def _address(serving: Serving, certificate: Certificate | None, port: int) -> st
     return f"{scheme}://{host}:{port}/"
 
 
-def _tell(shown: str, people: People, certificate: Certificate | None) -> None:
+def _print_addresses(shown: str, people: People, certificate: Certificate | None) -> None:
     print_text("printed.server-is-at", url=shown)
     if certificate is not None and not certificate.own:
         print_text("printed.own-certificate")
@@ -274,7 +274,7 @@ def _tell(shown: str, people: People, certificate: Certificate | None) -> None:
         print(f"  {people.accounts.setup_code}", flush=True)
 
 
-def _tell_problems(bench: Bench) -> None:
+def _print_problems(bench: Bench) -> None:
     """What is wrong with the station and not with a drive, such as a database out of reach: what
     was so at the start, and what becomes so.
     """

@@ -73,7 +73,7 @@ def _run(work: Callable[[], Awaitable[T]], error_code: int = 1) -> T:
 def run_in_order(work: Callable[[], Awaitable[T]]) -> T:
     """Run what moves an axis: Ctrl+C and SIGTERM let it put everything back first; exit code 130.
 
-    What the drive was borrowed for a measurement is put back while the work is cancelled.
+    What the drive was changed for a measurement is restored while the work is cancelled.
     """
     # The event loop makes a cancelling of SIGINT alone, and only where that is not ignored.
     with signals.interruptible():

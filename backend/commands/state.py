@@ -15,7 +15,7 @@ STATE_FOLDER_VARIABLE = "SERVODECK_CONFIG"
 def state_folder(chosen: Path | None) -> Path:
     """Where the list of drives, the parameter sets and the restore lists are kept.
 
-    The environment's SERVODECK_CONFIG is taken where no folder is given, so that server and
+    The environment's SERVODECK_CONFIG is used where no folder is given, so that server and
     commands of one station share it.
 
     Raises:

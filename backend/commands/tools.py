@@ -34,8 +34,8 @@ _OUTPUT: dict[str, tuple[Any, object]] = {"out": (measure.Out, None), "as_json":
 
 
 @dataclass(frozen=True)
-class Beside:
-    """What the command of a tool has beside what follows from its descriptor.
+class CommandExtras:
+    """What the command of a tool has extras what follows from its descriptor.
 
     ``options`` are further ones, or take the place of a setting's. ``settled`` makes the settings
     of what was given. ``here`` and ``there`` are done with the result, on a bus of one's own or on
@@ -49,12 +49,12 @@ class Beside:
     lines: Callable[[Any, dict[str, Any]], list[str]]
 
 
-def command_of(tool: AnyTool, beside: Beside | None = None) -> Callable[..., None]:
+def command_of(tool: AnyTool, extras: CommandExtras | None = None) -> Callable[..., None]:
     """The command of a tool: where the drive is, an option for each setting, and the output."""
-    own = {**_WHERE, **dict(_options(tool)), **(beside.options if beside else {}), **_OUTPUT}
+    own = {**_WHERE, **dict(_options(tool)), **(extras.options if extras else {}), **_OUTPUT}
 
     def command(**given: Any) -> None:
-        settings = _settings(tool, beside.settled(given) if beside else given)
+        settings = _settings(tool, extras.settled(given) if extras else given)
         where = measure.Where(*(given[name] for name in _WHERE))
 
         async def here() -> dict[str, object]:
@@ -67,17 +67,17 @@ def command_of(tool: AnyTool, beside: Beside | None = None) -> Callable[..., Non
                 settings.consent, closes_loops=tool.closes_loops,
             ) as (axis, session):  # fmt: skip
                 found = await tool.run(Run(axis, session, progress()), settings)
-                if beside is not None:
-                    await beside.here(axis, found, given)
+                if extras is not None:
+                    await extras.here(axis, found, given)
             return dict(found.model_dump(mode="json"))
 
         async def there(at: Remote, drive: DriveSummary, answer: Answer) -> None:
-            if beside is not None:
-                await beside.there(at, drive, answer, given)
+            if extras is not None:
+                await extras.there(at, drive, answer, given)
 
         def lines(answer: Answer) -> list[str]:
             found = tool.result.model_validate(answer)
-            return lines_of(tool, found) + (beside.lines(found, given) if beside else [])
+            return lines_of(tool, found) + (extras.lines(found, given) if extras else [])
 
         measure.measure(
             where, tool.kind, here, settings.model_dump(mode="json"), given["out"], lines,

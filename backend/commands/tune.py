@@ -11,7 +11,7 @@ from backend.axis.axis import Axis
 from backend.commands.measure import Answer
 from backend.commands.printing import words_of
 from backend.commands.remote import Remote
-from backend.commands.tools import Beside, command_of
+from backend.commands.tools import CommandExtras, command_of
 from backend.tools.autotune.apply import take_back
 from backend.tools.autotune.result import AutotuneAnswer
 from backend.tools.registry import BY_KIND
@@ -20,7 +20,7 @@ _OPTIONS: dict[str, tuple[Any, object]] = {
     "apply": (
         Annotated[
             bool,
-            typer.Option("--apply", help="write the design, verify it, and take it back"),
+            typer.Option("--apply", help="write the design, verify it, and undo it"),
         ],
         False,
     ),
@@ -62,4 +62,4 @@ def _lines(found: AutotuneAnswer, given: dict[str, Any]) -> list[str]:
     return ["", words_of("printed.tuning-taken-back")]
 
 
-autotune = command_of(BY_KIND["autotune"], Beside(_OPTIONS, _settled, _here, _there, _lines))
+autotune = command_of(BY_KIND["autotune"], CommandExtras(_OPTIONS, _settled, _here, _there, _lines))

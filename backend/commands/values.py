@@ -17,7 +17,7 @@ from drivers.errors import NotAllowed
 from profiles.schema import Raw
 
 
-def tell_missing(data: bytes) -> None:
+def print_missing(data: bytes) -> None:
     """Say on standard error which settings a set that was just made lacks."""
     missing = without(parameter_set.parse(data).not_read)
     if missing:
@@ -33,7 +33,7 @@ class Described(Protocol):
 
     @property
     def name(self) -> str:
-        """Name in words."""
+        """Name as text."""
 
     @property
     def type(self) -> str:
@@ -53,7 +53,7 @@ class Described(Protocol):
 
 
 class Reported(Protocol):
-    """What a drive said of it; ``raw`` is None where ``error`` says why."""
+    """What a drive said of it; ``raw`` is None where ``error`` states the reason."""
 
     @property
     def raw(self) -> Raw | None:
@@ -69,7 +69,7 @@ class Reported(Protocol):
 
 
 class Compared(NamedTuple):
-    """One row of a set beside the drive."""
+    """One row of a set next to the drive."""
 
     key: str
     name: str
@@ -227,7 +227,7 @@ def chosen(rows: Iterable[Compared], *, yes: bool) -> list[str]:
 
 
 def loaded(result: Mapping[str, object]) -> bool:
-    """Tell what a load did; whether every value was kept."""
+    """Report what a load did; whether every value was kept."""
     print_text("printed.set-loaded", written=str(result["written"]), failed=str(result["failed"]))
     print_text("printed.values-before", file=str(result["backup"]))
     return result["failed"] == 0

@@ -51,5 +51,5 @@ async def _ask(port: Port, chunk: Sequence[Parameter], access: ExclusiveAccess) 
 
 
 def _silence(answers: Answers) -> bool:
-    """Whether nothing of a batch was answered; one object alone tells nothing."""
+    """Whether nothing of a batch was answered; one object alone shows nothing."""
     return len(answers) > 1 and all(isinstance(answer, LinkTimeout) for answer in answers)

@@ -14,8 +14,8 @@ from backend.drive.ports import Port, address_of
 from backend.drive.readable import ReadableDrive
 from backend.drive.readings import CommandRecord, Reading, Refusal, WriteRecord
 from backend.drive.value_check import checked, named
+from backend.motion.alternatives import refused
 from backend.motion.classes import held_still, motion_of
-from backend.motion.doors import refused
 from backend.motion.grant import Grant
 from backend.motion.stopping import stops
 from drivers import cia402
@@ -86,7 +86,7 @@ class Drive(ReadableDrive):
         return await self._written(parameter, raw, permitted)
 
     async def put_back(self, key: str, raw: Raw) -> Reading:
-        """Write a borrowed value back, of whatever class, by the work that had borrowed it.
+        """Write a temporary value back, of whatever class, by the work that had changed it.
 
         Raises:
             NotGranted: it energises, and the calling work holds no grant.
@@ -165,9 +165,9 @@ class Drive(ReadableDrive):
         except BaseException as error:
             # A cancelled write may have reached the drive as well.
             problem = error.text if isinstance(error, DriveError) else text("drive.interrupted")
-            self._tell_write(parameter, before, value, None, problem)
+            self._notify_write(parameter, before, value, None, problem)
             raise
-        self._tell_write(parameter, before, value, reading.raw)
+        self._notify_write(parameter, before, value, reading.raw)
         return reading
 
     async def _send_and_read(
@@ -195,7 +195,7 @@ class Drive(ReadableDrive):
             self._changes.pending[parameter.key] = parameter.effective
         return await self.read(parameter.key)
 
-    def _tell_write(
+    def _notify_write(
         self,
         parameter: Parameter,
         before: Raw | None,
@@ -276,13 +276,13 @@ class Drive(ReadableDrive):
         except BaseException as error:
             # A cancelled command may have reached the drive as well.
             problem = error.text if isinstance(error, DriveError) else text("drive.interrupted")
-            self._tell_command(parameter, raw, problem)
+            self._notify_command(parameter, raw, problem)
             if isinstance(error, DriveError):
                 raise named(self.name, error, parameter, raw) from error
             raise
-        self._tell_command(parameter, raw)
+        self._notify_command(parameter, raw)
 
-    def _tell_command(self, parameter: Parameter, raw: int, problem: Text | None = None) -> None:
+    def _notify_command(self, parameter: Parameter, raw: int, problem: Text | None = None) -> None:
         record = CommandRecord(self.id, self.name, parameter.key, parameter.name, raw, problem)
         self.listeners.commanded(record)
 

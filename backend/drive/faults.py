@@ -10,7 +10,7 @@ from profiles.schema import Fault
 
 
 def fault_keys(drive: Drive) -> list[str]:
-    """Parameters that tell of faults, where a connected port carries them."""
+    """Parameters that report faults, where a connected port carries them."""
     keys = {match.key for fault in drive.profile.faults for match in fault.match}
     reachable = {key for key in keys if not drive.unreachable_why(drive.parameter(key))}
     if (code := drive.key("error_code")) is not None:
@@ -20,7 +20,7 @@ def fault_keys(drive: Drive) -> list[str]:
         reachable.add(kind.key)
     history = drive.profile.functions.history
     if history is not None and history.kind == "selected":
-        # The newest record tells which fault it is where 603Fh does not (R6L, 002:12361).
+        # The newest record shows which fault it is where 603Fh does not (R6L, 002:12361).
         for key in (history.select_key, history.code_key, drive.key("status_word")):
             if key is not None and not drive.unreachable_why(drive.parameter(key)):
                 reachable.add(key)

@@ -27,7 +27,7 @@ async def read_serial(drive: Drive) -> int | None:
 
 
 async def confirm_identity(drive: Drive) -> None:
-    """Ask for the serial number again, where it is known and the drive tells it.
+    """Ask for the serial number again, where it is known and the drive reports it.
 
     Raises:
         NotAllowed: another drive answers here.

@@ -34,21 +34,21 @@ class DriveListeners:
         self._refusals.append(listener)
 
     def refused(self, refusal: Refusal) -> None:
-        """Tell a refusal."""
+        """Report a refusal."""
         for listener in self._refusals:
             listener(refusal)
 
     def read(self, readings: list[Reading]) -> None:
-        """Tell new readings."""
+        """Report new readings."""
         for listener in list(self._readings):
             listener(readings)
 
     def wrote(self, record: WriteRecord) -> None:
-        """Tell a write."""
+        """Report a write."""
         for listener in self._writes:
             listener(record)
 
     def commanded(self, record: CommandRecord) -> None:
-        """Tell a command."""
+        """Report a command."""
         for listener in self._commands:
             listener(record)

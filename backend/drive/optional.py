@@ -1,7 +1,7 @@
 """Which objects of a profile a drive really has, where CiA 402-2 leaves them to the maker.
 
 A profile of the standard names them all; a drive that lacks one refuses to be asked for it. That
-is asked anew where it matters, as a drive that is still starting may deny what it has.
+is asked again where it matters, as a drive that is still starting may deny what it has.
 """
 
 from __future__ import annotations

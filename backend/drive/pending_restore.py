@@ -41,7 +41,7 @@ class PendingRestores:
 
     def __init__(self) -> None:
         self._entries: dict[str, PendingRestore] = {}
-        self._borrowed: dict[str, list[Raw]] = {}
+        self._temporary: dict[str, list[Raw]] = {}
         self._sent: dict[str, frozenset[Raw]] = {}
         self._listeners: list[Callable[[], None]] = []
         self._note: Note = _no_note
@@ -64,35 +64,35 @@ class PendingRestores:
             self._sent[entry.key] = entry.left
 
     @contextmanager
-    def borrowed(self, values: Mapping[str, Raw]) -> Iterator[None]:
-        """Around a motion that changes these raw values and puts them back when it ends."""
-        borrowed = dict(values)
-        for key, raw in borrowed.items():
-            self._borrowed.setdefault(key, []).append(raw)
-        if borrowed:
+    def temporary(self, values: Mapping[str, Raw]) -> Iterator[None]:
+        """Around a motion that changes these raw values and restores them when it ends."""
+        temporary = dict(values)
+        for key, raw in temporary.items():
+            self._temporary.setdefault(key, []).append(raw)
+        if temporary:
             self._note(durable=True)
         try:
             yield
         finally:
-            for key in borrowed:
-                self._borrowed[key].pop()
-                if not self._borrowed[key]:
-                    del self._borrowed[key]
+            for key in temporary:
+                self._temporary[key].pop()
+                if not self._temporary[key]:
+                    del self._temporary[key]
             self._note()
 
     @property
     def outstanding(self) -> tuple[PendingRestore, ...]:
         """What would be pending if this process ended now, without restoring anything."""
-        borrowed = {
+        temporary = {
             key: PendingRestore(key, raws[0], self._sent.get(key, frozenset()))
-            for key, raws in self._borrowed.items()
+            for key, raws in self._temporary.items()
         }
-        return tuple((borrowed | self._entries).values())
+        return tuple((temporary | self._entries).values())
 
     @property
     def in_motion(self) -> bool:
         """A motion goes on that has changed something for its length."""
-        return bool(self._borrowed)
+        return bool(self._temporary)
 
     @property
     def entries(self) -> tuple[PendingRestore, ...]:
@@ -105,7 +105,7 @@ class PendingRestores:
         return any(entry.unapplied for entry in self._entries.values())
 
     def add(self, values: Mapping[str, Raw], *, unapplied: bool = False) -> None:
-        """These raw values could not be put back, or (``unapplied``) not made to act."""
+        """These raw values could not be restored, or (``unapplied``) not made to act."""
         for key, raw in values.items():
             known = self._entries.get(key)
             left = self._sent.get(key, frozenset())
@@ -126,28 +126,28 @@ class PendingRestores:
         entry = self._entries.get(key)
         if entry is not None and wanted != entry.raw:
             self._entries[key] = replace(entry, left=frozenset())
-        if entry is not None or key in self._borrowed:
+        if entry is not None or key in self._temporary:
             self._note()
 
     def original(self, key: str, raw: Raw) -> Raw:
         """What it was before all motions that have changed it; ``raw`` where none has."""
-        return self._borrowed[key][0] if key in self._borrowed else raw
+        return self._temporary[key][0] if key in self._temporary else raw
 
-    def borrows(self, key: str) -> bool:
-        """A motion has changed this for its length, and puts it back."""
-        return key in self._borrowed
+    def is_temporary(self, key: str) -> bool:
+        """A motion has changed this for its length, and restores it."""
+        return key in self._temporary
 
     def restores(self, key: str, raw: Raw) -> bool:
-        """Whether writing this raw value puts back what a motion has changed."""
+        """Whether writing this raw value restores what a motion has changed."""
         entry = self._entries.get(key)
-        return raw in self._borrowed.get(key, ()) or (entry is not None and entry.raw == raw)
+        return raw in self._temporary.get(key, ()) or (entry is not None and entry.raw == raw)
 
     def commanded(self, key: str, raw: Raw) -> None:
         """A motion object is about to be written, which nobody reads back.
 
-        Only the mode of these is ever borrowed; setpoints and control words leave no trace here.
+        Only the mode of these is ever temporary; setpoints and control words leave no trace here.
         """
-        if key in self._borrowed or key in self._entries:
+        if key in self._temporary or key in self._entries:
             self.sent(key, raw, None)
 
     def seen(self, readings: Iterable[Reading]) -> None:

@@ -104,7 +104,7 @@ class ReadableDrive:
 
     @property
     def modes_key(self) -> str | None:
-        """Where the drive tells its modes, if its profile does not know them.
+        """Where the drive reports its modes, if its profile does not know them.
 
         Only a profile that stands for many drives does not: manuals print 6502h with wrong bits
         (002:14076).
@@ -143,7 +143,7 @@ class ReadableDrive:
         return cia402.decode_state(status_word, echoes_control=self._own_status)
 
     def fault_bit(self, key: str) -> int | None:
-        """The bit of the family's status word that tells of a fault; None of any other object."""
+        """The bit of the family's status word that reports a fault; None of any other object."""
         if key != self.key("status_word"):
             return None
         return cia402.fault_bit(echoes_control=self._own_status)
@@ -179,7 +179,7 @@ class ReadableDrive:
         self._announce_all()
 
     def forget(self) -> None:
-        """The drive restarted: nothing that was read before may be believed."""
+        """The drive restarted: nothing that was read before is trusted."""
         self._changes.forget()
         self.readings.clear()
 

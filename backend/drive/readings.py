@@ -37,7 +37,7 @@ class Reading:
 class WriteRecord:
     """A value that was sent to the drive; raw values.
 
-    ``before`` is what was known before, ``after`` what was read back; ``problem`` says why that
+    ``before`` is what was known before, ``after`` what was read back; ``problem`` states why that
     is not known, and then the drive may hold either.
     """
 

@@ -17,7 +17,7 @@ from profiles.schema import IoTerminal
 
 @dataclass(frozen=True, slots=True)
 class TerminalState:
-    """One terminal as it is. None: the drive does not tell.
+    """One terminal as it is. None: the drive does not report.
 
     ``same_function`` are the other terminals that were given the same function.
     """

@@ -2,7 +2,7 @@
 
 A terminal that is given "jog" while its input is on begins to jog, with a status word that says
 "disabled". So such a setting is written with a grant, only while the motor has no power; the
-shaft is watched afterwards, and where it turns the setting is put back and the axis is stopped.
+shaft is watched afterwards, and where it turns the setting is restored and the axis is stopped.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from backend.axis.axis import Axis
 from backend.axis.restoring import CLEANUP_TIMEOUT_S, shielded
 from backend.drive.readings import Reading
 from backend.drive.terminals import TerminalState, read_terminals
+from backend.motion.alternatives import alternative_of
 from backend.motion.classes import motion_of
-from backend.motion.doors import door_of
 from backend.motion.grant import NotGranted
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
@@ -24,7 +24,7 @@ from profiles.schema import Parameter, Raw
 
 #: For so long the shaft is watched; a drive's own jog turns it at once.
 _WATCHED_S, _LOOK_S = 0.3, 0.01
-#: What a shaft at rest may move, as noise of its encoder or by a jolt.
+#: What a shaft at standstill may move, as noise of its encoder or by a jolt.
 _STILL_REV = 0.001
 _AT_REST_S = 0.3
 _DISABLED = frozenset({State.SWITCH_ON_DISABLED, State.READY, State.NOT_READY, State.FAULT})
@@ -79,7 +79,7 @@ async def assign(axis: Axis, key: str, raw: Raw, reason: str = "") -> Reading:
 async def _require_inputs_off(axis: Axis, parameter: Parameter, raw: Raw) -> None:
     """The input that gets a function is off, and one that is inverted has no function.
 
-    A drive may not let a function be taken away again while it acts (M6-L), so this comes first.
+    A drive may not let a function be removed again while it acts (M6-L), so this comes first.
 
     Raises:
         NotAllowed: the function would act at once.
@@ -146,7 +146,7 @@ def _require_setting(axis: Axis, parameter: Parameter) -> None:
     }
     run = {s.key for p in profile.procedures for s in p.steps if s.do == "write"}
     if key in commanded | forced | run:
-        door = door_of(profile, parameter)
+        door = alternative_of(profile, parameter)
         error = NotGranted(
             "functions.command-not-setting",
             drive=drive.name,

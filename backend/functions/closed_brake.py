@@ -46,7 +46,7 @@ async def kept_closed(axis: Axis) -> AsyncIterator[None]:
 
     Raises:
         NotAllowed: the axis is enabled.
-        RestoreFailed: on leaving, naming what could not be put back.
+        RestoreFailed: on leaving, naming what could not be restored.
     """
     drive = axis.drive
     means = drive.profile.functions.brake_test

@@ -2,7 +2,7 @@
 
 A session belongs to one person's page. It ends when that page falls silent, when control of the
 axis passes to somebody else, on STOP, and on request; and on every way out the parameters are
-put back to what they were.
+restored to what they were.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class ForcingSession:
             pass
 
     def _require_open(self) -> None:
-        """What came too late must not be written after all has been put back."""
+        """What came too late must not be written after all has been restored."""
         if self.over:
             why = self.reason or "cancelled"
             raise NotAllowed(
@@ -260,10 +260,10 @@ class ForcingSessions:
         return session
 
     async def end(self, drive: str, name: str, reason: str = "ended") -> None:
-        """Release everything; returns when it is put back.
+        """Release everything; returns when it is restored.
 
         Raises:
-            DriveError: not everything could be put back.
+            DriveError: not everything could be restored.
         """
         session = self.get(drive, name)
         if session is None or session.job is None:
@@ -308,7 +308,7 @@ class ForcingSessions:
         return {"reason": session.reason}
 
     async def _act(self, session: ForcingSession) -> None:
-        """Make what was put back act; where that fails it is pending like the values themselves."""
+        """Make what was restored act; where that fails it is pending like the values themselves."""
         drive = session.axis.drive
         try:
             await apply_settings(session.axis, session.keys)

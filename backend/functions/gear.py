@@ -25,7 +25,7 @@ _COUNTED_ROLES = (
 
 @dataclass(frozen=True, slots=True)
 class GearChange:
-    """What was written: ``before`` takes it back; ``waits`` is what must happen before it acts."""
+    """What was written: ``before`` undoes it; ``waits`` is what must happen before it acts."""
 
     before: dict[str, int]
     waits: dict[str, str]
@@ -52,11 +52,11 @@ def counted_in_increments(axis: Axis) -> list[str]:
 
 
 async def write_gear(axis: Axis, values: Sequence[GearValue]) -> GearChange:
-    """Write all values, each read back; on a failure those written before are put back.
+    """Write all values, each read back; on a failure those written before are restored.
 
     Raises:
         NotAllowed: the axis is enabled. Rejected: the drive keeps another value.
-        DriveError: a write failed; the message says what could not be put back.
+        DriveError: a write failed; the message says what could not be restored.
     """
     drive = axis.drive
     if await axis.state() is State.OPERATION_ENABLED:
@@ -66,7 +66,7 @@ async def write_gear(axis: Axis, values: Sequence[GearValue]) -> GearChange:
         before[value.parameter.key] = await drive.raw(value.parameter.key)
     done: list[str] = []
     # For the next server, should this one be killed with half a gear written.
-    with drive.pending_restores.borrowed(before):
+    with drive.pending_restores.temporary(before):
         try:
             await _write_all(axis, values, before, done)
         except BaseException as error:

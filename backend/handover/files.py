@@ -1,4 +1,4 @@
-"""The files of a hand-over, by format: the list itself and what lies beside it."""
+"""The files of a hand-over, by format: the list itself and what lies next to it."""
 
 from __future__ import annotations
 

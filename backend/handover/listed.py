@@ -27,7 +27,7 @@ class Listed:
 
 @dataclass(frozen=True, slots=True)
 class ControllerList:
-    """A list: its format and writes in their order; ``ordered`` tells whether order counts."""
+    """A list: its format and writes in their order; ``ordered`` shows whether order counts."""
 
     format: str
     writes: tuple[Listed, ...]

@@ -1,6 +1,6 @@
 """Start-up lists of a controller, read back: what it will write, in its order.
 
-A file is taken by its contents, not by its name. What is broken as a whole is refused with one
+A file is recognised by its contents, not by its name. What is broken as a whole is refused with one
 error; a bad row is refused with its place, for a list that is read in part compares wrongly.
 """
 
@@ -47,7 +47,7 @@ _MAX_WRITES = 20_000
 _CCS_DOWNLOAD = 1
 _UPWARD = ("IP", "PS", "SO")
 _COMMANDS = ".//CoE/InitCmds/InitCmd"
-#: What the parsers raise; LookupError is an encoding that nobody knows.
+#: What the parsers raise; LookupError is an encoding that is unknown.
 _DAMAGED = (
     ParseError, ImportFailed, ValueError, LookupError, yaml.YAMLError, csv.Error, RecursionError,
 )  # fmt: skip

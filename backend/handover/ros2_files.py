@@ -89,7 +89,7 @@ def ros2(axis: AxisHandover) -> bytes:
 
 
 def _channel(axis: AxisHandover, entry: MappedEntry) -> str:
-    # It knows no real number in process data: such an entry keeps its place without an interface.
+    # It has no real number in process data: such an entry keeps its place without an interface.
     gap = entry.type is None or entry.type == "REAL32"
     kind = f"bit{entry.bits}" if gap or entry.type is None else entry.type.lower()
     kind = "bool" if entry.type == "BOOL" else kind
@@ -123,7 +123,7 @@ def increments_per_radian(axis: AxisHandover) -> float | None:
 
 
 def bus_yml(axes: Sequence[AxisHandover], dcf_names: Sequence[str]) -> bytes:
-    """`bus.yml` of ros2_canopen, which names the DCFs beside it; node numbers are proposed."""
+    """`bus.yml` of ros2_canopen, which names the DCFs next to it; node numbers are proposed."""
     cycle_us = max(axis.cycle_us for axis in axes)
     lines = [
         "options:",
@@ -154,7 +154,7 @@ def bus_yml(axes: Sequence[AxisHandover], dcf_names: Sequence[str]) -> bytes:
 
 
 def ros2_control(axes: Sequence[AxisHandover], slave_files: Sequence[str]) -> bytes:
-    """`ros2_control` of ethercat_driver_ros2 that names the slave files beside it."""
+    """`ros2_control` of ethercat_driver_ros2 that names the slave files next to it."""
     frequency = 1_000_000 // max(axis.cycle_us for axis in axes)
     lines = [
         '<ros2_control name="segment" type="system">',

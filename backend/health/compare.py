@@ -33,7 +33,7 @@ Direction = Literal["", "higher", "lower"]
 FALSE_ALARMS = 0.01
 #: The share that must be found, by quantity. Others are shown, not judged.
 LOOKED_FOR: dict[Quantity, float] = {"resonance": 0.05, "friction": 0.20, "inertia": 0.20}
-#: Fewer repeats tell too little of the spread.
+#: Fewer repeats show too little of the spread.
 LEAST_REPEATS = 3
 #: The newest checks that are compared.
 CHECKS = 2

@@ -157,7 +157,7 @@ class Library:
             # Another station made the same name, or stored the same contents, at this moment.
             entry, fresh = self._add(kind, name, data, addition)
         if fresh:
-            self._tell("saved", entry, bytes=len(data))
+            self._record_action("saved", entry, bytes=len(data))
         return entry
 
     def _add(self, kind: Kind, name: str, data: bytes, addition: Addition) -> tuple[Entry, bool]:
@@ -209,7 +209,7 @@ class Library:
             item.words = rows.words(item)
             session.flush()
             entry = _loaded(item)
-        self._tell("annotated", entry, tags=", ".join(entry.tags))
+        self._record_action("annotated", entry, tags=", ".join(entry.tags))
         return entry
 
     def delete(self, entry_id: int) -> Entry:
@@ -223,11 +223,11 @@ class Library:
             item.deleted = item.deleted or datetime.now(UTC)
             session.flush()
             entry = _loaded(item)
-        self._tell("deleted", entry)
+        self._record_action("deleted", entry)
         return entry
 
     def undelete(self, entry_id: int) -> Entry:
-        """Take an entry back that was put aside.
+        """Take an entry back that was archived.
 
         Raises:
             NotInLibrary: no such entry.
@@ -237,15 +237,15 @@ class Library:
             item.deleted = None
             session.flush()
             entry = _loaded(item)
-        self._tell("taken back", entry)
+        self._record_action("taken back", entry)
         return entry
 
     def reported_deleted(self, entry: Entry) -> None:
         """A file of this station was deleted for good; the audit is reported."""
-        self._tell("deleted", entry)
+        self._record_action("deleted", entry)
 
     def purge(self, before: datetime) -> list[Entry]:
-        """Delete for good what was put aside before this time, with contents nothing else names.
+        """Delete for good what was archived before this time, with contents nothing else names.
 
         Raises:
             DatabaseFailed, BlobFailed: some may remain; calling again goes on.
@@ -261,7 +261,7 @@ class Library:
             for content in session.scalars(select(Content).where(Content.sha256.not_in(used))):
                 session.delete(content)
         for entry in gone:
-            self._tell("purged", entry)
+            self._record_action("purged", entry)
         self.sweep_blobs(datetime.now(UTC) - _BLOB_AGE)
         return gone
 
@@ -294,7 +294,7 @@ class Library:
             raise NotInLibrary("library.no-entry-library", value=entry_id)
         return item
 
-    def _tell(self, action: Action, entry: Entry, **detail: Value) -> None:
+    def _record_action(self, action: Action, entry: Entry, **detail: Value) -> None:
         facts: dict[str, Value] = {
             "kind": entry.kind,
             "version": entry.latest.number,

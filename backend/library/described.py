@@ -23,7 +23,7 @@ def folders(state: Path) -> list[Folder]:
     return [
         Folder(
             "recording", recordings.folder, (RECORDING,),
-            lambda path: _recording(recordings, path), beside=".json",
+            lambda path: _recording(recordings, path), sidecar=".json",
         ),
         Folder("measurement", state / "measurements", (measurements.SUFFIX,), _measurement),
         Folder("report", state / "reports", (".html", ".pdf"), _report),

@@ -36,14 +36,14 @@ class Described:
 class Folder:
     """A folder that is indexed. ``describe`` may raise NotAllowed for a file that is damaged.
 
-    ``beside`` is the ending of a file beside each, whose change counts as well.
+    ``sidecar`` is the ending of a file next to each, whose change counts as well.
     """
 
     kind: Kind
     path: Path
     suffixes: tuple[str, ...]
     describe: Callable[[Path], Described]
-    beside: str = ""
+    sidecar: str = ""
 
     def stamps(self) -> dict[str, str]:
         """Names of its files, each with what changes when the file does."""
@@ -55,9 +55,9 @@ class Folder:
                 try:
                     status = path.stat()
                     stamp = f"{status.st_mtime_ns}:{status.st_size}"
-                    beside = path.with_name(path.name + self.beside)
-                    if self.beside and beside.exists():
-                        stamp += f":{beside.stat().st_mtime_ns}"
+                    sidecar = path.with_name(path.name + self.sidecar)
+                    if self.sidecar and sidecar.exists():
+                        stamp += f":{sidecar.stat().st_mtime_ns}"
                 except FileNotFoundError:
                     continue  # deleted at this moment
                 found[path.name] = stamp

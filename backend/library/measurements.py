@@ -1,7 +1,7 @@
 """Stored measurements: the raw signals, how they were made, and what was concluded.
 
 One file each (``.sdmeas``, a zip as numpy writes it): ``meta`` is JSON, every other member an
-array. Whoever opens it can evaluate it anew; see `backend.station.evaluation`.
+array. Whoever opens it can evaluate it again; see `backend.station.evaluation`.
 """
 
 from __future__ import annotations

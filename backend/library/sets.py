@@ -1,4 +1,4 @@
-"""Parameter sets in the library, by name; and the folder from which plain files are taken in."""
+"""Parameter sets in the library, by name; and the folder from which plain files are imported."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _TAKEN = "imported"
 
 
 def addition_of(content: ParameterSet, *, tags: Sequence[str] = ()) -> Addition:
-    """What the library keeps of a set beside its text."""
+    """What the library keeps of a set next to its text."""
     return Addition(
         axis=AxisIdentity(
             profile=content.profile,
@@ -39,7 +39,7 @@ def addition_of(content: ParameterSet, *, tags: Sequence[str] = ()) -> Addition:
 class LibrarySets:
     """Sets of the library under their file names (``….sdset``). All of it blocks.
 
-    Files that lie in ``folder`` (from an earlier version, or put there by hand) are taken in when
+    Files that lie in ``folder`` (from an earlier version, or put there by hand) are imported when
     sets are listed, and then lie in its sub-folder ``imported``; those that are no sets stay.
     """
 
@@ -48,7 +48,7 @@ class LibrarySets:
         self.folder = folder
 
     def names(self) -> list[str]:
-        """Names, newest first; at their end those of files that cannot be taken in."""
+        """Names, newest first; at their end those of files that cannot be imported."""
         problems = self.take_in()
         return [entry.name for entry in self.entries()] + sorted(problems)
 
@@ -76,7 +76,7 @@ class LibrarySets:
         """
         path = self.folder / checked_name(name, SUFFIX)
         if self.library.named("set", path.name) is None and path.is_file():
-            return path.read_bytes()  # one that cannot be taken in
+            return path.read_bytes()  # one that cannot be imported
         return self.library.content(self.entry(name).id, number)
 
     def load(self, name: str, number: int | None = None) -> ParameterSet:

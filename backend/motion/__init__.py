@@ -1,1 +1,1 @@
-"""The one authority over motion: grants, what needs one, and how axes are brought to rest."""
+"""The one authority over motion: grants, what needs one, and how axes are stopped."""

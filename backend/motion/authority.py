@@ -1,7 +1,7 @@
 """Who may move which axis now. Everything that can put energy into a motor asks here.
 
 A grant is held by the work that asked for it: the task, and the tasks that it starts, such as
-cleanups. A route that runs beside a motion of the same axis does not hold the motion's grant.
+cleanups. A route that runs next to a motion of the same axis does not hold the motion's grant.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from backend.people.identity import acting_person, acting_session
 from drivers.errors import Busy
 from drivers.texts.message import Text, text
 
-#: No motion is permitted for longer than this without being asked for anew.
+#: No motion is permitted for longer than this without being asked for again.
 LONGEST_S = 4 * 3600.0
 #: An axis that was left enabled through no page loses its power after this time.
 UNATTENDED_S = 600.0
@@ -98,7 +98,7 @@ class MotionAuthority:
     ) -> None:
         """This grant permits to write this object of this drive now.
 
-        One that has ended still lets the work put back what it had changed (``restores``).
+        One that has ended still lets the work restore what it had changed (``restores``).
 
         Raises:
             NotGranted: it is of another drive or object, or it has ended.
@@ -211,7 +211,7 @@ class MotionAuthority:
     ) -> Grant:
         outer = self.held(drive)
         if outer is not None and (why := self._ended(outer)) is not None:
-            # Work that STOP has ended does not get anew what was taken from it.
+            # Work that STOP has ended does not get back what was removed.
             raise NotGranted(
                 "motion.permission-move-ended", drive=name, purpose=outer.purpose, why=why
             )

@@ -10,7 +10,7 @@ MotionClass = Literal["none", "at_enable", "energises"]
 
 
 def motion_of(parameter: Parameter) -> MotionClass:
-    """The motion class. What can be written and has none is taken for the worst."""
+    """The motion class. What can be written and has none is treated as the worst."""
     if parameter.access == "ro":
         return "none"
     return parameter.motion or "energises"

@@ -41,7 +41,7 @@ class Grant:
 class NotGranted(NotAllowed):
     """Something that can put energy into a motor, without a grant of the motion authority.
 
-    ``page`` and ``route`` are where it can be done (`backend.motion.doors`); empty where nowhere.
+    ``page`` and ``route`` are where it can be done (`backend.motion.alternatives`), or empty.
     """
 
     kind = "not-granted"

@@ -38,11 +38,11 @@ class TravelUnit:
         return rpm * self._speed_per_rpm
 
     def say(self, revolutions: float, form: str = ".4g") -> str:
-        """Travel in words: 12.5 mm."""
+        """Travel as text: 12.5 mm."""
         return f"{self.travel(revolutions):{form}} {self.name}"
 
     def say_speed(self, rpm: float) -> str:
-        """Speed in words: 300 mm/s."""
+        """Speed as text: 300 mm/s."""
         return f"{self.speed(rpm):.4g} {self.speed_name}"
 
 

@@ -24,7 +24,7 @@ _MAX_LINES = 20_000
 _ENCODINGS = ["utf-8-sig", "cp1252", "gb18030"]
 _KEY = re.compile(r"(?:0x)?([0-9a-f]{4})(?:h?[:.\s_/-]\s*|sub)(?:0x)?([0-9a-f]{1,2})h?", re.I)
 _INDEX = re.compile(r"(?:0x([0-9a-f]{1,4})|([0-9a-f]{4})h?)", re.I)
-#: What a spreadsheet writes and wants in front of a list.
+#: What a spreadsheet writes and expects in front of a list.
 _SEPARATOR_LINE = re.compile(r'"?sep=([,;\t])"?', re.I)
 _SAME_UNIT = {"r/min": "rpm", "1/min": "rpm", "min-1": "rpm", "u/min": "rpm", "sec": "s"}
 _HEADINGS = {

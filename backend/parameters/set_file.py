@@ -16,8 +16,8 @@ from typing import Any, Literal
 
 from backend.drive.drive import Drive
 from backend.drive.readings import Reading
+from backend.motion.alternatives import refused
 from backend.motion.classes import motion_of
-from backend.motion.doors import refused
 from drivers.errors import DriveError, NotAllowed
 from profiles.schema import Parameter, Profile, Raw
 

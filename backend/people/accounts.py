@@ -68,7 +68,7 @@ class Accounts:
     async def set_up(
         self, code: str, name: str, password: str, address: str, client: str
     ) -> tuple[str, LoginSession]:
-        """The first administrator; the code stands in the terminal of the machine.
+        """The first administrator; the code is in the terminal of the machine.
 
         Raises:
             Forbidden: there is one already, or the code is wrong. TooOften: too many tries.
@@ -133,7 +133,7 @@ class Accounts:
         """A new account.
 
         Raises:
-            NotAllowed: the name is taken, or name or password is none.
+            NotAllowed: the name is in use, or name or password is none.
         """
         async with self._changing:
             return await self._add(name, password, role)
@@ -190,7 +190,7 @@ class Accounts:
         await self._end(s.id for s in self.directory.sessions(account_id) if s.id != keep)
 
     async def require_password(self, account_id: int, password: str, address: str) -> None:
-        """The present password, before something that a borrowed screen must not do.
+        """The present password, before something that another person at this screen must not do.
 
         Raises:
             Forbidden: it is wrong. TooOften: too many tries.

@@ -10,7 +10,7 @@ import unicodedata
 from drivers.errors import NotAllowed
 from drivers.texts.message import text
 
-#: Letters and digits that are not taken for one another when read aloud or copied by hand.
+#: Letters and digits that are not mistaken for one another when read aloud or copied by hand.
 _CLEAR = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"
 
 
@@ -69,5 +69,5 @@ def checked_person(name: str) -> str:
 
 
 def same_text(given: str, kept: str) -> bool:
-    """Comparison whose time tells nothing."""
+    """Comparison whose time shows nothing."""
     return hmac.compare_digest(given.encode(), kept.encode())

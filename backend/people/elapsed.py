@@ -2,7 +2,7 @@
 
 The wall clock is set: by a person, by a time server after the start, by a supply that failed. A
 grant must end after its minutes all the same. Time in which the computer slept counts, where the
-system tells it.
+system reports it.
 """
 
 from __future__ import annotations

@@ -103,7 +103,7 @@ class Leases:
         asked = self._asked.get(drive)
         if asked is not None:
             self._set(drive, Holder(asked.connection, asked.person, time.time()))
-            self._tell(asked.connection, drive, "given", holder.person)
+            self._notify(asked.connection, drive, "given", holder.person)
         elif holder.giver is not None:
             self._return(drive, holder)
         else:
@@ -139,7 +139,7 @@ class Leases:
         if other is None:
             until = self._ticks() + ANSWER_WITHIN_S
             self._asked[drive] = Asked(connection, person, until)
-            self._tell(holder.connection, drive, "asked", person)
+            self._notify(holder.connection, drive, "asked", person)
             self._changed(drive)
 
     def refuse(self, drive: str, connection: str) -> None:
@@ -147,7 +147,7 @@ class Leases:
         holder, asked = self._holders.get(drive), self._asked.get(drive)
         if holder is not None and asked is not None and holder.connection == connection:
             del self._asked[drive]
-            self._tell(asked.connection, drive, "refused", holder.person)
+            self._notify(asked.connection, drive, "refused", holder.person)
             self._changed(drive)
 
     def hand(
@@ -168,10 +168,10 @@ class Leases:
         if to == connection:
             return
         until = None if time_s is None else self._ticks() + time_s
-        # Back to whoever gave it first: a chain of loans would end nobody knows where.
+        # Back to whoever gave it first: a chain of transfers would have no known end.
         giver = None if time_s is None else holder.giver or holder
         self._set(drive, Holder(to, person, time.time(), until, giver))
-        self._tell(to, drive, "given", holder.person)
+        self._notify(to, drive, "given", holder.person)
 
     def override(self, drive: str, connection: str, person: str) -> None:
         """Take control from whoever has it. The caller has the right and has stopped the axis."""
@@ -180,7 +180,7 @@ class Leases:
             return
         self._set(drive, Holder(connection, person, time.time()))
         if before is not None:
-            self._tell(before.connection, drive, "overridden", person)
+            self._notify(before.connection, drive, "overridden", person)
 
     # --- what ends by itself ----------------------------------------------------------
 
@@ -202,7 +202,7 @@ class Leases:
         """Like `drop`, for a connection that is silent but not closed; it is reported."""
         dropped = self.drop(connection)
         for drive in dropped:
-            self._tell(connection, drive, "lost", "")
+            self._notify(connection, drive, "lost", "")
         return dropped
 
     def tick(self, moves: Callable[[str], bool]) -> None:
@@ -210,7 +210,7 @@ class Leases:
         now = self._ticks()
         for drive, holder in list(self._holders.items()):
             if holder.until is not None and now >= holder.until and not moves(drive):
-                self._tell(holder.connection, drive, "expired", "")
+                self._notify(holder.connection, drive, "expired", "")
                 if holder.giver is None:
                     self._free(drive)
                 else:
@@ -219,15 +219,15 @@ class Leases:
             held = self._holders.get(drive)
             if held is not None and now >= asked.until and not moves(drive):
                 self._set(drive, Holder(asked.connection, asked.person, time.time()))
-                self._tell(held.connection, drive, "overridden", asked.person)
-                self._tell(asked.connection, drive, "given", held.person)
+                self._notify(held.connection, drive, "overridden", asked.person)
+                self._notify(asked.connection, drive, "given", held.person)
 
     def _return(self, drive: str, holder: Holder) -> None:
         giver = holder.giver
         if giver is None:
             raise ValueError("nobody to return it to")
         self._set(drive, Holder(giver.connection, giver.person, time.time()))
-        self._tell(giver.connection, drive, "returned", holder.person)
+        self._notify(giver.connection, drive, "returned", holder.person)
 
     def _set(self, drive: str, holder: Holder) -> Holder:
         self._holders[drive] = holder
@@ -240,6 +240,6 @@ class Leases:
         self._asked.pop(drive, None)
         self._changed(drive)
 
-    def _tell(self, connection: str, drive: str, kind: NoticeKind, person: str) -> None:
+    def _notify(self, connection: str, drive: str, kind: NoticeKind, person: str) -> None:
         for listener in self.on_notice:
             listener(Notice(connection, drive, kind, person))

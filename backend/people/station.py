@@ -59,7 +59,7 @@ class People:
         With ``recovering`` also where they are gone, which the machine's terminal alone may do.
 
         Raises:
-            AccountsGone: the station has had accounts, and has no administrator now.
+            AccountsMissing: the station has had accounts, and has no administrator now.
             DatabaseFailed: they cannot be read.
         """
         if self.accounts_needed:
@@ -82,8 +82,8 @@ class People:
         try:
             self.accounts.devices = KnownDevices(self._marker.write().key)
         except StorageFailed as error:
-            # Who is to log in can; only that there are accounts stands in one place too few.
-            log.error("it is not noted beside the database that there are accounts: %s", error)  # noqa: TRY400
+            # Who is to log in can; only that there are accounts is in one place too few.
+            log.error("the note that accounts exist is missing next to the database: %s", error)  # noqa: TRY400
 
     def close(self) -> None:
         """Let go of the database."""

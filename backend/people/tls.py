@@ -29,7 +29,7 @@ from drivers.errors import NotAllowed
 #: The longest that phones accept, also from an authority that their user has installed.
 LIFETIME = timedelta(days=820)
 AUTHORITY_LIFETIME = timedelta(days=10 * 365)
-#: Made anew at a start when it has less than this left; the authority outlives what it issues.
+#: Made again at a start when it has less than this left; the authority outlives what it issues.
 RENEW = timedelta(days=180)
 AUTHORITY_FILE = "authority.pem"
 #: Private, link-local and loopback addresses (RFC 1918, 3927, 4193, 4291).

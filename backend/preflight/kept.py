@@ -23,7 +23,7 @@ class Kept:
 
 def read(folder: Path) -> dict[str, Kept]:
     """By interface (empty: without one). Nothing where the file is not there or damaged: it is
-    measured anew.
+    measured again.
     """
     try:
         listed = json.loads((folder / FILE).read_text("utf-8"))

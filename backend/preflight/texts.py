@@ -19,7 +19,7 @@ class Words(NamedTuple):
 
 
 def words(one: Finding, language: Language = "en") -> Words:
-    """A finding in words."""
+    """A finding as text."""
     what, remedy = _FINDINGS[language][one.code]
     shown = {name: _shown(value) for name, value in one.params.items()}
     if "share" in one.params:

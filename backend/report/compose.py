@@ -142,14 +142,14 @@ def _warnings(facts: Facts, words: Words) -> list[Block]:
 
 
 def _stale(facts: Facts, words: Words) -> list[Note]:
-    """What was measured before the last change tells nothing of the axis as it is."""
+    """What was measured before the last change shows nothing of the axis as it is."""
     last = facts.last_change
     if last is None:
         return []
     shown = [m for m in facts.measured if _is_loop(m) or isinstance(m.view, StepAnswer)]
     old = [m for m in shown if m.saved < last]
     if not facts.changes and not old:
-        # What was tried and taken back needs no proof.
+        # What was tried and undone needs no proof.
         return []
     if not any(_is_loop(m) and m.saved >= last for m in shown):
         return [Note(words("warn.unverified"), "warn")]

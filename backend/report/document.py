@@ -21,7 +21,7 @@ class Heading:
 
 @dataclass(frozen=True)
 class Note:
-    """A paragraph; its tone is also said in words."""
+    """A paragraph; its tone is also said as text."""
 
     text: str
     tone: Tone = "plain"
@@ -29,7 +29,7 @@ class Note:
 
 @dataclass(frozen=True)
 class Table:
-    """``head`` may be empty. ``right`` tells the columns of numbers."""
+    """``head`` may be empty. ``right`` shows the columns of numbers."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -57,7 +57,7 @@ Block = Heading | Note | Table | Figure | Signatures
 
 @dataclass(frozen=True)
 class Document:
-    """``footer`` stands on every page of a PDF, before the page number."""
+    """``footer`` is on every page of a PDF, before the page number."""
 
     title: str
     subtitle: str

@@ -1,4 +1,4 @@
-"""Everything that a report tells, in any language, before it has a form."""
+"""Everything that a report shows, in any language, before it has a form."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class HandedOverFile:
 
 @dataclass(frozen=True)
 class Measured:
-    """A measurement evaluated anew. ``earlier`` is the same kind before the first change.
+    """A measurement evaluated again. ``earlier`` is the same kind before the first change.
 
     ``differences`` names what another version of the program concluded otherwise at the time.
     """
@@ -101,5 +101,5 @@ class Facts:
     trouble: tuple[str, ...] = ()
     handed_over: tuple[HandedOverFile, ...] = ()
     condition: Condition | None = None
-    #: Whether the drive was asked; a report of files alone knows nothing of its settings.
+    #: Whether the drive was asked; a report of files alone has no data of its settings.
     live: bool = True

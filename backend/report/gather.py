@@ -1,4 +1,4 @@
-"""Collect what a report tells: from the drive as it is now, its changes, and measurements."""
+"""Collect what a report shows: from the drive as it is now, its changes, and measurements."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class About:
 
 
 def kind_of(head: Head) -> str:
-    """Kind of a measurement as a report tells them apart: steps of speed are not moves."""
+    """Kind of a measurement as a report distinguishes them: steps of speed are not moves."""
     settings = head.meta.get("settings")
     if head.kind == "step" and isinstance(settings, dict):
         return f"step-{settings.get('kind', 'speed')}"
@@ -47,7 +47,7 @@ def kind_of(head: Head) -> str:
 
 
 def belongs(head: Head, drive: Drive) -> bool:
-    """Whether a file was measured on this very drive: by serial number where both tell one."""
+    """Whether a file was measured on this very drive: by serial number where both show one."""
     identity, found = head.meta.get("identity"), drive.found
     serial = identity.get("serial") if isinstance(identity, dict) else None
     if head.meta.get("profile") != drive.profile.drive:
@@ -84,7 +84,7 @@ def _alike(kind: str, heads: Mapping[str, Head]) -> list[list[tuple[datetime, st
 def measured_from(
     store: MeasurementStore, chosen: Iterable[tuple[str, str]]
 ) -> tuple[tuple[Measured, ...], tuple[str, ...]]:
-    """Chosen files evaluated anew, and sentences about those that cannot be. Takes seconds.
+    """Chosen files evaluated again, and sentences about those that cannot be. Takes seconds.
 
     Raises:
         NotAllowed: there is no file of a name.
@@ -241,7 +241,7 @@ def _text_of(parameter: Parameter, raw: Raw) -> str:
 
 
 def facts_of_files(heads: Mapping[str, Head], about: About) -> Facts:
-    """What files tell of the drive that they were measured on.
+    """What files report of the drive that they were measured on.
 
     Raises:
         NotAllowed: they are of different drives.

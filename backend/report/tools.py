@@ -44,7 +44,7 @@ def result_of(tool: object, result: dict[str, object]) -> ToolResult:
 
 
 def verdict_of(kept: object) -> VerdictInfo | None:
-    """The verdict that an automatic tuning left beside its measurement; None where there is none.
+    """The verdict that an automatic tuning left next to its measurement; None where there is none.
 
     Raises:
         BadMeasurement: it is not what a tuning concludes.
@@ -80,7 +80,7 @@ def tool_blocks(result: ToolResult, words: Words) -> list[Block]:
 
 
 def grid_table(tool: AnyTool, grid: Grid, words: Words) -> Table:
-    """A table of a tool in words."""
+    """A table of a tool as text."""
     head, *rows = tool.cells(grid, words.language)
     return Table(head, tuple(rows), (False, *(True,) * (len(head) - 1)))
 
@@ -93,7 +93,7 @@ def tool_verdict(kind: str, result: ToolResult, words: Words) -> Note:
 
 
 def note_of(tool: AnyTool, note: ToolNote, words: Words) -> Note:
-    """A finding of a tool in words."""
+    """A finding of a tool as text."""
     return Note(tool.text(note.name, words.language, note.values), note.tone)
 
 

@@ -1,4 +1,4 @@
-"""From a file's bytes to its table: named columns of numbers. Nothing in it is believed.
+"""From a file's bytes to its table: named columns of numbers. Nothing in it is trusted.
 
 Text: comma, semicolon, tab or blanks between the columns, decimal point or comma, any lines before
 the table (makers' scopes write several), UTF-8, UTF-16 or Latin-1, and gzip around it. MATLAB: v4
@@ -33,7 +33,7 @@ _MISSING = {"", "nan", "-nan", "inf", "-inf", "+inf", "null", "n/a", "#n/a", "no
 
 @dataclass(frozen=True)
 class Table:
-    """``columns`` by number as in the file, ``names`` beside them; NaN where nothing stands.
+    """``columns`` by number as in the file, ``names`` next to them; NaN where nothing is written.
 
     ``first_line`` is the line of the file that holds the first row, 0 where there are no lines.
     ``facts`` are pairs that stood before the table, such as a sample time.
@@ -299,7 +299,7 @@ def _names(head: list[str], layout: _Layout) -> tuple[str, ...]:
     ]
     if not fitting:
         return tuple(f"column {i + 1}" for i in range(layout.width))
-    named = next((cells for cells in fitting if _tells(cells)), fitting[-1])
+    named = next((cells for cells in fitting if _has_names(cells)), fitting[-1])
     units = fitting[-1] if fitting[-1] is not named else None
     names = []
     for i, cell in enumerate(named):
@@ -309,7 +309,7 @@ def _names(head: list[str], layout: _Layout) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _tells(cells: list[str]) -> bool:
+def _has_names(cells: list[str]) -> bool:
     """A line of names: words, and not twice the same one throughout."""
     words = [c for c in cells if re.search(r"[^\W\d]", c)]
     return 2 * len(words) >= len(cells) and len(set(words)) > 1

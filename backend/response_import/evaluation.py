@@ -83,7 +83,7 @@ def prepared(table: Table, name: str, settings: ImportSettings) -> Signals:
 
 
 def evaluate_signals(signals: Signals, name: str, settings: ImportSettings) -> dict[str, object]:
-    """The JSON form of a sweep, with what an import says beside it.
+    """The JSON form of a sweep, with what an import says next to it.
 
     Raises:
         BadRecording: the recording supports no answer.
@@ -307,5 +307,5 @@ def _refuted(wrong: Contradiction) -> Text:
 
 
 def _numbers(values: FloatArray) -> list[float | None]:
-    """JSON knows no NaN."""
+    """JSON has no NaN."""
     return [float(v) if np.isfinite(v) else None for v in values]

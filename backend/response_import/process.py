@@ -1,6 +1,6 @@
 """Imports in a process of their own: ``python -m backend.response_import.process``.
 
-A file of somebody else may take seconds and much memory, and nobody knows what is in it. Here it
+A file of somebody else may take seconds and much memory, and it is not known what is in it. Here it
 holds up no motion and whoever started it can end it. One task comes pickled on the standard input,
 from our own parent only; one JSON object goes to the standard output.
 """

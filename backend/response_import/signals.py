@@ -33,7 +33,7 @@ _TIME_UNIT = re.compile(r"[\[(/_ ]\s*(s|sec|ms|us|µs|μs|ns)\s*[\])]?\s*$", re.
 
 @dataclass(frozen=True)
 class Signals:
-    """Input and output [n], evenly sampled. ``time_unit`` is what the column was taken to hold."""
+    """Input and output [n], evenly sampled. ``time_unit`` is the unit assumed for the column."""
 
     signal_in: FloatArray
     signal_out: FloatArray

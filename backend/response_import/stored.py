@@ -1,4 +1,4 @@
-"""An import as a stored measurement, so that it reopens and is evaluated anew."""
+"""An import as a stored measurement, so that it reopens and is evaluated again."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The restore lists: values that are borrowed for the length of a motion, kept on the disk."""
+"""The restore lists: values that are changed for the length of a motion, kept on the disk."""

@@ -17,7 +17,8 @@ def keep_list(
     in_motion: Callable[[], bool],
     failed: Callable[[StorageFailed], None],
 ) -> None:
-    """Recall what is pending in a drive; write its list whenever something is borrowed or back.
+    """Recall what is pending in a drive; write its list whenever something is changed temporarily
+    or back.
 
     ``in_motion`` says whether the next process has to stop the axis, ``failed`` is called once per
     failure of the disk: a motion goes on without a list, as people are informed then.

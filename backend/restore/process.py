@@ -1,4 +1,4 @@
-"""Whether the process that borrowed values still lives: then it restores them itself."""
+"""Whether the process that changed values still lives: then it restores them itself."""
 
 from __future__ import annotations
 

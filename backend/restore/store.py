@@ -1,7 +1,7 @@
 """Restore lists on the disk: whoever is killed in a motion, server or command, restores nothing.
 
-One small file per drive in the state folder while values are borrowed or pending, none otherwise.
-It is written before the first borrowed value changes, and the disk is waited for then, but no
+One small file per drive in the state folder while values are changed or pending, none otherwise.
+It is written before the first temporary value changes, and the disk is waited for then, but no
 longer than a motion may begin late by it.
 """
 
@@ -73,7 +73,7 @@ class Pending:
 
     ``since`` is when it noted this last (seconds since 1970), ``by`` what it was. ``moved``: it
     ended a moment ago in the middle of a motion. ``held_by`` is another process that lives and
-    moves this drive with borrowed values now, and ``serial`` that of the drive which was here.
+    moves this drive with temporary values now, and ``serial`` that of the drive which was here.
     """
 
     values: tuple[PendingRestore, ...] = ()
@@ -99,12 +99,13 @@ class RestoreList:
         self, values: Sequence[PendingRestore], *, in_motion: bool,
         identity: DriveIdentity | None = None, durable: bool = False,
     ) -> None:  # fmt: skip
-        """Note what is borrowed or pending now instead of what was; nothing takes the file away.
+        """Note what is changed temporarily or pending now instead of what was; nothing takes the
+        file away.
 
         ``durable`` waits for the disk, up to `FLUSH_S`.
 
         Raises:
-            StorageFailed: it cannot be written or taken away.
+            StorageFailed: it cannot be written or removed.
         """
         drive = self.identity = identity or self.identity
         if values:
@@ -131,7 +132,7 @@ class RestoreList:
 
 
 class RestoreStore:
-    """All restore lists of a state folder. ``by`` says in words who writes them."""
+    """All restore lists of a state folder. ``by`` says as text who writes them."""
 
     def __init__(self, state_folder: Path, by: str) -> None:
         self._folder = state_folder / "restore"

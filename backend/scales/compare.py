@@ -1,4 +1,4 @@
-"""Whether 606Ch and 6064h of a whole recording tell of the same motion.
+"""Whether 606Ch and 6064h of a whole recording report the same motion.
 
 The loop watches them while the axis moves (`drivers.feedback`) and must decide at once. A
 recording shows more: also at low speeds and to and fro, and before anything is computed from 606Ch.

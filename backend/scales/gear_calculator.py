@@ -132,7 +132,7 @@ def plan_gear(profile: Profile, mechanics: Mechanics, encoder_counts: int | None
     """Gear parameters for these mechanics.
 
     ``encoder_counts`` are the increments per motor revolution of the encoder at hand, None where
-    the drive does not tell; then the profile's own figure counts.
+    the drive does not report; then the profile's own figure counts.
 
     Raises:
         OutOfRange: a dimension is missing, the numbers do not fit the drive's parameters, or the

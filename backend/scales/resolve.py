@@ -200,7 +200,7 @@ def _rate(
 def _other_factor(reported: Reported, quantity: Quantity) -> str | None:
     """The object that says that raw values are not simply the stated unit; None without one.
 
-    6090h beside another 608Fh, or a factor of 6096h or 6097h that is not 1: whether a drive
+    6090h next to another 608Fh, or a factor of 6096h or 6097h that is not 1: whether a drive
     calculates with them, and before or behind its stated unit, is the maker's choice.
     """
     first, second = _FACTORS[quantity]

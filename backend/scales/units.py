@@ -31,7 +31,7 @@ class AxisUnits:
 
     To show a raw value is always possible: without a certain scale it is shown as it is, under its
     raw name. To make a raw value of one in engineering units raises `ScaleUnknown` then, so that
-    no tool can move by a unit that nobody knows.
+    no tool can move by a unit that is unknown.
     """
 
     spec: UnitSpec
@@ -130,7 +130,7 @@ class AxisUnits:
     def velocity_raw_of(self, parameter: Parameter, rpm: float) -> int:
         """Rpm to the raw speed of an object whose own unit may differ from that of 60FFh.
 
-        6099h of the M6-L is in rpm beside velocities in increments per second (000:2167).
+        6099h of the M6-L is in rpm next to velocities in increments per second (000:2167).
         """
         if parameter.unit == "rpm":
             return round(parameter.to_raw(rpm))
@@ -170,7 +170,7 @@ class AxisUnits:
         return FeedbackScale(60.0 * per_rpm / self.counts_per_rev, _IGNORED_RPM * abs(per_rpm))
 
     def rest_tolerance(self) -> int:
-        """Increments that an axis at rest may move by: 0.0005 rev, where that is known."""
+        """Increments that an axis at standstill may move by: 0.0005 rev, where that is known."""
         return max(2, round(0.0005 * (self.counts_per_rev or 0.0)))
 
 
@@ -234,7 +234,7 @@ _ENCODER_BITS = range(10, 33)
 
 
 async def encoder_counts(drive: Drive) -> int | None:
-    """Increments per revolution of the encoder that is connected, where the drive tells them.
+    """Increments per revolution of the encoder that is connected, where the drive reports them.
 
     R6L motors come with 17 or 23 bits (002:589), and its gear counts in encoder increments. A
     family without a parameter of its own has 608Fh, if it has that.

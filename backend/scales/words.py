@@ -1,4 +1,4 @@
-"""Why a loop ended a motion, in the units of the axis and in words. Made once, here."""
+"""Why a loop ended a motion, in the units of the axis and as text. Made once, here."""
 
 from __future__ import annotations
 

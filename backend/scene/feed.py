@@ -135,7 +135,7 @@ class SceneFeed:
             view.move({d: a.position_rev for d, a in axes.items() if a.position_rev is not None})
 
     def _arrangement(self) -> object:
-        """What a change of makes the scene be built anew."""
+        """What a change of makes the scene be built again."""
         return {
             drive: (m.drive.name, id(m.axis.session), self._mechanics_of(drive))
             for drive, m in self._bench.connected_drives.items()
@@ -211,7 +211,7 @@ def _grow(axes: dict[str, _Axis]) -> bool:
 
 
 def _words(axis: _Axis) -> tuple[str, str]:
-    """State for the colour, and what stands above the axis."""
+    """State for the colour, and what is above the axis."""
     snapshot = axis.connected.monitor.snapshot
     state = "other"
     if snapshot.state is State.OPERATION_ENABLED:

@@ -93,7 +93,7 @@ class SceneView:
             }
 
     def move(self, positions_rev: dict[str, float]) -> None:
-        """Put the parts of these axes where the motors stand; who stands still sends nothing."""
+        """Put the parts of these axes where the motors are; who stands still sends nothing."""
         with self._server.atomic():
             for drive, revolutions in positions_rev.items():
                 parts = self._axes.get(drive)

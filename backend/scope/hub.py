@@ -126,7 +126,7 @@ class ScopeHub:
         subscription = Subscription(drive, tuple(keys), period_s)
         sampler = self._samplers.get(drive)
         if sampler is None or sampler.axis is not axis:
-            # A drive that was taken off the bench and came back is another one.
+            # A drive that was removed from the axis list and came back is another one.
             sampler = self._samplers[drive] = _Sampler(axis)
         sampler.add(subscription)
         subscription.sampler = sampler
@@ -187,7 +187,7 @@ class _Sampler:
             try:
                 readings = await drive.read_many(keys)
             except DriveError:
-                # The monitor tells the user why; here the gap shows as missing time.
+                # The monitor shows the user why; here the gap shows as missing time.
                 await asyncio.sleep(RETRY_S)
                 continue
             middle = (before + time.monotonic()) / 2

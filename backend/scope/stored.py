@@ -137,7 +137,7 @@ class ScopeStore:
         return sorted(found, key=lambda each: -each.modified)
 
     def save_snapshot(self, name: str, data: bytes) -> str:
-        """Keep a snapshot; returns its file name, with a number where the name is taken.
+        """Keep a snapshot; returns its file name, with a number where the name is in use.
 
         Raises:
             BadSnapshot: it is not whole. NotAllowed: not a file name, or too many.

@@ -81,7 +81,7 @@ class DemoBench:
         """Start the virtual drives and wait until their wires exist.
 
         Raises:
-            LinkLost: a wire could not be made; the message says why.
+            LinkLost: a wire could not be made; the message states the reason.
         """
         self._folder.mkdir(parents=True, exist_ok=True)
         arguments = ["--bench", str(self._file), "--folder", str(self._folder)]

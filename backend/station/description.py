@@ -41,7 +41,7 @@ async def import_in_process(task: Task, limit_s: float = IMPORT_LIMIT_S) -> dict
     """Carry out an import in a process of its own, which ends with the caller's task.
 
     Raises:
-        BadDescription: nothing usable in it, the name is taken, or it takes too long.
+        BadDescription: nothing usable in it, the name is in use, or it takes too long.
     """
     process = await asyncio.create_subprocess_exec(
         sys.executable,
@@ -77,12 +77,12 @@ async def import_in_process(task: Task, limit_s: float = IMPORT_LIMIT_S) -> dict
 async def drive_task(
     link: Link, found: Found, name: str, progress: Progress
 ) -> FileTask | DescriptionTask:
-    """What a drive tells of its own objects, ready to be made a profile called ``name``.
+    """What a drive reports of its own objects, ready to be made a profile called ``name``.
 
     An EtherCAT drive lists them (SDO information), a CANopen drive may carry its own EDS (1021h).
 
     Raises:
-        NotAllowed: this drive, or a drive on this kind of bus, tells nothing.
+        NotAllowed: this drive, or a drive on this kind of bus, shows nothing.
         ImportFailed: it offers a list, and nothing is in it.
     """
     if link.traits.description == "stored_eds":
@@ -108,7 +108,7 @@ async def profile_of_drive(
 
     Raises:
         NotAllowed: see `drive_task`.
-        ImportFailed: nothing in what this drive tells can be used.
+        ImportFailed: nothing in what this drive reports can be used.
     """
     task = await drive_task(link, found, name, progress)
     if isinstance(task, FileTask):

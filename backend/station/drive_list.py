@@ -24,7 +24,7 @@ class SavedPort:
 
 @dataclass(frozen=True, slots=True)
 class SavedDrive:
-    """A drive as it stands in the list; the first port is the one it was connected by."""
+    """A drive as it is in the list; the first port is the one it was connected by."""
 
     name: str
     profile: str

@@ -1,4 +1,4 @@
-"""Stored measurements evaluated anew, and compared with what was concluded at the time."""
+"""Stored measurements evaluated again, and compared with what was concluded at the time."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Evaluation:
 
 
 def evaluate(measurement: Measurement) -> Evaluation:
-    """Evaluate the raw data anew and compare.
+    """Evaluate the raw data again and compare.
 
     Raises:
         BadMeasurement: of a kind that cannot be evaluated, or not complete.
@@ -44,7 +44,7 @@ def evaluate(measurement: Measurement) -> Evaluation:
 
 
 def recompute(measurement: Measurement) -> dict[str, object]:
-    """Evaluate the raw data anew; the tool's JSON form.
+    """Evaluate the raw data again; the tool's JSON form.
 
     Raises:
         BadMeasurement: of a kind that cannot be evaluated, or not complete.

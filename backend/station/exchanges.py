@@ -136,7 +136,7 @@ class Exchanges:
 
     @contextlib.contextmanager
     def _changing_of(self, url: str) -> Iterator[None]:
-        """No motion begins on this bus meanwhile: its drives would be taken out from under it."""
+        """No motion begins on this bus meanwhile: its drives would be removed meanwhile."""
         self._changing.add(url)
         try:
             yield

@@ -15,7 +15,7 @@ from backend.work.jobs import Job
 from drivers.errors import DriveError, LinkTimeout
 from drivers.texts.message import text
 
-#: Ending an exchange, and starting the one that had to give way.
+#: Ending an exchange, and starting the one that had to be stopped.
 EXCHANGE_ENDS_S = 60.0
 #: Setting one up for a measurement; its request is answered then, within the 30 s that pages and
 #: programs wait, also where a segment falls silent in the middle and ending it takes 15 s more.
@@ -33,7 +33,7 @@ class Exchange:
     own: bool
     """It was started for this measurement."""
     before_s: float | None = None
-    """Cycle of the exchange that had to give way to it."""
+    """Cycle of the exchange that had to be stopped to it."""
     taken: bool = False
     """The measurement has begun, and ends it."""
     late: asyncio.Task[None] | None = None
@@ -79,7 +79,7 @@ async def exchange_for(bench: Bench, connected: ConnectedDrive, cycle_s: float) 
     """The running exchange if it suits, else one that is started for the measurement.
 
     A drive without cyclic modes is commanded by its profile velocity during the measurement only,
-    so an exchange that runs gives way meanwhile.
+    so an exchange that runs is stopped meanwhile.
 
     Raises:
         Busy: a drive of the bus is moved.

@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 #: Polling period while somebody watches, and while nobody does.
 WATCHED_S = 0.1
 IDLE_S = 1.0
-#: Beside an exchange that brings state and values, everything else is asked for so often.
+#: During an exchange that brings state and values, everything else is asked for so often.
 ASKED_S = 1.0
 #: Option codes and ramps of STOP are asked for so often, while the axis is enabled.
 STOP_ASKED_S = 0.9
@@ -49,7 +49,7 @@ _VALUE_ROLES = {
 
 _SHOWN_ROLES = (*_VALUE_ROLES.values(), "mode_display")
 #: A change of these has everything asked for.
-_TELLING_ROLES = ("status_word", "error_code")
+_STATE_ROLES = ("status_word", "error_code")
 #: Target reached, internal limit and the bits of the mode come and go with every motion.
 _MODE_SPECIFIC = 0x3C00
 #: Monitors that run, counted: times the golden ratio they are spread evenly, however many.
@@ -194,14 +194,14 @@ class Monitor:
         self._last = await drive.read_many(dict.fromkeys(wanted))
         self._last_causes, self._waiting = [], list(drive.pending)
         if self._state() in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
-            await self._know_stop(began_s)
+            await self._read_stop_settings(began_s)
         if self._state() is not State.OPERATION_ENABLED:
             self._last_causes = await self.axis.blocked_by()
         self._asked_s = began_s
         return await self._snapshot()
 
     async def _read_what_changes(self) -> Snapshot:
-        """The newest process data instead of questions, as long as they tell nothing new.
+        """The newest process data instead of questions, as long as they show nothing new.
 
         The drive itself is still asked every `ASKED_S`: process data may go on where its mailbox,
         and with it the firmware, is dead. Any change of state or fault has everything asked for.
@@ -211,9 +211,9 @@ class Monitor:
         if session is None or time.monotonic() - self._asked_s >= ASKED_S:
             return await self._read()
         shown = {key: role for role in _SHOWN_ROLES if (key := drive.key(role))}
-        telling = [key for role in _TELLING_ROLES if (key := drive.key(role))]
+        telling = [key for role in _STATE_ROLES if (key := drive.key(role))]
         newest = drive.take(session.newest(drive, [*telling, *shown], NEWEST_S))
-        if self._tells_other(newest, telling) or self._waiting != list(drive.pending):
+        if self._state_differs(newest, telling) or self._waiting != list(drive.pending):
             return await self._read()
         self._last = self._last | newest
         asked = [k for k, role in shown.items() if k not in newest and role not in _SLOW_ROLES]
@@ -221,13 +221,13 @@ class Monitor:
             self._last = self._last | await drive.read_many(asked)
         return await self._snapshot()
 
-    async def _know_stop(self, now_s: float) -> None:
+    async def _read_stop_settings(self, now_s: float) -> None:
         """STOP has no time to ask how the drive brakes, and anybody may change it."""
         if now_s - self._stop_asked_s >= STOP_ASKED_S:
             self._stop_asked_s = now_s
-            await self.axis.know_stop()
+            await self.axis.read_stop_settings()
 
-    def _tells_other(self, newest: Mapping[str, Reading], telling: Sequence[str]) -> bool:
+    def _state_differs(self, newest: Mapping[str, Reading], telling: Sequence[str]) -> bool:
         """Whether state, warning or error code are not what they were, or are not known."""
         drive = self.axis.drive
         reported, known = (

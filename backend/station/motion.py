@@ -1,4 +1,4 @@
-"""Which axes of a bench may begin to move, and how they are brought to rest."""
+"""Which axes of a bench may begin to move, and how they are stopped."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 
 class Motion:
-    """For one bench: what holds an axis still, STOP for all of them, and the power taken off."""
+    """For one bench: what holds an axis still, STOP for all, and switching the power off."""
 
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
@@ -129,7 +129,7 @@ class Motion:
 
         The write does not wait for any job's cleanup, and goes out even when whoever asked for
         it is gone by then. Returns drive id to problem, None where the drive took the stop.
-        Whether the axis stands is watched from then on, and tells `standstill`.
+        Whether the axis is at standstill is watched from then on, and shows `standstill`.
         """
         connected_drives = [self._bench.connected(drive_id) for drive_id in drive_ids]
         for connected in connected_drives:
@@ -195,8 +195,8 @@ class Motion:
     async def standstill(self, drive_ids: Sequence[str]) -> list[AxisStop]:
         """What the last STOP of these drives has reached; waits for verdicts that are due.
 
-        Drives that were never stopped are left out. One that is taken off the bench meanwhile
-        was not seen to stand, and is reported so. May take some seconds.
+        Drives that were never stopped are left out. One that is removed from the axis list
+        meanwhile was not seen to stand, and is reported so. May take some seconds.
         """
         watches = {each: self._watches[each] for each in drive_ids if each in self._watches}
         if watches:
@@ -226,7 +226,7 @@ class Motion:
         if connected is not None:
             job = self._bench.jobs.moving(drive_id)
             if job is not None:
-                # Of the page that is gone, and being ended: the axis is brought to rest first.
+                # Of the page that is gone, and being ended: the axis is stopped first.
                 await job.wait()
             await self.let_go_of(connected)
             connected.monitor.hurry()
@@ -236,7 +236,7 @@ class Motion:
         try:
             await connected.axis.let_go()
         except DriveError as error:
-            # Commanded to stop as soon as it answers, here or after it was put back on the bench.
+            # Commanded to stop as soon as it answers, here or after it was added again.
             connected.axis.stop_pending = True
             line = text(
                 "station.may-still-be-enabled", drive=connected.drive.name, cause=error.text

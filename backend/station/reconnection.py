@@ -1,4 +1,4 @@
-"""What is done when a drive answers again: nothing that was known of it may be believed."""
+"""What is done when a drive answers again: nothing that was known of it is trusted."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Reconnection:
             drive.found = Found(drive.ports[0].station, serial=pending.serial)
 
     def returned(self, drive_id: str) -> None:
-        """It may have restarted: everything is read anew, and pending values are restored."""
+        """It may have restarted: everything is read again, and pending values are restored."""
         connected = self._bench.connected_drives.get(drive_id)
         if connected is None:
             return
@@ -118,7 +118,7 @@ class Reconnection:
     def seen(self, connected: ConnectedDrive, snapshot: Snapshot) -> None:
         """An axis that was enabled when its drive answered stands now: restore what is pending.
 
-        Once; what cannot be put back then stays on offer.
+        Once; what cannot be restored then stays on offer.
         """
         drive = connected.drive
         if drive.id not in self._awaited or not snapshot.fresh:

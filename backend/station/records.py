@@ -1,4 +1,4 @@
-"""What a station keeps: the database with library and audit, and the folders beside it."""
+"""What a station keeps: the database with library and audit, and the folders next to it."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from drivers.errors import LinkTimeout, NotAllowed
 from drivers.urls import bus_kind
 from profiles.schema import LinkKind
 
-#: Settings that are compared before a second port is believed.
+#: Settings that are compared before a second port is trusted.
 _COMPARED = 24
 
 
@@ -52,7 +52,7 @@ def missing_ports(drive: Drive) -> list[MissingPort]:
 async def require_same_drive(drive: Drive, other: Port) -> None:
     """Settings read over the new port are those that the connected ports hold.
 
-    Serial buses tell no identity, and a swapped cable must not write another motor's data. Two
+    Serial buses show no identity, and a swapped cable must not write another motor's data. Two
     drives with equal settings cannot be distinguished this way.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Whether an axis moves, by 606Ch and by differences of 6064h; neither is believed alone."""
+"""Whether an axis moves, by 606Ch and by differences of 6064h; neither is trusted alone."""
 
 from __future__ import annotations
 
@@ -13,14 +13,16 @@ from backend.scales.units import AxisUnits
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout
 
-#: Slower than this by both: standing. A 606Ch without a filter shows some rpm of noise at rest.
+#: Slower than this by both: standing. A 606Ch without a filter shows some rpm of noise at
+#: standstill.
 STANDS_BY_POSITION_RPM = 3.0
 STANDS_BY_SPEED_RPM = 6.0
 #: Where the increments per revolution are not known: increments in a window, raw speed.
 _STILL_INC, _STILL_RAW = 20, 2000
-#: Differences of the position are taken over this time at least.
+#: Differences of the position are calculated over this time at least.
 WINDOW_S = 0.05
-#: An axis stands when it has stood for this long: one that turns round stands for a moment.
+#: An axis is at standstill when it has stood for this long: one that turns round stands for a
+#: moment.
 DWELL_S = 0.15
 #: Process data older than this say nothing of the present.
 _NEWEST_S = 0.05
@@ -63,7 +65,7 @@ class SpeedWatch:
         """Take one sample.
 
         Raises:
-            DriveError: the drive tells neither position nor speed.
+            DriveError: the drive reports neither position nor speed.
         """
         try:
             async with asyncio.timeout(LOOK_S):
@@ -83,7 +85,7 @@ class SpeedWatch:
             reported = drive.take(session.newest(drive, keys, _NEWEST_S))
         missing = [key for key in keys if key not in reported]
         if len(missing) > 1 or drive.require("status_word") in missing:
-            # A drive whose mailbox is mute is not asked for what the process data tell already.
+            # A drive whose mailbox is mute is not asked for what the process data show already.
             reported |= await drive.read_many(missing)
         readings = (reported.get(drive.key(role) or "") for role in roles)
         word, position, velocity = (None if r is None else r.integer for r in readings)
@@ -131,7 +133,7 @@ class SpeedWatch:
         pair = self._then_and_now(over_s)
         return pair is not None and pair[1] < pair[0] * 0.995 - 0.2
 
-    def stands_in_s(self, over_s: float = 0.25) -> float:
+    def time_to_standstill_s(self, over_s: float = 0.25) -> float:
         """Time to rest, should it go on to slow down as it does; infinite where it does not."""
         pair = self._then_and_now(over_s)
         if pair is None or not self.slows(over_s):
@@ -190,12 +192,12 @@ class SpeedWatch:
 
 
 def _difference(new: int, old: int) -> int:
-    """Of positions of 32 bits, which begin anew at the end of their range."""
+    """Of positions of 32 bits, which begin again at the end of their range."""
     return (new - old + 2**31) % 2**32 - 2**31
 
 
 async def units_of(axis: Axis) -> AxisUnits | None:
-    """Units as known; asked for where they are not, None where the drive does not tell."""
+    """Units as known; asked for where they are not, None where the drive does not report."""
     known = axis.known_units
     if known is not None:
         return known

@@ -51,7 +51,7 @@ class TurnWatch:
     def take(
         self, units: AxisUnits, state: State, position: int | None, velocity: int | None
     ) -> Turning | None:
-        """One more reading; None while it stands, or may turn."""
+        """One more reading; None at standstill, or where it may turn."""
         now = time.monotonic()
         by_position = self._by_position(units, now, position)
         by_velocity = None if velocity is None else abs(units.velocity(velocity))

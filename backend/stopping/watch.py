@@ -1,7 +1,7 @@
 """Watches one axis from STOP to standstill, and does more where the quick stop is not enough.
 
 The first quick-stop word is out when this begins. What follows, each as a `StopStep`: where the
-axis turns without being enabled, what the drive moves by itself is taken back (`stop_clears` of
+axis turns without being enabled, what the drive moves by itself is undone (`stop_clears` of
 its profile); where an enabled axis neither stands nor slows down when its ramp should be over, its
 power goes, the brake first where the bus rules it; and at last the process data end, so that the
 drive's watchdog trips. An axis that slows down on a long ramp keeps its power: to coast is worse.
@@ -43,9 +43,9 @@ _OWN_RAMP_S = 1.0
 _LOOK_EVERY_S = 0.02
 #: Turning without being enabled for this long is not the end of a quick stop.
 _UNPOWERED_S = 0.1
-#: Slower than this part of the speed within that time: it comes to rest. Faster: it falls.
+#: Slower than this part of the speed within that time: it stops. Faster: it falls.
 _RUNS_OUT, _FALLS = 0.95, 1.05
-#: A drive that tells nothing for this long is not reached.
+#: A drive that reports nothing for this long is not reached.
 _SILENT_S = 1.5
 #: A position that was read within this time before STOP shows whether the axis stood; a younger one
 #: than `WINDOW_S` is too young for a speed, and is let grow old enough.
@@ -70,7 +70,7 @@ class StopWatch:
         self._until_s = 0.0
 
     async def run(self, problem: Text | None = None) -> AxisStop:
-        """Until the verdict. ``problem`` says why the first word did not go out."""
+        """Until the verdict. ``problem`` states why the first word did not go out."""
         axis, self._began_s = self._axis, time.monotonic()
         before = self._resting_at()
         try:
@@ -84,16 +84,16 @@ class StopWatch:
         if problem is None and before is not None and self._stood(before, first):
             return self._verdict(Verdict.STOPPED)
         self._until_s = self._began_s + SHORTEST_S
-        await self._know_ramp()
+        await self._read_ramp()
         return await self._follow(problem)
 
-    async def _know_ramp(self) -> None:
+    async def _read_ramp(self) -> None:
         """What was not read before the motion is asked for now, the word being out."""
         axis = self._axis
         if known_settings(axis.drive).ramp_raw() is None:
             try:
                 async with asyncio.timeout(LOOK_S):
-                    await axis.know_stop()
+                    await axis.read_stop_settings()
             except TimeoutError:
                 return
 
@@ -190,7 +190,7 @@ class StopWatch:
     async def _next(self, sample: Sample) -> bool:
         """The time is over: wait on, or do the next thing. False where nothing is left."""
         now, slows = time.monotonic(), self._watch.slows()
-        soon = self._watch.stands_in_s() < _SOON_S
+        soon = self._watch.time_to_standstill_s() < _SOON_S
         if slows and (sample.state in _POWERED or soon) and now - self._began_s < _PATIENCE_S:
             self._until_s = now + _STEP_S / 2
             return True

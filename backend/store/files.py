@@ -1,4 +1,4 @@
-"""Files that are whole or absent: written beside, flushed, then renamed into place."""
+"""Files that are whole or absent: written under another name, flushed, then renamed into place."""
 
 from __future__ import annotations
 

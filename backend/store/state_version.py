@@ -135,9 +135,9 @@ def _note(folder: Path, state: StateVersion) -> None:
 
 
 def _from_first(_folder: Path) -> None:
-    """Version 2 keeps what 0.1.0 wrote as it is, beside restore lists by a drive's identity.
+    """Version 2 keeps what 0.1.0 wrote as it is, next to restore lists by a drive's identity.
 
-    Restore lists in ``owed/`` are taken over when their drive answers (`RestoreStore`), since
+    Restore lists in ``owed/`` are adopted when their drive answers (`RestoreStore`), since
     only then its serial number is known; the database has migrations of its own.
     """
 

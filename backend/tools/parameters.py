@@ -64,7 +64,7 @@ async def read_settings(
 
 
 def without(keys: Sequence[str]) -> str:
-    """What a set lacks, in words to be added to a sentence; empty where it lacks nothing."""
+    """What a set lacks, as text to be added to a sentence; empty where it lacks nothing."""
     if not keys:
         return ""
     named = ", ".join(keys[:_NAMED]) + (" …" if len(keys) > _NAMED else "")
@@ -86,7 +86,7 @@ async def save_set(
     """Read the drive's settings and store them; returns the file name.
 
     Raises:
-        NotAllowed: the name is taken. StorageFailed: disk. LinkLost: the bus is gone.
+        NotAllowed: the name is in use. StorageFailed: disk. LinkLost: the bus is gone.
     """
     readings = await read_settings(drive, motor_individual=motor_individual, progress=progress)
     data = parameter_set.dump(
@@ -144,7 +144,7 @@ async def load_set(
         try:
             report.append(await _write_verified(drive, key, raw))
         except LinkLost as error:
-            # Half a set is in force now: which half, and how to take it back.
+            # Half a set is in force now: which half, and how to undo it.
             error.text = text(
                 "set.written-in-part", cause=error.text, written=number, rows=len(chosen), key=key,
                 backup=backup,

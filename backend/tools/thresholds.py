@@ -30,8 +30,8 @@ class autotune_again:
 class autotune_apply:
     """`autotune/apply.py`."""
 
-    # SOFTENED, QUIETER: So often a candidate that hums is made softer, and to this share of the hum
-    # that is permitted.
+    # SOFTENED, QUIETER: So often a candidate that oscillates is made softer, and to this share of
+    # the hum that is permitted.
     SOFTENED = 2
     """[count] Origin: 33aa8ae7."""
     QUIETER = 0.85
@@ -51,7 +51,7 @@ class autotune_candidates:
     NARROWINGS = 4
     """[count] Origin: 7166e5a3 with benchmarks/tune_accuracy."""
     COHERENT = 0.8
-    """[ratio] Lines that a cautious design believes. Origin: 66bd184e with
+    """[ratio] Lines that a cautious design trusts. Origin: 66bd184e with
     benchmarks/tune_accuracy."""
 
 
@@ -81,7 +81,7 @@ class autotune_gain_steps:
     """[ratio] Noise passes for growth in one of so many steps at most, over all bands of a spectrum
     together. Origin: d16e3511."""
     # DEGREES, DEGREES_BEFORE: Real degrees of freedom of a band of three lines in one piece, and of
-    # the noise beside it in all pieces of the step with the gain as it is: each line of a Hann
+    # the noise next to it in all pieces of the step with the gain as it is: each line of a Hann
     # window shares with its neighbours.
     DEGREES = 3.0
     """[deg] Origin: d16e3511."""
@@ -124,7 +124,7 @@ class autotune_present:
 class autotune_raising:
     """`autotune/raising.py`."""
 
-    # NOT_SHOWN_DB, MOST_SHOWN_DB: So much of a promised gain margin is shown by raising the gain,
+    # NOT_SHOWN_DB, MOST_SHOWN_DB: So much of a guaranteed gain margin is shown by raising the gain,
     # where the last crossover is above what was measured: all but this, and no more than that.
     NOT_SHOWN_DB = 1.5
     """[dB] Origin: 17b160fe."""
@@ -159,7 +159,7 @@ class autotune_time_budget:
     """`autotune/time_budget.py`."""
 
     AROUND_S = 4.0
-    """[s] Writing a design, standing still and a step, beside the measurement of the loop. Origin:
+    """[s] Writing a design, standing still and a step, next to the measurement of the loop. Origin:
     e3bffcb4 with benchmarks/tune_accuracy."""
     DESIGNED_AND_VERIFIED_S = 12.0
     """[s] What follows the measurements: computing designs, writing one and verifying it. Origin:
@@ -211,9 +211,9 @@ class autotune_verify:
     """[ratio] Coherence of lines that a bandwidth is read from where those do not hold it. Origin:
     29633e14."""
     MOST_PAIRS = 4
-    """[count] Pairs of realisations that are measured at most where the first one tells too little:
+    """[count] Pairs of realisations that are measured at most where the first one shows too little:
     friction and noise of a heavy or a coarse axis average out, and so does the distortion of play,
-    which a single pair cannot tell from the response. Origin: 5caa8367."""
+    which a single pair cannot distinguish from the response. Origin: 5caa8367."""
     LOOKS = 2
     """[count] A loop that contradicts its prediction is verified once more where there is time for
     so many: that one, and a more careful design. Origin: 5caa8367."""
@@ -250,8 +250,8 @@ class brake_evaluate:
     """[ratio] Origin: ca58f5df."""
     OF_LIMIT = 0.05
     """[ratio] Origin: ca58f5df."""
-    # PARTS, STIFF_QUANTILE: Parts of the ramp that a compliance is taken of; a slipping part is
-    # softer than an elastic one.
+    # PARTS, STIFF_QUANTILE: Parts of the ramp that a compliance is calculated from; a slipping part
+    # is softer than an elastic one.
     PARTS = 8
     """[count] Origin: ca58f5df."""
     STIFF_QUANTILE = 0.3
@@ -279,7 +279,7 @@ class brake_texts:
 class brake_run:
     """`brake/run.py`."""
 
-    # LEAD_S, PRELOAD_S, STILL_S, TOP_S, DOWN_S, END_S: Seconds of each part of the sequence beside
+    # LEAD_S, PRELOAD_S, STILL_S, TOP_S, DOWN_S, END_S: Seconds of each part of the sequence next to
     # its ramp.
     LEAD_S = 0.2
     """[s] Origin: ca58f5df."""
@@ -370,8 +370,8 @@ class first_power_run:
 class friction_evaluate:
     """`friction/evaluate.py`."""
 
-    # BLOCKS, EVEN: Blocks that a mean is taken over; a speed that is not held in one of them is
-    # uneven.
+    # BLOCKS, EVEN: Blocks that a mean is calculated over; a speed that is not held in one of them
+    # is uneven.
     BLOCKS = 8
     """[count] Origin: 16e1fbc9."""
     EVEN = (0.3, 1.7)
@@ -397,7 +397,7 @@ class friction_evaluate:
     16e1fbc9."""
     SHARE_OF_RIPPLE = 0.03
     """[ratio] Nor an order of the ripple better than this, with the roughly known inertia and
-    friction that are taken out: one run of each of the five families was off by 2 to 4 %. Origin:
+    friction that are removed: one run of each of the five families was off by 2 to 4 %. Origin:
     d16e3511."""
 
 
@@ -561,7 +561,7 @@ class inertia_run:
 
     END_MARGIN_REV = 0.15
     """[rev] Margin to a taught or found end. Origin: f0621549."""
-    # GENTLY, AROUND_S: Gentle moves last about so many times as long; seconds beside them, such as
+    # GENTLY, AROUND_S: Gentle moves last about so many times as long; seconds next to them, such as
     # going back.
     GENTLY = 1.5
     """[ratio] Origin: 76c87fed with docs/tuning-accuracy.md."""
@@ -620,10 +620,10 @@ class measuring_alignment:
     """`measuring/alignment.py`."""
 
     COMPARED = 400
-    """[count] Rows of a run that are compared: enough to tell one place of a sequence from another.
+    """[count] Rows of a run that are compared: enough to show one place of a sequence from another.
     Origin: b6929249."""
     SURE = 15
-    """[count] Moved setpoints that must agree before a place is believed, where a sequence has as
+    """[count] Moved setpoints that must agree before a place is trusted, where a sequence has as
     many. Origin: b6929249."""
 
 
@@ -645,7 +645,7 @@ class measuring_excite:
     ba28e55a."""
     BASE_GLADLY = 0.25
     """[ratio] Share of the speed that it takes where torque affords it: a load that swings moves
-    the motor more than a rigid one, by how much nobody knows before. Origin: 2f3875f1 with
+    the motor more than a rigid one, by an amount that is unknown before. Origin: 2f3875f1 with
     benchmarks/analysis_comparison."""
     # RISE_HZ, RISE_MOST: Without a loop, lines rise from this frequency on, up to this factor.
     RISE_HZ = 120.0
@@ -706,7 +706,7 @@ class measuring_waveform:
 class moves_end_search:
     """`moves/end_search.py`."""
 
-    # STALL_S, START_S: So long at rest is an end; the axis' own start is not judged.
+    # STALL_S, START_S: So long at standstill is an end; the axis' own start is not judged.
     STALL_S = 0.12
     """[s] Origin: 7166e5a3 with benchmarks/tune_accuracy."""
     START_S = 0.25
@@ -729,7 +729,7 @@ class moves_go_back:
     MISSED = 0.2
     """[ratio] Origin: 76c87fed with docs/tuning-accuracy.md."""
     # SHARES, DISTINGUISHED_REV: What share of a way a loop goes, and moves that are different
-    # enough to tell.
+    # enough to show.
     SHARES = (0.4, 1.5)
     """[ratio] Origin: f9af5d30 with benchmarks/chaos/run."""
     DISTINGUISHED_REV = 0.02
@@ -859,7 +859,7 @@ class notch_in_loop:
     back but for what friction and a pull take of it. Origin: 73639f9f with
     docs/tuning-accuracy.md."""
     FEWEST_PERIODS = 2
-    """[count] Fewer tell nothing of noise. Origin: b5755842."""
+    """[count] Fewer show nothing of noise. Origin: b5755842."""
 
 
 class notch_trials:
@@ -895,14 +895,14 @@ class sweep_evaluation:
     """`sweep/evaluation.py`."""
 
     # SLOW_HZ, SLOWER: A current loop is not slower than this, nor than this share of what the drive
-    # tells.
+    # shows.
     SLOW_HZ = 450.0
     """[Hz] Origin: e8f9e730."""
     SLOWER = 0.7
     """[ratio] Origin: e8f9e730."""
     BY_REFERENCE_S = 15e-6
     """[s] What is charged to all lines where a speed loop's reference was the excitation, one
-    deviation: a setpoint that is held until it is sampled tells next to nothing of current loop and
+    deviation: a setpoint that is held until it is sampled shows next to nothing of current loop and
     delay, which the loop's own torque has to, and that is small on heavy axes. Origin: 7020a899."""
     ROUNDS = 3
     """[count] A speed loop's gain and the mechanics are found in turn, so often at most. Origin:
@@ -953,8 +953,8 @@ class sweep_profile_speed:
     exceeds it. Origin: c71e9acb."""
 
 
-class sweep_quiet_velocity:
-    """`sweep/quiet_velocity.py`."""
+class sweep_velocity_noise:
+    """`sweep/velocity_noise.py`."""
 
     NOISE = (0.2, 0.45)
     """[ratio] Nothing of a slow move is up here, so what is there is noise; shares of the sample
@@ -991,8 +991,8 @@ class sweep_speed_injection:
     """[ratio] Origin: 3fdbbd99 with docs/tuning-accuracy.md."""
     LEAST_BASE = 0.4
     """[ratio] Origin: 3fdbbd99 with docs/tuning-accuracy.md."""
-    # WEIGHTS, BY_DOUBT: Deviations of lines are taken to differ by so much, relative to the median;
-    # and the power of it.
+    # WEIGHTS, BY_DOUBT: Deviations of lines are assumed to differ by so much, relative to the
+    # median; and the power of it.
     WEIGHTS = (0.1, 4.0)
     """[ratio] Origin: 3fdbbd99 with docs/tuning-accuracy.md."""
     BY_DOUBT = 0.5

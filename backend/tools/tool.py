@@ -89,7 +89,7 @@ class ToolSettings(BaseModel):
 
 
 class ToolResult(BaseModel):
-    """What every result of a tool carries; its ``tool`` tells which result it is."""
+    """What every result of a tool carries; its ``tool`` shows which result it is."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -97,7 +97,7 @@ class ToolResult(BaseModel):
     measurements: tuple[str, ...] = Field(default=(), description="names of the stored raw data")
 
     def in_language(self, language: Language) -> Self:  # noqa: ARG002
-        """The same result, its sentences in a language where it has any beside its codes."""
+        """The same result, its sentences in a language where it has any next to its codes."""
         return self
 
 
@@ -251,7 +251,7 @@ class Tool(Generic[S, R]):
         return found.format(**values) if values else found
 
     def cells(self, grid: Grid, language: Language) -> list[tuple[str, ...]]:
-        """The head and the rows of a table in words."""
+        """The head and the rows of a table as text."""
 
         def shown(cell: Cell) -> str:
             return cell if isinstance(cell, str) else self.text(cell.name, language, cell.values)

@@ -1,4 +1,4 @@
-"""A message as results carry it beside its English words."""
+"""A message as results carry it next to its English words."""
 
 from __future__ import annotations
 

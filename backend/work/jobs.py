@@ -99,7 +99,7 @@ class JobRunner:
         self._granted = granted
         self._jobs: dict[str, Job] = {}
         self._numbers = itertools.count(1)
-        # A page outlives a restart of the server: its old jobs must not be taken for new ones.
+        # A page outlives a restart of the server: its old jobs must not be mistaken for new ones.
         self._run_mark = secrets.token_hex(3)
         self._changed = changed
         self._last_reported: dict[str, float] = {}
@@ -164,7 +164,7 @@ class JobRunner:
             title_text=as_text(title),
             drive=drive,
             motion=motion,
-            progress=Progress(lambda: self._tell(job)),
+            progress=Progress(lambda: self._notify(job)),
             person=person or acting_person(),
             actor=acting.get(),
             stoppable=stoppable,
@@ -209,7 +209,7 @@ class JobRunner:
             job.state, job.ended = "cancelled", time.time()
             self._changed(job)
 
-    def _tell(self, job: Job) -> None:
+    def _notify(self, job: Job) -> None:
         """Progress at 10 Hz at most; the end is always shown by `_run`."""
         now = time.monotonic()
         if now - self._last_reported.get(job.id, 0.0) >= 0.1:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 
 def main() -> int:
-    """Run the trial; the exit status tells whether something was violated."""
+    """Run the trial; the exit status shows whether something was violated."""
     # Not at the top: the server under trial sets its clock before it imports the product.
     from benchmarks.chaos.run import main as run
 

@@ -449,7 +449,7 @@ class Person:
             await guest.leave()
 
     async def remove_and_add(self, axis: int) -> None:
-        """Take an axis off the bench while others work with it, and put it back."""
+        """Take an axis off the bench while others work with it, and add it again."""
         self.judge.troubled = max(self.judge.troubled, time.monotonic())
         answer = await self.ask("DELETE", f"/drives/{self.drives[axis]}", "remove")
         if answer is not None and answer.is_success:

@@ -60,7 +60,7 @@ class Trial:
         print(f"{time.monotonic() - self._began:8.3f} {text}", file=self._out, flush=True)
 
     async def run(self) -> None:
-        """All of it; what is found stands in the judge's record."""
+        """All of it; what is found is in the judge's record."""
         await asyncio.to_thread(self.station.start)
         try:
             await self._set_up()
@@ -122,10 +122,10 @@ class Trial:
                 raise task.exception()  # type: ignore[misc]
         await self._quiet(before)
         if len(self.judge.record.violations) > known:
-            await self._tell_log()
+            await self._print_log()
 
-    async def _tell_log(self) -> None:
-        """What the server itself tells of it."""
+    async def _print_log(self) -> None:
+        """What the server itself reports of it."""
         anna = self.people[0]
         with contextlib.suppress(httpx.HTTPError, WebSocketException, OSError):
             await anna.arrive()
@@ -240,7 +240,8 @@ class Trial:
             if problem and problem["type"] == "urn:servodeck:internal":
                 self.judge.violated(f"{job['title']}: {problem['detail']}", problem["detail"][:60])
         reported = [j["problem"]["detail"] for j in jobs if j["problem"]]
-        # What an earlier server was killed with is put back when the axis stands, and reported.
+        # What an earlier server was killed with is restored when the axis is at standstill, and
+        # reported.
         reported += [str(j["result"]) for j in jobs if j["kind"] == "put-back" and j["result"]]
         self._reported = " ".join(reported)
 
@@ -367,7 +368,7 @@ class Trial:
 
 
 def main() -> int:
-    """Run the trial; the exit status tells whether something was violated."""
+    """Run the trial; the exit status shows whether something was violated."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.chaos")
     parser.add_argument("--seconds", type=float, default=120.0, help="for each bus")
     parser.add_argument("--seed", type=int, default=1)

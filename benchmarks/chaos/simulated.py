@@ -194,7 +194,7 @@ def run_seed(seed: int) -> Mix:
 
 
 def main() -> int:
-    """Seeds one after the other; the exit status tells whether something was found."""
+    """Seeds one after the other; the exit status shows whether something was found."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.chaos.simulated")
     parser.add_argument("--seeds", type=int, default=200)
     parser.add_argument("--first", type=int, default=1)

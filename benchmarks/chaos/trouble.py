@@ -19,7 +19,7 @@ Trouble = Callable[[float], Awaitable[None]]
 
 
 class Troubles:
-    """Makes trouble for some seconds and takes it back."""
+    """Makes trouble for some seconds and undoes it."""
 
     def __init__(
         self, station: TrialStation, judge: Judge, source: random.Random, say: Any, tally: Tally,
@@ -60,7 +60,7 @@ class Troubles:
     def _axis(self) -> int:
         return self.random.randrange(len(self.station.specs))
 
-    async def _tell(self, do: str, **arguments: object) -> None:
+    async def _send(self, do: str, **arguments: object) -> None:
         await asyncio.to_thread(self.station.trouble, do, **arguments)
 
     @property
@@ -69,14 +69,14 @@ class Troubles:
 
     async def pull(self, seconds: float) -> None:
         if self._ethercat:
-            await self._tell("cut", cable=self._axis())
+            await self._send("cut", cable=self._axis())
             await asyncio.sleep(seconds)
-            await self._tell("heal")
+            await self._send("heal")
             return
         wire = self.station.url_of(self._axis())
-        await self._tell("pull", wire=wire)
+        await self._send("pull", wire=wire)
         await asyncio.sleep(seconds)
-        await self._tell("heal", wire=wire)
+        await self._send("heal", wire=wire)
 
     async def blip(self, _seconds: float) -> None:
         """A cable that is loose: many short breaks."""
@@ -89,18 +89,18 @@ class Troubles:
         where: dict[str, object] = (
             {"slave": axis} if self._ethercat else {"wire": self.station.url_of(axis)}
         )
-        await self._tell("mute", on=True, **where)
+        await self._send("mute", on=True, **where)
         await asyncio.sleep(seconds)
-        await self._tell("mute", on=False, **where)
+        await self._send("mute", on=False, **where)
 
     async def power_cycle(self, seconds: float) -> None:
         axis = self._axis()
         self.cycled.add(axis)
         self.judge.unclear[axis] = "its supply was off"
         if self._ethercat:
-            await self._tell("power_cycle", slave=axis, off_s=seconds)
+            await self._send("power_cycle", slave=axis, off_s=seconds)
         else:
-            await self._tell("power_cycle", axis=self.station.specs[axis].name, off_s=seconds)
+            await self._send("power_cycle", axis=self.station.specs[axis].name, off_s=seconds)
         await asyncio.sleep(seconds)
 
     async def power_twice(self, seconds: float) -> None:
@@ -124,29 +124,29 @@ class Troubles:
         where: dict[str, object] = (
             {"slave": axis} if self._ethercat else {"axis": self.station.specs[axis].name}
         )
-        await self._tell("inject", what="overload", **where)
+        await self._send("inject", what="overload", **where)
 
     async def lose(self, seconds: float) -> None:
-        await self._tell("lose", chance=self.random.choice([0.01, 0.1, 0.6, 1.0]),
+        await self._send("lose", chance=self.random.choice([0.01, 0.1, 0.6, 1.0]),
                          cyclic=self.random.random() < 0.5,
                          direction=self.random.choice(["in", "out"]))  # fmt: skip
         await asyncio.sleep(seconds)
-        await self._tell("peace")
+        await self._send("peace")
 
     async def counter(self, seconds: float) -> None:
-        await self._tell("counter", by=-1, chance=self.random.choice([0.05, 0.5, 1.0]))
+        await self._send("counter", by=-1, chance=self.random.choice([0.05, 0.5, 1.0]))
         await asyncio.sleep(seconds)
-        await self._tell("peace")
+        await self._send("peace")
 
     async def late(self, seconds: float) -> None:
-        await self._tell("late", by_s=0.02, chance=0.1)
+        await self._send("late", by_s=0.02, chance=0.1)
         await asyncio.sleep(seconds)
-        await self._tell("peace")
+        await self._send("peace")
 
     async def slow_sdo(self, seconds: float) -> None:
-        await self._tell("timing", sdo_s=0.08, al_s=0.1)
+        await self._send("timing", sdo_s=0.08, al_s=0.1)
         await asyncio.sleep(seconds)
-        await self._tell("timing", sdo_s=0.001, al_s=0.002)
+        await self._send("timing", sdo_s=0.001, al_s=0.002)
 
     async def _stopped(self, process: int | None, seconds: float) -> None:
         if process is None:

@@ -22,7 +22,7 @@ _BY_PROCESS_DATA = "jog by process data"
 _NOT_TAMPERED = frozenset({_BY_PROCESS_DATA})
 #: A jog over a link without process data has none to lose, and DS_C documents no watchdog.
 _WITHOUT_PROCESS_DATA = frozenset({"jog"})
-#: Manuals that know no way to brake: 001:894 with 001:487.
+#: Manuals that have no way to brake: 001:894 with 001:487.
 _UNBRAKED = frozenset({("ep3e", "torque")})
 
 
@@ -39,7 +39,7 @@ class Outcome:
     degrees: float
     shaft_rpm_at_answer: float
     steps: tuple[str, ...]
-    speed_said: float | None
+    speed_reported: float | None
 
     @property
     def truthful(self) -> bool:

@@ -1,6 +1,6 @@
 """An event loop whose time is simulated: who waits for 3 s has waited at once.
 
-Time goes on only while nothing is ready to run, by what the nearest timer wants. What threads do
+Time advances only while nothing is ready to run, to the time of the nearest timer. What threads do
 is waited for in the computer's own time. `time.monotonic` is the loop's while it runs.
 """
 

@@ -129,7 +129,7 @@ class Rig:
     """Waited for between enabling and the trigger of a drive's own identification."""
 
     def keep(self, work: Coroutine[None, None, None]) -> None:
-        """Run beside the test until the bench closes."""
+        """Run next to the test until the bench closes."""
         self.kept.append(asyncio.create_task(work))
 
     @property

@@ -3,7 +3,7 @@
     python -m benchmarks.stopping --vertical [--family m6l …] [--markdown]
 
 The load pulls with `GRAVITY_NM`; positive is up. The brake is on the output that its family has for
-it. Judged by the shaft: a load that has come to rest and sinks again was let go before its brake
+it. Judged by the shaft: a load that has stopped and sinks again was let go before its brake
 held. The virtual brake grips at once; how slow a real one may be shows the time for which the
 drive keeps the power on with the brake output off (`Sinking.lead_s`).
 """
@@ -33,7 +33,7 @@ from drivers.cia402 import Mode
 
 #: A quarter of the rated torque of 1.27 Nm: 1600 rad/s² on the motor's own 2e-4 kg m².
 GRAVITY_NM = 0.32
-#: What holds the load, and what lifts it beside that, in percent of the rated torque.
+#: What holds the load, and what lifts it in addition to that, in percent of the rated torque.
 _HOLDS_PERCENT, _LIFTS_PERCENT = 100.0 * GRAVITY_NM / 1.27, 8.0
 #: After the answer the load is looked at for so long.
 _AFTER_S = 2.0
@@ -49,7 +49,7 @@ _TAMPERED = frozenset({"holding", "raising", "lowering"})
 
 
 async def _holding(bench: Rig) -> None:
-    """Enabled at rest."""
+    """Enabled at standstill."""
     bench.poke("60FF:00", 0)
     await enable(bench, mode_of(bench, Mode.PV, Mode.CSV))
     await asyncio.sleep(SEEN_S)
@@ -141,7 +141,7 @@ VERTICAL: dict[str, tuple[Begin, frozenset[str]]] = {
 
 @dataclass(frozen=True)
 class Sinking:
-    """What became of the load. ``stood_s`` is None where it never came to rest.
+    """What became of the load. ``stood_s`` is None where it never stopped.
 
     ``sank_deg`` is how far it went down from where it stood first, or from the place of STOP where
     it never stood. ``lead_s`` is how long the power was on with the brake applied; None where the
@@ -160,7 +160,7 @@ class Sinking:
 
     @property
     def held(self) -> bool:
-        """The load was held all the time, and the answer says that it stands."""
+        """The load was held all the time, and the answer says that it is at standstill."""
         stands = self.stood_s is not None and self.rpm_at_end <= STANDS_RPM
         return stands and self.sank_deg <= SINKS_DEG and self.verdict == "stopped"
 

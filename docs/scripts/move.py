@@ -1,4 +1,4 @@
-"""Move an axis by some revolutions and back, and print where it stands. THE AXIS MOVES.
+"""Move an axis by some revolutions and back, and print where it is. THE AXIS MOVES.
 
     python move.py DRIVE_ID REVOLUTIONS SPEED_RPM
 
@@ -14,7 +14,8 @@ import httpx
 
 
 def move(api: httpx.Client, drive: str, revolutions: float, speed_rpm: float) -> None:
-    """One relative move in profile position mode, with limits; returns when the axis stands.
+    """One relative move in profile position mode, with limits; returns when the axis is at
+    standstill.
 
     Raises:
         RuntimeError: the move was refused or ended early.

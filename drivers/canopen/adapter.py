@@ -8,7 +8,7 @@ from pathlib import Path
 import can
 
 from drivers.adapters import require_channel, serial_device
-from drivers.canopen.slcan import AdapterBlocked, AdapterGone, SlcanBus
+from drivers.canopen.slcan import AdapterBlocked, AdapterLost, SlcanBus
 from drivers.canopen.url import CanUrl
 from drivers.errors import DriveError, LinkLost
 
@@ -75,7 +75,7 @@ def translate(url: CanUrl, error: BaseException) -> LinkLost:
     elif isinstance(error, (can.CanInterfaceNotImplementedError, ImportError, NameError)):
         why = f"its driver is not installed ({text})"
         remedy = "install the adapter maker's driver, or use socketcan on Linux"
-    elif isinstance(error, AdapterGone):
+    elif isinstance(error, AdapterLost):
         why = text
         remedy = "check its USB cable and plug it in again; it is opened by itself when it is back"
     else:

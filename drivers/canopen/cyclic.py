@@ -76,7 +76,7 @@ class CanopenCyclic:
         self._clock = clock
         self._loop: SyncLoop | None = None
         self._consumers: list[Callable[[ScopeBlock], None]] = []
-        self._tell: Callable[[LinkEvent], None] = lambda _event: None
+        self._send_event: Callable[[LinkEvent], None] = lambda _event: None
         self._heard: Callable[[int], bool] = lambda _node: False
 
     @property
@@ -94,13 +94,13 @@ class CanopenCyclic:
         """Empty: an exchange that broke off is not set up again by itself."""
         return ""
 
-    def know_nodes_by(self, heard: Callable[[int], bool]) -> None:
-        """How to tell whether a node of this number is on the bus."""
+    def watch_nodes_by(self, heard: Callable[[int], bool]) -> None:
+        """How to determine whether a node of this number is on the bus."""
         self._heard = heard
 
-    def tell_events_to(self, tell: Callable[[LinkEvent], None]) -> None:
+    def send_events_to(self, send: Callable[[LinkEvent], None]) -> None:
         """Where events of the loop go (any thread)."""
-        self._tell = tell
+        self._send_event = send
 
     def set_modes(self, station: int, modes: Sequence[int]) -> None:
         """Which modes the drive has: without CSP, CSV or CST its commands stay with SDO."""
@@ -109,8 +109,8 @@ class CanopenCyclic:
         else:
             self._without_cyclic_modes.add(station)
 
-    def take_pdos(self, station: int, fixed: Sequence[FixedPdo]) -> None:
-        """PDOs of the drive that it does not let be mapped anew."""
+    def set_fixed_pdos(self, station: int, fixed: Sequence[FixedPdo]) -> None:
+        """PDOs of the drive that it does not let be mapped again."""
         self._fixed_pdos[station] = tuple(fixed)
 
     def speak(self, station: int, dialect: Dialect) -> None:
@@ -164,7 +164,7 @@ class CanopenCyclic:
 
         Raises:
             NotAllowed: nothing configured, or a drive does not let itself be mapped.
-            LinkTimeout, LinkLost: as for any write; what was changed has been put back.
+            LinkTimeout, LinkLost: as for any write; what was changed has been restored.
         """
         configured = self._configured
         if configured is None:
@@ -187,7 +187,7 @@ class CanopenCyclic:
             images,
             configured.cycle_s,
             deliver=deliver,
-            tell=self._tell,
+            notify=self._send_event,
             own_id=self._settings.own_id,
             clock=self._clock,
         )
@@ -215,7 +215,7 @@ class CanopenCyclic:
         try:
             await self.stop()
         except DriveError as error:
-            self._tell(LinkEvent("fault", None, f"the PDOs could not be put back: {error}"))
+            self._send_event(LinkEvent("fault", None, f"the PDOs could not be restored: {error}"))
 
     async def play(self, trajectories: Sequence[Trajectory]) -> int:
         """Play trajectories in step; returns the cycle counter of the first value.
@@ -235,7 +235,7 @@ class CanopenCyclic:
         return loop.play(motions)
 
     async def _until_seen_enabled(self, loop: SyncLoop, station: int) -> None:
-        """An SDO may tell of Operation enabled a cycle or two before the process data do."""
+        """An SDO may report Operation enabled a cycle or two before the process data do."""
         axis = loop.images.axes[station]
         waited_s = 0.0
         enabled = State.OPERATION_ENABLED
@@ -393,7 +393,7 @@ class CanopenCyclic:
             raise NotAllowed("canopen.node-control-word-not", node=station)
 
     def _report(self, station: int, text: str) -> None:
-        self._tell(LinkEvent("fault", station, f"node {station}: {text}"))
+        self._send_event(LinkEvent("fault", station, f"node {station}: {text}"))
 
     def _deliver(self, block: ScopeBlock) -> None:
         for consumer in list(self._consumers):
@@ -420,7 +420,7 @@ class CanopenCyclic:
             self._setup.interpolate(station, configured.cycle_s)
             if not self._setup.guard(station):
                 unguarded.add(station)
-                self._tell(
+                self._send_event(
                     LinkEvent(
                         "state",
                         station,

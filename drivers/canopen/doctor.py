@@ -1,4 +1,4 @@
-"""Reading of a node and its bus whatever tells why it does not reach Operational. Blocking.
+"""Reading of a node and its bus whatever shows why it does not reach Operational. Blocking.
 
 Asks and listens only: reads of objects, and one request of node guarding where that starts no
 life guarding. Source: CiA 301 v4.2.0 clauses 7.2.8.2.2 (error control) and 7.5.2 (objects).

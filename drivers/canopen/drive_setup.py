@@ -55,7 +55,7 @@ class DriveSetup:
         return self._read(station, 0x1016, 1) == value
 
     def interpolate(self, station: int, cycle_s: float) -> None:
-        """Tell a drive that interpolates between setpoints how far apart they come (60C2h)."""
+        """Write to a drive that interpolates between setpoints how far apart they come (60C2h)."""
         try:
             value, exponent = interpolation_period(round(cycle_s * 1e9))
             self._change(station, SdoWrite(0x60C2, 1, bytes([value])))
@@ -73,7 +73,7 @@ class DriveSetup:
         """Put everything back.
 
         Raises:
-            NotAllowed: something could not be put back; the message lists it.
+            NotAllowed: something could not be restored; the message lists it.
         """
         undo, self._undo = self._undo, []
         self._put_back(undo)
@@ -106,7 +106,7 @@ class DriveSetup:
                 self._write(station, write.index, write.subindex, write.data)
                 cleared = cleared or write.index == pdo.mapping
         except Rejected as refusal:
-            if not cleared:  # a fixed mapping is as it was, and would refuse to be put back too
+            if not cleared:  # a fixed mapping is as it was, and would refuse to be restored too
                 self._undo = [
                     (s, w) for s, w in self._undo if (s, w.index) != (station, pdo.mapping)
                 ]

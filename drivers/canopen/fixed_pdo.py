@@ -51,7 +51,7 @@ class FixedPdo:
 
 
 def fixed_pdos(profile: Profile, station: int) -> tuple[FixedPdo, ...]:
-    """The fixed PDOs of a node, of directions in which no PDO can be mapped anew."""
+    """The fixed PDOs of a node, of directions in which no PDO can be mapped again."""
     sets = profile.pdo.sets if profile.pdo is not None else ()
     open_ways = {each.direction for each in sets if not each.fixed}
     found = (
@@ -91,7 +91,7 @@ def chosen(
 ) -> tuple[list[tuple[FixedPdo, tuple[CyclicSignal, ...]]], list[CyclicSignal]]:
     """PDOs that hold these signals, each with its own; and the signals that none holds.
 
-    What an output PDO holds beside them is a signal as well: the drive takes it in every cycle.
+    What an output PDO holds next to them is a signal as well: the drive takes it in every cycle.
     """
     left = list(wanted)
     found = []
@@ -104,7 +104,7 @@ def chosen(
         for address, _ in pdo.starts():
             signal = by_place.get((address.index, address.subindex))
             if signal is None and pdo.direction == "rx":
-                signal = _beside(wanted[0], address)
+                signal = _signal_at(wanted[0], address)
             if signal is not None:
                 signals.append(signal)
         left = [s for s in left if s not in signals]
@@ -112,7 +112,7 @@ def chosen(
     return found, left
 
 
-def _beside(known: CyclicSignal, address: Address) -> CyclicSignal:
+def _signal_at(known: CyclicSignal, address: Address) -> CyclicSignal:
     """A signal of the same drive, named like the others."""
     drive, slash, _ = known.channel.rpartition("/")
     key = f"{address.index:04X}:{address.subindex:02X}"

@@ -90,7 +90,7 @@ class CanopenLink:
             node: SdoChannel(node, self._request_sender(node)) for node in range(1, 128)
         }
         self._turns = {node: asyncio.Lock() for node in range(1, 128)}
-        #: Writes that wait for their turn: one may be the stop, so batches of reads give way.
+        #: Writes that wait for their turn: one may be the stop, so batches of reads yield.
         self._urgent = dict.fromkeys(range(1, 128), 0)
         self._port = CanPort(self._settings, self._frame, self._event, self._idle, opener)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -109,8 +109,8 @@ class CanopenLink:
         self._examiner = Examiner(
             self._port, self._watch, self._watch_lock, self._channels, self._cyclic
         )
-        self._cyclic.tell_events_to(self._announce)
-        self._cyclic.know_nodes_by(self._watch.is_there)
+        self._cyclic.send_events_to(self._announce)
+        self._cyclic.watch_nodes_by(self._watch.is_there)
         self.cyclic: Cyclic | None = self._cyclic
 
     async def open(self) -> None:
@@ -144,7 +144,7 @@ class CanopenLink:
         self._profiles[station] = profile
         self._cyclic.set_modes(station, profile.supported_modes)
         self._cyclic.speak(station, dialect_of(profile))
-        self._cyclic.take_pdos(station, fixed_pdos(profile, station))
+        self._cyclic.set_fixed_pdos(station, fixed_pdos(profile, station))
 
     def unreachable(self, station: int, address: Address) -> Text | None:
         """See `drivers.link.Link.unreachable`; SDO transfers carry every object."""
@@ -394,7 +394,7 @@ class CanopenLink:
             try:
                 self._port.send(Frame(HEARTBEAT + node, remote=True))
             except LinkLost:
-                return  # the receiving thread is about to notice and tell of it
+                return  # the receiving thread is about to notice and report it
 
     @property
     def doctor(self) -> CanopenLink:
@@ -436,9 +436,9 @@ class CanopenLink:
         self._port.ring.note(f"{event.kind}: {event.text}", event.station)
         loop = self._loop
         if loop is not None and not loop.is_closed():
-            loop.call_soon_threadsafe(self._tell, event)
+            loop.call_soon_threadsafe(self._notify, event)
 
-    def _tell(self, event: LinkEvent) -> None:
+    def _notify(self, event: LinkEvent) -> None:
         for listener in list(self._listeners):
             listener(event)
 

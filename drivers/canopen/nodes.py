@@ -71,7 +71,7 @@ class NodeRecord:
     emergencies: int = 0
     last_emergency: int | None = None
     open_emergency: int | None = None
-    """The last emergency, until it is taken back (code 0) or the node restarts."""
+    """The last emergency, until it is undone (code 0) or the node restarts."""
     emergency_window_s: float | None = None
     emergencies_reported: int = 0
     emergencies_untold: int = 0
@@ -92,7 +92,7 @@ class NodeRecord:
 
     @property
     def state_text(self) -> str:
-        """NMT state in words, or empty."""
+        """NMT state as text, or empty."""
         return "" if self.state is None else NMT_STATES.get(self.state, f"state {self.state}")
 
 
@@ -169,7 +169,7 @@ class NodeWatch:
             return LinkEvent(
                 "boot",
                 record.node,
-                f"node {record.node} restarted: values that were not saved are gone, read it anew",
+                f"node {record.node} restarted: values that were not saved are gone, read it again",
             )
         return LinkEvent("boot", record.node, f"node {record.node} started")
 

@@ -1,4 +1,4 @@
-"""Which signal travels in which PDO, and the writes that tell the drive so. Pure.
+"""Which signal travels in which PDO, and the writes that configure the drive so. Pure.
 
 Source: CiA 301 v4.2.0 clauses 7.5.2.35 to 7.5.2.38 (PDO parameters) and 7.2.2 (PDO services).
 """
@@ -87,7 +87,7 @@ def plan(
 ) -> tuple[tuple[PdoPlan, ...], tuple[CyclicSignal, ...]]:
     """Distribute signals over four PDOs of 8 bytes per node and direction, in the order given.
 
-    ``fixed`` has the PDOs of stations that cannot be mapped anew: those are used as they are.
+    ``fixed`` has the PDOs of stations that cannot be mapped again: those are used as they are.
     Returns the PDOs and the signals that found no room (or are not mappable at all).
     """
     pdos: list[PdoPlan] = []

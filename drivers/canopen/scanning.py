@@ -55,7 +55,7 @@ def identify(channel: SdoChannel, answers: Sequence[bytes], timeout_s: float) ->
 
     return Found(
         station=channel.node,
-        # 0 is no vendor and no serial number: a drive that says so has none to tell.
+        # 0 is no vendor and no serial number: a drive that says so has none to show.
         vendor_id=number(0x1018, 1) or None,
         product_code=number(0x1018, 2),
         revision=number(0x1018, 3),

@@ -1,4 +1,4 @@
-"""slcan adapters: python-can's client, made to tell of refused frames and of bus-off.
+"""slcan adapters: python-can's client, made to report refused frames and of bus-off.
 
 python-can drops the adapter's BEL (a frame it could not send) and never asks for the status
 flags, so a bus-off would only look like silence. It also reads one byte per system call.
@@ -20,7 +20,7 @@ class AdapterBlocked(can.CanOperationError):
     """The adapter takes no more frames."""
 
 
-class AdapterGone(can.CanOperationError):
+class AdapterLost(can.CanOperationError):
     """The adapter does not answer the computer any more."""
 
 
@@ -56,7 +56,7 @@ class SlcanBus(slcanBus):
                 line = self._buffered_line()
         except (OSError, serial.SerialException, TypeError) as error:
             # TypeError: pyserial reads a descriptor that another thread has closed.
-            raise AdapterGone(f"the adapter is gone: {error}") from error
+            raise AdapterLost(f"the adapter is gone: {error}") from error
         if line == "\a":
             self._ask_for_flags()
         return line
@@ -69,7 +69,7 @@ class SlcanBus(slcanBus):
         except serial.SerialTimeoutException as error:
             raise AdapterBlocked("the adapter takes no more frames") from error
         except _GONE as error:
-            raise AdapterGone(f"the adapter is gone: {error}") from error
+            raise AdapterLost(f"the adapter is gone: {error}") from error
 
     def _ask_for_flags(self) -> None:
         """At most twice a second: an adapter that does not know F answers it with BEL again."""

@@ -72,7 +72,7 @@ class _Statistics:
 class SyncLoop:
     """Sends SYNC and output PDOs every ``cycle_s``, gathers input PDOs into blocks.
 
-    Every public method may be called from any thread. ``deliver`` and ``tell`` are called on the
+    Every public method may be called from any thread. ``deliver`` and ``notify`` are called on the
     loop's thread and must not block.
     """
 
@@ -83,7 +83,7 @@ class SyncLoop:
         cycle_s: float,
         *,
         deliver: Callable[[ScopeBlock], None],
-        tell: Callable[[LinkEvent], None],
+        notify: Callable[[LinkEvent], None],
         own_id: int,
         clock: LoopClock | None = None,
     ) -> None:
@@ -92,7 +92,7 @@ class SyncLoop:
         self.cycle_s = cycle_s
         self._send = send
         self._deliver = deliver
-        self._tell = tell
+        self._notify = notify
         self._heartbeat = Frame(HEARTBEAT + own_id, _OPERATIONAL)
         self._lock = threading.Condition()
         self._stopping = False
@@ -148,7 +148,7 @@ class SyncLoop:
         return True
 
     def forget_arrivals(self) -> None:
-        """Count anew which input PDOs came."""
+        """Count again which input PDOs came."""
         with self._lock:
             self._came.clear()
 
@@ -307,7 +307,7 @@ class SyncLoop:
                 self._lock.notify_all()
             if lost:
                 self.abandon(None, Halted(HaltCause.LOST, note=error.text))
-                self._tell(LinkEvent("state", None, f"cyclic exchange interrupted: {error}"))
+                self._notify(LinkEvent("state", None, f"cyclic exchange interrupted: {error}"))
             return
         self._bus_lost = False
 
@@ -330,7 +330,7 @@ class SyncLoop:
         self._statistics.incomplete += not valid
         if not self._rows:
             self._block_cycle = self._sent_cycle
-        # Beside what SYNC called for stands what went out in the same cycle, for the next SYNC.
+        # Next to what SYNC called for stands what went out in the same cycle, for the next SYNC.
         self._rows.append([*self.images.values, *self._sent])
         self._row_valid.append(valid)
         for station, axis in self.images.axes.items():

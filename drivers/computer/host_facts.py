@@ -118,7 +118,7 @@ class Computer:
         """Set one of the kernel's switches.
 
         Raises:
-            OSError: not permitted, not there, or not taken.
+            OSError: not permitted, not there, or not accepted.
         """
         (self.root / path).write_text(value, "utf-8")
 

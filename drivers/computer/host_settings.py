@@ -63,7 +63,7 @@ class HostSettings:
         """Set it.
 
         Raises:
-            OSError: not permitted, not there, or not taken.
+            OSError: not permitted, not there, or not accepted.
         """
         if setting.card:
             self.write_card(setting.card, setting.place, int(value))

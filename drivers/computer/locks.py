@@ -11,7 +11,7 @@ if sys.platform == "win32":
 else:
     import fcntl
 
-#: Locked on Windows, which knows no lock of a file as a whole: far behind any content, as a locked
+#: Locked on Windows, which has no lock of a file as a whole: far behind any content, as a locked
 #: byte cannot be read by others.
 _LOCKED_BYTE = 1 << 30
 

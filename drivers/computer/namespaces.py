@@ -48,7 +48,7 @@ def leave_namespaces() -> None:
         libc = ctypes.CDLL(None, use_errno=True)
         uid, gid = os.geteuid(), os.getegid()
         if libc.unshare(_CLONE_NEWUSER | _CLONE_NEWNET) == 0:
-            # The kernel wants setgroups denied before an ordinary user may map a group.
+            # The kernel needs setgroups denied before an ordinary user may map a group.
             Path("/proc/self/setgroups").write_text("deny", encoding="ascii")
             Path("/proc/self/uid_map").write_text(f"0 {uid} 1", encoding="ascii")
             Path("/proc/self/gid_map").write_text(f"0 {gid} 1", encoding="ascii")

@@ -1,4 +1,4 @@
-"""Processes: telling one from another, their turn on the processor, how they end."""
+"""Processes: distinguishing them, their turn on the processor, how they end."""
 
 from __future__ import annotations
 

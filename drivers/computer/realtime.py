@@ -17,7 +17,7 @@ _PRIORITY = 40
 
 @dataclass(frozen=True, slots=True)
 class RealTime:
-    """What was granted; ``notes`` say in words what was not, and how to get it."""
+    """What was granted; ``notes`` say as text what was not, and how to get it."""
 
     fifo_priority: int
     notes: tuple[str, ...]
@@ -56,5 +56,5 @@ def claim(*, wanted: bool = True) -> RealTime:
 
 
 def die_with_parent() -> None:
-    """Have SIGTERM sent to this process when its parent dies; the pipe's end tells as well."""
+    """Have SIGTERM sent to this process when its parent dies; the pipe's end shows as well."""
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)

@@ -79,7 +79,7 @@ def own_terminals() -> set[str]:
 
 
 def port_options() -> dict[str, bool]:
-    """What pyserial is asked for beside the line's settings: the port for this process alone.
+    """What pyserial is asked for next to the line's settings: the port for this process alone.
 
     A COM port always is; pyserial refuses to be asked for it there.
     """

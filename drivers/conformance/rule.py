@@ -22,7 +22,7 @@ class Verdict(Enum):
 
     @property
     def text(self) -> Text:
-        """In words."""
+        """The verdict as text."""
         return text(_VERDICTS[self])
 
 
@@ -79,7 +79,7 @@ class Rule:
 
     @property
     def title(self) -> Text:
-        """What the clause prescribes, in words."""
+        """What the clause prescribes, as text."""
         return text(self.code)
 
 

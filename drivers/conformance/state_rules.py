@@ -19,7 +19,7 @@ _INVALID_CHANGE, _UNKNOWN_STATE = 0x0011, 0x0012
 
 
 async def _to_preop(states: AlStates, station: int) -> AlAnswer:
-    """Pre-Op without an error, by Init where it stands anywhere else."""
+    """Pre-Op without an error, by Init where it is anywhere else."""
     answer = await states.request(station, _PREOP | _ERROR)
     if answer.state != _PREOP:
         await states.request(station, _INIT | _ERROR)

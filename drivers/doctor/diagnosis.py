@@ -22,7 +22,7 @@ _BUSY_PREFIX = ("1C12", "1C13")
 
 @dataclass(frozen=True, slots=True)
 class CauseText:
-    """A cause in words, English and Chinese."""
+    """A cause as text, English and Chinese."""
 
     code: str
     title: str
@@ -52,7 +52,7 @@ class Cause:
 
     @property
     def text(self) -> CauseText:
-        """In words."""
+        """The cause as text."""
         return catalogue()[self.code]
 
 

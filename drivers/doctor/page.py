@@ -13,10 +13,10 @@ from drivers.doctor.diagnosis import AL_CAUSES, catalogue
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "not-operational.md"
 _HEAD = """# My drive does not reach OP
 
-*This page is written by `python -m drivers.doctor.page` from the causes that the doctor knows.*
+*This page is written by `python -m drivers.doctor.page` from the causes that the doctor can find.*
 
 `servodeck doctor ethercat://eth0` or `servodeck doctor canopen://socketcan/can0` takes every drive
-of the bus to Operational (nothing is enabled, nothing moves) and says why one refuses: the
+of the bus to Operational (nothing is enabled, nothing moves) and states why one refuses: the
 likeliest cause first, each with the facts that speak for it. On the page *Connect*, *Why not in
 Operational?* reads the same of a bus that is open, without changing a state.
 

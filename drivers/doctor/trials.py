@@ -14,7 +14,7 @@ from profiles.bring_up import BringUp, ClockMode
 from profiles.schema import PdoSet, Profile
 
 MOST = 4
-"""Trials of one station: each takes the drive to Operational anew."""
+"""Trials of one station: each takes the drive to Operational again."""
 
 _ACTIVATES = (0x0300, 0x0000, 0x0700, 0x0330)
 """Values of 0980h that drives in use want: SYNC0, no clock, SYNC0 and SYNC1, SYNC0 on its pin."""
@@ -97,7 +97,7 @@ def _without_command(cause: Cause, profile: Profile) -> Iterator[Trial]:
 
 
 def _other_clock(_cause: Cause, profile: Profile) -> Iterator[Trial]:
-    """Operation modes of the file before values that other drives want."""
+    """Operation modes of the file before values that other drives need."""
     rules = _rules(profile)
     used = rules.clock_mode
     before = 0x0300 if used is None else used.assign_activate

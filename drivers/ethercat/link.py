@@ -234,7 +234,7 @@ class EthercatLink:
         """Drive one slave to a state.
 
         Raises:
-            NotAllowed: it refuses; the reason is its AL status code in words.
+            NotAllowed: it refuses; the reason is its AL status code as text.
         """
         await self._call({"op": "state", "station": station, "state": state.name}, _ANSWER_S)
 
@@ -362,24 +362,24 @@ class EthercatLink:
         elif message["event"] == "link":
             kind, station = message["kind"], message["station"]
             if kind == "back" and station is None and self.process_data.trouble:
-                # Who reads everything anew on "back" waits until the drives have been set up.
+                # Who reads everything again on "back" waits until the drives have been set up.
                 kind = "state"
-            self._tell(LinkEvent(kind, station, message["text"], message["code"]))
+            self._notify(LinkEvent(kind, station, message["text"], message["code"]))
 
     def _restarted(self, why: str) -> None:
         self._status = {}
-        self._tell(LinkEvent("lost", None, why))
+        self._notify(LinkEvent("lost", None, why))
         self.process_data.host_gone(why)
 
     def _exchange_changed(self, text: str, well: bool) -> None:
         if not well:
-            self._tell(LinkEvent("fault", None, text))
+            self._notify(LinkEvent("fault", None, text))
             return
-        self._tell(LinkEvent("state", None, text))
+        self._notify(LinkEvent("state", None, text))
         for station in self.process_data.stations:
-            self._tell(LinkEvent("back", station, f"station {station} is in OP again, disabled"))
+            self._notify(LinkEvent("back", station, f"station {station} is in OP again, disabled"))
 
-    def _tell(self, event: LinkEvent) -> None:
+    def _notify(self, event: LinkEvent) -> None:
         self.recorder.note(f"{event.kind}: {event.text}", event.station)
         for listener in tuple(self._listeners):
             listener(event)

@@ -1,7 +1,7 @@
 """The recorder of an EtherCAT segment: ``python -m drivers.flight.process IFACE --control FD``.
 
 The kernel copies every EtherCAT frame of the interface, sent and received, with its time in
-nanoseconds; this process only collects the copies. It runs beside the host process at low
+nanoseconds; this process only collects the copies. It runs next to the host process at low
 priority, so that nothing of it comes into the cycle. Lines of JSON come on the control socket:
 ``{"note": TEXT, "station": N, "time_ns": T}`` and ``{"file": true, "station": N}``; the answer to
 the latter is a length of 8 bytes, little endian, and the pcapng file.

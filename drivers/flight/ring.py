@@ -15,7 +15,7 @@ MAX_BYTES = 64 << 20
 _MAX_NOTES = 2000
 _HEAD = struct.Struct("<qB")
 _OVERHEAD = 48
-"""Bytes of a Python object and its place in the ring, beside the frame itself."""
+"""Bytes of a Python object and its place in the ring, next to the frame itself."""
 
 Belongs = Callable[[bytes, int], bool]
 """Whether a frame has to do with a station."""

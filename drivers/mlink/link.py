@@ -24,7 +24,7 @@ _MAX_WORDS = 2
 def register_of(index: int, subindex: int) -> int:
     """First register of an object: 6040h -> 6400h, 6099h:02 -> 6991h, 2105h -> 3050h.
 
-    Subindex 0 and 1 share a register, and so do a few objects far apart; `MlinkLayout` tells
+    Subindex 0 and 1 share a register, and so do a few objects far apart; `MlinkLayout` shows
     them apart by the profile.
 
     Raises:
@@ -42,7 +42,7 @@ def register_of(index: int, subindex: int) -> int:
 
 
 class MlinkLayout:
-    """Registers by rule. Without a profile every object is taken to be reachable.
+    """Registers by rule. Without a profile every object is assumed to be reachable.
 
     Two neighbours are read in one request only where the profile allows blocks
     (``max_registers``), and only subindices of one object that fill one register each: the
@@ -126,7 +126,7 @@ class MlinkLayout:
 def ambiguous_objects(profile: Profile) -> dict[tuple[int, int], str]:
     """Objects that share a register with another one, and with which.
 
-    Subindex 0 of a record gives way to subindex 1, which the package reads there. Where two
+    Subindex 0 of a record is replaced by subindex 1, which the package reads there. Where two
     different objects meet, neither can be trusted.
     """
     owners: dict[int, list[tuple[int, int, DataType]]] = {}

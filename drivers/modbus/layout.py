@@ -32,7 +32,7 @@ class Layout(Protocol):
         """Registers of a value.
 
         Raises:
-            NotAllowed: this value cannot be reached over this link; the message says why.
+            NotAllowed: this value cannot be reached over this link; the message states the reason.
         """
 
     def limits(self, station: int) -> BlockLimits:

@@ -4,7 +4,7 @@ Blocking code; `drivers.modbus.link.RegisterLink` runs it on the bus's thread. N
 repeated here, because only the caller knows whether a repetition is harmless.
 
 After a failed question its answer may still come; see `drivers.modbus.late` for how it is kept
-from being taken for another one.
+from being mistaken for another one.
 """
 
 from __future__ import annotations
@@ -282,7 +282,7 @@ class Line:
             own_echo_due = self.echo and not self._echo_taken
             if not own_echo_due and _looks_damaged(buffer, query, answer):
                 left = min(left, self.settings.gap_s)
-            # What came while this computer stood still is taken all the same.
+            # What came while this computer stood still is accepted all the same.
             data = port.read(max(left, 0.0)) if left > -_BABBLE_S else b""
             if not data:
                 return answer, bytes(buffer)
@@ -367,7 +367,7 @@ class Line:
     def _outwait(
         self, port: Port, late: LateAnswers, query: Query, timeout_s: float | None
     ) -> None:
-        """Make sure that no late answer can be taken for the one to ``query``.
+        """Make sure that no late answer can be mistaken for the one to ``query``.
 
         Raises:
             LinkTimeout: no answer to the check, or none that proves anything; nothing was asked.

@@ -53,7 +53,7 @@ from profiles.schema import LinkKind, Profile
 
 T = TypeVar("T")
 
-#: A job on the bus's thread gives way to others after this time (and always after a failure).
+#: A job on the bus's thread yields to others after this time (and always after a failure).
 _TURN_S = 0.005
 #: A drive that says that it is busy is asked again after this time, then after twice as long.
 _BUSY_S = 0.05
@@ -331,7 +331,7 @@ class RegisterLink:
     def _changed(self, up: bool, text: str) -> None:
         self._line.ring.note(text)
         if self._loop is not None and not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._tell, up, text)
+            self._loop.call_soon_threadsafe(self._notify, up, text)
 
     # --- on the event loop ---
 
@@ -340,7 +340,7 @@ class RegisterLink:
             raise LinkLost("modbus.not-open", url=self.url)
         return await self._thread.run(job, urgent=urgent)
 
-    def _tell(self, up: bool, text: str) -> None:
+    def _notify(self, up: bool, text: str) -> None:
         if self._thread is None:
             return
         event = LinkEvent("back" if up else "lost", None, text)

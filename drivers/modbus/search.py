@@ -1,4 +1,4 @@
-"""Find out how a serial line is set, where nobody knows any more (or no manual prints it)."""
+"""Find out how a serial line is set, where that is no longer known (or no manual prints it)."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class SpeedGuard:
             self._watch.gap()
 
     def interrupt(self) -> None:
-        """The position was set anew, or samples are missing: nothing is compared across that."""
+        """The position was set again, or samples are missing: nothing is compared across that."""
         if self._watch is not None:
             self._watch.interrupt()
 

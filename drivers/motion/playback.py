@@ -45,14 +45,14 @@ LET_GO_S = 0.05
 """Until the power goes from an axis that its closed brake holds and that no torque drives."""
 
 _RESTLESS = 2
-"""Increments per cycle that encoder noise may make of an axis at rest."""
+"""Increments per cycle that encoder noise may make of an axis at standstill."""
 _ALIVE_STATES = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 _STANDARD = cia402.Dialect()
 _DISABLED = Halted(HaltCause.COMMANDED, note=text("cyclic.axis-being-disabled"))
 _PAUSED = Halted(HaltCause.COMMANDED, note=text("cyclic.motion-ended"))
 _RESTLESS_STILL = Halted(HaltCause.COMMANDED, note=text("cyclic.not-come-rest-ramp"))
 _STALE_CYCLES = 3
-"""Samples that may be older than what a mailbox reported before an axis was enabled anew."""
+"""Samples that may be older than what a mailbox reported before an axis was enabled again."""
 _SETTLES = 2
 """An axis that lags behind its ramp may take so many times its length longer to be held."""
 _REST_S, _GIVE_UP = 0.05, 30

@@ -1,4 +1,4 @@
-"""Answers of tools as plain values: each sentence beside its message, in any language.
+"""Answers of tools as plain values: each sentence next to its message, in any language.
 
 A message is a code and facts under ``<name>_message``, several are a list under
 ``<name>_messages``; their sentences stand under ``<name>`` (``<name>s`` of a list, where that is

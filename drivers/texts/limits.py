@@ -1,4 +1,4 @@
-"""Limits that an error names beside its value, as codes and facts: a bound, a number, a unit.
+"""Limits that an error names next to its value, as codes and facts: a bound, a number, a unit.
 
 Bare figures with a unit, choices and forms of addresses have no words, and are given as they are.
 """

@@ -50,7 +50,7 @@ _FUNCTIONS: dict[str, Any] = {"NUM": _num, "QUOTED": _quoted}
 
 
 def identifier(code: str) -> str:
-    """The identifier of a code in the catalogue's files, which know no dots."""
+    """The identifier of a code in the catalogue's files, which have no dots."""
     return code.replace(".", "_")
 
 

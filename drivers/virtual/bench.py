@@ -88,7 +88,7 @@ class BenchSpec(BaseModel):
 
 
 def load_bench(path: Path = STANDARD_BENCH) -> BenchSpec:
-    """Read a bench file (TOML, or JSON of the same shape); mechanics paths are beside it.
+    """Read a bench file (TOML, or JSON of the same shape); mechanics paths are next to it.
 
     Raises:
         NotAllowed: the file is missing or wrong; the message names the field.
@@ -98,8 +98,8 @@ def load_bench(path: Path = STANDARD_BENCH) -> BenchSpec:
         content = json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
         for axis in content.get("axis", []):
             if isinstance(axis.get("mechanics"), str):
-                beside = path.parent / axis["mechanics"]
-                axis["mechanics"] = tomllib.loads(beside.read_text("utf-8"))
+                mechanics_file = path.parent / axis["mechanics"]
+                axis["mechanics"] = tomllib.loads(mechanics_file.read_text("utf-8"))
         bench = BenchSpec.model_validate(content)
     except ValidationError as error:
         first = error.errors()[0]

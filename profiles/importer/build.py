@@ -36,7 +36,7 @@ _AXIS_STEP = 0x800
 #: Objects of CiA 402 without which a drive is none.
 _NEEDED = ("6040:00", "6041:00")
 
-#: Objects that tell that a mode exists (CiA 402-2 clause 8.5).
+#: Objects that show that a mode exists (CiA 402-2 clause 8.5).
 _MODE_OBJECTS: dict[int, tuple[str, ...]] = {
     1: ("607A:00", "6081:00"), 3: ("60FF:00", "6083:00"), 4: ("6071:00",), 6: ("6098:00",),
     8: ("607A:00",), 9: ("60FF:00",), 10: ("6071:00",),

@@ -22,7 +22,7 @@ from profiles.schema import DataType
 
 @dataclass(frozen=True, slots=True)
 class ConfiguredValue:
-    """One ``ParameterValue`` as it stands in the file; what is added to the node-ID is the sum.
+    """One ``ParameterValue`` as it is in the file; what is added to the node-ID is the sum.
 
     ``type`` is that of the file, None where it gives none.
     """

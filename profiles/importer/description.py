@@ -1,4 +1,4 @@
-"""A drive as a description file tells of it, whatever the file's format."""
+"""A drive as a description file reports it, whatever the file's format."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ class DictionaryEntry:
     read in Pre-Op, Safe-Op, Op; bits 3 to 5 write in the same states; bit 6 mappable as RxPDO,
     bit 7 as TxPDO. ``object_name`` is the name of the whole object where it has subindices,
     ``members`` how many subindices it has. ``unit`` is a number of CiA 303-2; values are bytes as
-    they travel. All of these are left out where the drive tells none.
+    they travel. All of these are left out where the drive reports none.
     """
 
     index: int

@@ -187,7 +187,7 @@ class _Entries:
             entry
             for subindex, member in sorted(members.items())
             # Subindex 0 only counts the others (CiA 301 clause 7.4.4), as a byte. One of another
-            # type is a value of its own: some makers put 603Fh:00 beside further subindices.
+            # type is a value of its own: some makers put 603Fh:00 next to further subindices.
             if subindex > 0 or len(members) == 1 or self._is_value(member, parent)
             for entry in self._entry(index, subindex, member, parent, title)
         ]

@@ -60,7 +60,7 @@ def _layout(
         value = entry.default_raw
         if entry.subindex == 0 or not isinstance(value, int) or value == 0:
             continue
-        # Where the file gives 0 beside entries, it is a template that nobody filled in.
+        # Where the file gives 0 next to entries, it is a template that nobody filled in.
         if count and entry.subindex > count:
             report.noted(place, f"entry {entry.subindex} is behind the {count:g} that are in use")
             continue

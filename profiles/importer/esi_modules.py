@@ -47,7 +47,7 @@ def parts_of(root: Element, device: Element) -> list[Part]:
 
 
 def module_list(root: Element, device: Element) -> InitCommand | None:
-    """The write of F030h that tells the device its modules; None where the file asks for none."""
+    """The write of F030h that gives the device its modules; None where the file asks for none."""
     slots = child(device, "Slots")
     if slots is None or not flag_of(slots, "DownloadModuleIdentList"):
         return None
@@ -79,7 +79,7 @@ def dictionaries_of(element: Element) -> list[Element]:
 
 
 def _delivered(slot: Element, number: int) -> int | None:
-    """The module that stands in a slot by default; in the first slot the first that may."""
+    """The module that is in a slot by default; in the first slot the first that may."""
     idents = children(slot, "ModuleIdent")
     marked = [each for each in idents if flag_of(each, "Default")]
     needed = number == 0 or bool(_number(attribute_of(slot, "MinInstances")))

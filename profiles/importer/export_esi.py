@@ -36,7 +36,7 @@ def export_esi(profile: Profile) -> bytes:
     """
     root = Element("EtherCATInfo", Version="1.0")
     vendor = SubElement(root, "Vendor")
-    # A number that nobody knows is left out: a wrong one would fit another drive.
+    # A number that is unknown is left out: a wrong one would fit another drive.
     if profile.identity.vendor_id is not None:
         _text(vendor, "Id", _hex(profile.identity.vendor_id, 8))
     _text(vendor, "Name", profile.identity.maker)

@@ -1,6 +1,6 @@
 """Imports in a process of their own: ``python -m profiles.importer.process``.
 
-A maker's file may take seconds, and nobody knows what is in it. Here it holds up no motion, and
+A maker's file may take seconds, and it is not known what is in it. Here it holds up no motion, and
 whoever started it can end it. One task comes pickled on the standard input, from our own parent
 only; one JSON object goes to the standard output: ``{"ok": …}`` or ``{"error": "…"}``.
 """

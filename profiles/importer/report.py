@@ -10,7 +10,7 @@ _KEPT = 500
 
 
 class ImportFailed(Exception):
-    """Nothing usable is in the file; the message says why and what to do."""
+    """Nothing usable is in the file; the message states why and what to do."""
 
 
 @dataclass(frozen=True, slots=True)

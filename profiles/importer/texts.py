@@ -65,7 +65,7 @@ def _python_name(encoding: str) -> str:
 def decode_xml(data: bytes, name: str, report: ImportReport) -> str:
     """Text of an XML file without its declaration, so that the parser gets plain Unicode.
 
-    The parser itself knows no multi-byte encodings such as GB2312.
+    The parser itself has no multi-byte encodings such as GB2312.
     """
     declared = _DECLARED.match(data[:400])
     if declared is None or data.startswith(tuple(mark for mark, _ in _MARKS)):

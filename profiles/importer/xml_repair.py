@@ -1,4 +1,4 @@
-"""What makers' tools write that no XML parser takes, taken out of an ESI file. Pure."""
+"""What makers' tools write that no XML parser takes, removed from an ESI file. Pure."""
 
 from __future__ import annotations
 

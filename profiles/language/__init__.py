@@ -1,1 +1,1 @@
-"""Texts of the profiles in other languages, as overlays beside each profile."""
+"""Texts of the profiles in other languages, as overlays next to each profile."""

@@ -25,6 +25,6 @@ def with_standard_help(profile: Profile) -> Profile:
         p.model_copy(update={"help": known[p.key]}) if not p.help and p.key in known else p
         for p in profile.parameters
     )
-    # Built anew, not copied: a copy would keep the tables that the old one has worked out.
+    # Built again, not copied: a copy would keep the tables that the old one has worked out.
     fields = {name: getattr(profile, name) for name in Profile.model_fields}
     return Profile.model_construct(profile.model_fields_set, **{**fields, "parameters": parameters})

@@ -49,7 +49,7 @@ def standard_rule(key: str) -> MotionRule | None:
 def classified(profile: Profile) -> Profile:
     """The profile with the motion class of every writable object."""
     parameters = tuple(_classified(profile, p) for p in profile.parameters)
-    # Built anew, not copied: a copy would keep the tables that the old one has worked out.
+    # Built again, not copied: a copy would keep the tables that the old one has worked out.
     fields = {name: getattr(profile, name) for name in Profile.model_fields}
     return Profile.model_construct(profile.model_fields_set, **{**fields, "parameters": parameters})
 

@@ -1,6 +1,6 @@
 """Motion classes that a person of a station gives to objects of an imported profile.
 
-They are kept as rules in ``motion.yaml`` beside the imported ``profile.yaml``. The loader joins
+They are kept as rules in ``motion.yaml`` next to the imported ``profile.yaml``. The loader joins
 files in name order and the first rule counts, so a person's word stands before everything else.
 Profiles that come with servodeck have their classes from a manual, standard objects from the
 standard: those nobody changes here.
@@ -23,7 +23,7 @@ _MAX_REASON = 500
 
 
 class CannotClassify(Exception):
-    """The class of this object is not a person's to give; the message says why."""
+    """The class of this object is not a person's to give; the message states the reason."""
 
 
 def why_fixed(profile: Profile, parameter: Parameter) -> str:

@@ -1,8 +1,8 @@
 """Trouble on an EtherCAT segment, as a user of the interface sees it.
 
-Each fault: reported in words, the server answers meanwhile, the axis stands, and all is well again
-without a restart once the cause is gone. Times of the drives follow the frames, so a busy test
-machine changes nothing but how long this takes.
+Each fault: reported as text, the server answers meanwhile, the axis is at standstill, and all is
+well again without a restart once the cause is gone. Times of the drives follow the frames, so a
+busy test machine changes nothing but how long this takes.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Segment:
         self.station.http.delete("/buses/cyclic", params={"url": URL})
 
     def exchange(self) -> Any:
-        """What the interface tells of the exchange."""
+        """What the interface reports of the exchange."""
         return self.station.ok(self.station.http.get("/buses"))[0]["cyclic"]
 
     def view(self) -> Any:
@@ -165,7 +165,7 @@ def segment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Segment]:
 
 @pytest.fixture
 def running(segment: Segment) -> Iterator[Segment]:
-    """Process data are exchanged; afterwards all trouble is taken back.
+    """Process data are exchanged; afterwards all trouble is undone.
 
     The server answers at once all the while, whatever the trouble is.
     """
@@ -205,7 +205,7 @@ def turns_or_ended(segment: Segment, page: Live) -> Any:
 
 
 def reason(ended: Any) -> str:
-    """Why a jog ended, in words."""
+    """Why a jog ended, as text."""
     return f"{ended['reason']} {(ended['problem'] or {}).get('detail', '')}"
 
 

@@ -49,7 +49,7 @@ def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
 
 @pytest.fixture
 def in_real_time(tmp_path: Path) -> Iterator[Station]:
-    """Its own clock, which alone can tell how late a cycle was."""
+    """Its own clock, which alone can show how late a cycle was."""
     with started(tmp_path, steady=False) as running:
         yield running
 

@@ -53,7 +53,7 @@ def raw(station: Station, family: str, key: str) -> Any:
 
 
 def put(station: Station, family: str, key: str, value: int) -> None:
-    """Through the door that the parameter's motion class has."""
+    """By the route that the parameter's motion class has."""
     moves = load_profile(family).by_key[key].motion == "energises"
     door = "motion-settings" if moves else "parameters"
     station.ok(station.http.put(f"/drives/{family}/{door}/{key}", json={"raw": value}))
@@ -140,7 +140,7 @@ def test_m6l_forces_outputs_only_while_process_data_run(station: Station) -> Non
 
 
 def test_m6l_switches_a_virtual_input_on(station: Station) -> None:
-    """P03.14 switches DI1 to DI9 on beside their pins (000:3276)."""
+    """P03.14 switches DI1 to DI9 on next to their pins (000:3276)."""
     path = "/drives/m6l/io/forcing/simulation"
     station.ok(station.http.post(path, json={"confirmed": True}))
     assert terminals(station, "m6l")["DI9"]["on"] is False

@@ -127,7 +127,7 @@ def test_server_finds_its_drives_again_after_a_kill(drives: DemoBench, tmp_path:
 def test_what_a_killed_server_left_in_the_drive_is_put_back(
     drives: DemoBench, tmp_path: Path
 ) -> None:
-    """The ramps of its jog: by itself once the axis stands free, and the rest on one press."""
+    """The ramps of its jog: by itself once the axis stands still, the rest on one press."""
     url = drives.addresses["mlink://virtual0"]
     before = asyncio.run(number(url, 0x6083, "UINT32"))
     server = ServerProcess(tmp_path / "state")

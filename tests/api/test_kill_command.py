@@ -1,4 +1,4 @@
-"""Commands killed in a measurement (SIGKILL): what they borrowed is known and restored later."""
+"""Commands killed in a measurement (SIGKILL): what they changed is known and restored later."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ drive = "{drive}"
 on = "{url}"
 station = 1
 """
-#: Mode of operation, quick-stop deceleration and the profile ramps: what a sweep borrows.
+#: Mode of operation, quick-stop deceleration and the profile ramps: what a sweep changes.
 MODE, QUICK_STOP, RAMP = "6060:00", "6085:00", "6083:00"
 
 
@@ -72,13 +72,13 @@ class Bench:
             "sweep", self.url, "--station", "1", "--out", str(self.folder / "never.json"), *more
         )
 
-        def borrowed() -> bool:
+        def changed() -> bool:
             if sweep.poll() is not None:
                 raise AssertionError(sweep.communicate()[1])
             return bool(self.noted().get(key, {}).get("left")) and MODE in self.noted()
 
         try:
-            until(borrowed, HANG_S, "the sweep changes what it borrows")
+            until(changed, HANG_S, "the sweep changes what it changes")
         finally:
             os.kill(sweep.pid, signal.SIGKILL)
             sweep.communicate()
@@ -106,20 +106,21 @@ def canopen(tmp_path: Path) -> Iterator[Bench]:
 
 def test_a_sweep_killed_on_ethercat_is_reported_and_restored_by_a_command(ethercat: Bench) -> None:
     before, quiet = ethercat.held(MODE, QUICK_STOP)
-    assert "borrowed" not in quiet
+    assert "temporary values" not in quiet
     ethercat.sweep_killed(QUICK_STOP)
     noted = ethercat.noted()
     assert {key: noted[key]["raw"] for key in before} == before, "noted before the first write"
     left, reported = ethercat.held(MODE, QUICK_STOP)
     assert left[QUICK_STOP] != before[QUICK_STOP]
     assert "`servodeck sweep` was cut off" in reported
+    assert "temporary values" in reported
     assert f"{QUICK_STOP} (was {before[QUICK_STOP]})" in reported
     assert "servodeck params restore ethercat://ec0m --station 1" in reported
     _, restored = ethercat.run("params", "restore", ethercat.url, "--station", "1")
     assert f"restored: {QUICK_STOP} = {before[QUICK_STOP]}" in restored
     after, quiet = ethercat.held(MODE, QUICK_STOP)
     assert after == before
-    assert "borrowed" not in quiet
+    assert "temporary values" not in quiet
     assert not list((ethercat.state / "restore").glob("*.json"))
 
 
@@ -153,4 +154,4 @@ def test_a_sweep_killed_on_canopen_is_restored_by_the_next_server(canopen: Bench
         server.end()
     after, quiet = canopen.held(MODE, RAMP)
     assert after == before
-    assert "borrowed" not in quiet
+    assert "temporary values" not in quiet

@@ -26,7 +26,7 @@ def test_read_all(station: Station, x: str) -> None:
     result = station.done(station.http.post(f"/drives/{x}/jobs/read_all", json={}))
     rows = station.ok(station.http.get(f"/drives/{x}/parameters"))
     readable = [row for row in rows if row["access"] != "wo"]
-    # MLink has one register for subindex 0 and 1: nobody can tell them apart there.
+    # MLink has one register for subindex 0 and 1: nobody can distinguish them there.
     beyond = [row for row in readable if not row["reachable"]]
     assert {"2005:00", "1A02:01", "6502:00"} <= {row["key"] for row in beyond}
     assert all("MLink cannot distinguish" in row["unreachable_why"] for row in beyond)

@@ -91,7 +91,7 @@ def test_changes_stand_in_the_report(station: Station, drive: str) -> None:
     assert "no loop was measured afterwards" in page
     assert "not saved in its memory" in page
 
-    # Taken back, nothing of it is left to tell.
+    # Undone, nothing of it is left to show.
     station.ok(station.http.post(f"/drives/{drive}/tune/undo", json=undo))
     made = station.ok(station.http.post(f"/drives/{drive}/reports", json=body))
     assert "Tuning changed no setting." in station.http.get(f"/reports/{made['file']}").text

@@ -1,4 +1,4 @@
-"""The 3D scene through our own origin: viser's messages tell where the parts stand."""
+"""The 3D scene through our own origin: viser's messages show where the parts stand."""
 
 from __future__ import annotations
 

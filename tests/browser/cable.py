@@ -34,7 +34,7 @@ class Cable:
                 _shut(end)
 
     def stall(self) -> None:
-        """Carry nothing in either direction, and tell nobody: a pulled cable, bad Wi-Fi."""
+        """Carry nothing in either direction, and report to nobody: a pulled cable, bad Wi-Fi."""
         self._whole.clear()
 
     def mend(self) -> None:

@@ -26,8 +26,8 @@ FLAGS = [
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
 ]  # fmt: skip
-#: For what must appear: the tests run beside others, on a computer that has no time to spare. What
-#: must be reported soon is waited for with `driving.TOLD_MS`.
+#: For what must appear: the tests run next to others, on a computer that has no time to spare. What
+#: must be reported soon is waited for with `driving.SHOWN_MS`.
 PATIENCE_MS = 15_000
 #: A wide and a narrow screen with a finger, as in the field.
 LAPTOP = {"viewport": {"width": 1280, "height": 800}}

@@ -14,7 +14,7 @@ from tests.support.station import HANG_S, Station, until
 MOVING_RPM = 20.0
 #: Renewal time-out 0.2 s, braking 0.1 s at 60 rpm and 600 rpm/s, and the time to ask.
 STOP_S = 2.0
-#: Within this time a page tells what people must know: that it lost the server, that somebody
+#: Within this time a page shows what people must know: that it lost the server, that somebody
 #: pressed STOP and what it reached, that an axis has a fault.
 REPORTED_MS = 5_000
 #: Why a jog ends, rightly, when a computer has no time for the page for a tenth of a second.
@@ -104,7 +104,7 @@ class Bench:
         return [job for job in jobs if job["kind"] == "jog"]
 
     def wait_standing(self) -> None:
-        """The axis stands, its job has ended, and it stays where it is."""
+        """The axis is at standstill, its job has ended, and it stays where it is."""
         within(STOP_S, lambda: not self.moves(), "the axis stands")
         until(lambda: self.state()["moving_job"] is None, HANG_S, "the job has ended")
         before = self.state()["position"]

@@ -79,7 +79,7 @@ def spectrum(page: Page, station: Station, axis: str) -> None:
     job = generate(station, axis, duration_s=8, **signal)
 
     def whole() -> bool:
-        """One line and next to nothing beside it: neither a gap nor a fade is in sight."""
+        """One line and next to nothing next to it: neither a gap nor a fade is in sight."""
         found = peaks(page)
         return (
             len(found) > 1

@@ -113,7 +113,7 @@ def _panels(page: Page, drive: str, folder: Path, colours: int) -> None:
 
 
 def _automatic(page: Page, station: Station, drive: str, folder: Path, colours: int) -> None:
-    """All steps in one job, and what its panel then tells."""
+    """All steps in one job, and what its panel then shows."""
     open_axis(page, drive, "tune")
     tuning.open_step(page, "automatic")
     tuning.run_job(page, station, drive, "Start tuning")

@@ -18,7 +18,7 @@ AXIS_PAGES = (
 BENCH_PAGES = ("connect", "scope", "rerun", "scene", "files", "audit", "people")
 #: Three words in a row with a small letter each are a phrase; names and abbreviations are not.
 ENGLISH = re.compile(r"[A-Za-z]*[a-z]{2,}(?:[ ,]+[A-Za-z]*[a-z]{2,}){2,}")
-#: States of CiA 402-2 stand in English beside the Chinese name, as the manuals print them.
+#: States of CiA 402-2 stand in English next to the Chinese name, as the manuals print them.
 STATES = re.compile("|".join(re.escape(state.value) for state in State))
 #: Visible texts and labels, except what states its language as English (names in the original).
 VISIBLE = """() => {

@@ -170,7 +170,7 @@ def test_a_measurement_is_shared_and_copied_by_the_buttons(
     for page in _open(browser, one.url, **LAPTOP):
         open_files(page)
         page.get_by_role("button", name=f"Copy {NAME} into the shared library").click()
-        # The copy is an entry of its own, beside the file of this station.
+        # The copy is an entry of its own, next to the file of this station.
         expect(page.get_by_role("article").filter(has_text=NAME)).to_have_count(2)
         expect(page.get_by_role("alert")).to_have_count(0)
     for page in _open(browser, two.url, **LAPTOP):

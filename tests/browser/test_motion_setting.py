@@ -1,4 +1,4 @@
-"""Objects that can energise the motor: no field in the table, and the door that sets them."""
+"""Objects that can energise the motor: no field in the table, and where they are set."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_a_setting_that_can_move_needs_reason_and_consent(laptop: Page, bench: B
         expect(term).to_be_visible()
         expect(term.locator("xpath=following-sibling::dd[1]")).to_contain_text(fact)
     write = dialog.get_by_role("button", name="Write this setting")
-    write.click(force=True)  # dim, and a press says why
+    write.click(force=True)  # dim, and a press states the reason
     expect(dialog).to_contain_text("Give a reason.")
     dialog.get_by_label("Reason (log and audit)").fill("test of the supply")
     write.click(force=True)

@@ -172,7 +172,7 @@ def test_a_viewer_moves_nothing_and_can_stop(opened: Open, bench: Bench) -> None
 # --- markup ---------------------------------------------------------------------------
 
 MARKUP = "<img src=x onerror=alert(1)>"
-#: What is alive if a text was taken for markup: elements that no page of ours has.
+#: What is alive if a text was mistaken for markup: elements that no page of ours has.
 ALIVE = """() => [...document.querySelectorAll('img[src="x"], svg[onload], a[href^="javascript"]')]
                  .map((each) => each.outerHTML)"""
 #: Pages, and whether one of the texts is to be read there.
@@ -394,7 +394,7 @@ def test_the_end_of_the_visit_stops_the_guest_at_once(opened: Open, bench: Bench
     end_visit(anna)
     within(1, lambda: not bench.moves(), "the axis stands")
     expect(guest.get_by_role("heading", name="Log in")).to_be_visible(timeout=3_000)
-    # The page loads anew just now; its cookie is asked, not the page.
+    # The page loads again just now; its cookie is asked, not the page.
     again = guest.context.request.get(f"{bench.station.url}/api/v1/drives")
     assert again.status == 401
     guest.mouse.up()

@@ -1,4 +1,4 @@
-"""A press has an effect, or the page says why not, whatever comes and goes meanwhile."""
+"""A press has an effect, or the page states why not, whatever comes and goes meanwhile."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ def test_a_measurement_is_explained(laptop: Page, axis: str) -> None:
     page.get_by_text("What the shape of the curve shows").click()
     expect(page.get_by_text("tighten the coupling, then put a notch")).to_be_visible()
 
-    # Evaluated anew from the raw signals, with what it was taken with.
+    # Evaluated again from the raw signals, with what it was taken with.
     expect(page.get_by_text("the same result as when it was measured")).to_be_visible()
     page.get_by_text("How it was measured").click()
     expect(page.locator("dl.facts .pair", has_text="torque_percent")).to_contain_text("80")
@@ -141,7 +141,7 @@ def test_a_notch_is_dragged_and_predicted_but_not_written(
     center.fill("250")
     expect(notch).to_have_attribute("aria-valuenow", "250")
 
-    # Four views of the loop that would follow, beside the loop as it is.
+    # Four views of the loop that would follow, compared with the loop as it is.
     for view, name in (("Open loop", "Open loop"), ("Sensitivity", "Sensitivity"),
                        ("Step", "Step"), ("Closed loop", "Closed loop")):  # fmt: skip
         page.get_by_text(view, exact=True).last.click()

@@ -45,7 +45,7 @@ def test_a_small_move_teaches_the_scales(laptop: Page, station: Station) -> None
         card.get_by_role("button", name="Move by increments").click()
         ended = card.get_by_text(f"Small move by {increments} increments: N: done")
         expect(ended).to_be_visible(timeout=ENDED_MS)
-        # How far it went by the drive's own count stands beside what the person confirms.
+        # How far it went by the drive's own count is shown next to what the person confirms.
         until(lambda wanted=increments: abs(moved(card) - wanted) < 20, what=f"{increments} moved")
     card.get_by_label("The shaft turned by").fill("0.5")
     card.get_by_role("button", name="Confirm this turn").click()

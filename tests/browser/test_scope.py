@@ -316,7 +316,7 @@ def test_a_text_that_is_no_expression_is_said_to_be_none(page: Page) -> None:
 
 
 class Fingers:
-    """Touches of a page, as its screen tells of them."""
+    """Touches of a page, as its screen reports them."""
 
     def __init__(self, page: Page) -> None:
         self._page = page
@@ -335,7 +335,7 @@ class Fingers:
                 "touchMove",
                 *((a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])) for a, b in ways),
             )
-        # The browser tells of places between two that it was reported, by their times.
+        # The browser reports places between two that it was reported, by their times.
         self._page.evaluate("() => new Promise(requestAnimationFrame)")
         self.touch("touchMove", *(end for _, end in ways))
         self.touch("touchEnd")
@@ -357,7 +357,7 @@ def stretch_in_sight(page: Page) -> tuple[float, float]:
 
 
 def two_fingers_zoom(page: Page) -> None:
-    """Beside each other they zoom and move time, one above the other the scales."""
+    """Next to each other they zoom and move time, one above the other the scales."""
     page.get_by_label("Time shown").select_option("5")
     page.get_by_role("button", name="Pause").click()
     plot = page.locator(".time-plot .u-over")

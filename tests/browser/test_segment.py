@@ -133,7 +133,7 @@ def test_a_slave_chosen_by_key_tells_about_itself(laptop: Page, axis: Bench) -> 
 
 
 def test_an_exchange_that_broke_off_comes_back_and_says_so(laptop: Page, axis: Bench) -> None:
-    """The host process is replaced by itself; what is shown meanwhile is in words."""
+    """The host process is replaced by itself; what is shown meanwhile is as text."""
     page, segment = laptop, axis.station.drives.segments[URL]
     connect(page)
     start(page)

@@ -64,7 +64,7 @@ def gains_of(station: Station, axis: str) -> tuple[float, float]:
 
 
 def expect_step(page: Page, name: str, reported: str) -> None:
-    """What the path tells of a step: done, next or open."""
+    """What the path reports of a step: done, next or open."""
     path = page.get_by_role("navigation", name="Steps of commissioning")
     step = path.get_by_role("link", name=re.compile(name)).locator("small")
     expect(step).to_have_text(re.compile(f"^(?:{reported})$"))
@@ -243,7 +243,7 @@ def test_autotune_is_cancelled_while_the_axis_moves(
     until(lambda: station.state(axis)["state"] == "Operation enabled", 60, "the axis is enabled")
     page.locator(".job").get_by_role("button", name="Cancel").click()
     expect(page.get_by_role("status").filter(has_text="cancelled")).to_be_visible()
-    # The axis stands without torque, and everything is as it was.
+    # The axis is at standstill without torque, and everything is as it was.
     until(lambda: station.state(axis)["moving_job"] is None, HANG_S, "the axis is free")
     assert station.state(axis)["state"] != "Operation enabled"
     assert abs(station.state(axis)["velocity"]) < MOVING_RPM

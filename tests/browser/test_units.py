@@ -26,7 +26,7 @@ def test_a_screw_becomes_a_gear_and_is_taken_back(laptop: Page, bench: Bench) ->
     dialog.get_by_role("button", name="Write the gear").click()
     # 10 mm of 0.001 mm.
     until(lambda: bench.raw("6092:01") == 10000, what="the feed is written")
-    # Overview shows travel beside revolutions.
+    # Overview shows travel next to revolutions.
     open_axis(page, bench.drive, "overview")
     expect(page.get_by_text("Travel", exact=True)).to_be_visible()
     _move_in_millimetres(page, bench)

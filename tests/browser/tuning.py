@@ -110,7 +110,7 @@ def run_job(
 ) -> None:
     """Press a button that starts a job on the axis, and wait for the job's good end.
 
-    ``state`` makes the statements that each run asks for anew.
+    ``state`` makes the statements that each run asks for again.
     """
     reported = ""
     for _ in range(_TRIES):

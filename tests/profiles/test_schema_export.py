@@ -20,7 +20,7 @@ PARAMETER_FIELDS = {
 
 def test_schema_file_is_up_to_date() -> None:
     assert SCHEMA_FILE.read_text("utf-8") == json_schema(), (
-        "write it anew: python -c 'from profiles.export import *; "
+        "write it again: python -c 'from profiles.export import *; "
         "SCHEMA_FILE.write_text(json_schema())'"
     )
 

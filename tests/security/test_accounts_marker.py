@@ -15,7 +15,7 @@ import httpx
 import pytest
 
 from backend.commands.serve import Serving, accounts_needed
-from backend.people.login.marker import FILE, AccountsGone, AccountsMarker
+from backend.people.login.marker import FILE, AccountsMarker, AccountsMissing
 from backend.people.rights import Role
 from backend.people.station import People
 from backend.store.database import DatabaseFailed
@@ -77,12 +77,12 @@ async def test_without_its_accounts_it_does_not_start(
     serving = Serving(accounts=accounts)
     assert await accounts_needed(station, serving) is True
     loss(station)
-    with pytest.raises(AccountsGone, match="emptied, lost or replaced") as refused:
+    with pytest.raises(AccountsMissing, match="emptied, lost or replaced") as refused:
         await accounts_needed(station, serving)
     remedy = refused.value.remedy or ""
     assert "servodeck restore" in remedy
     assert "servodeck people add NAME --role administrator" in remedy
-    with opened(station) as people, pytest.raises(AccountsGone):
+    with opened(station) as people, pytest.raises(AccountsMissing):
         await people.open()
 
 
@@ -90,7 +90,7 @@ async def test_without_its_accounts_it_does_not_start(
 async def test_a_damaged_note_is_a_note(station: Path, damage: bytes) -> None:
     removed(station)
     (station / FILE).write_bytes(damage)
-    with pytest.raises(AccountsGone):
+    with pytest.raises(AccountsMissing):
         await accounts_needed(station, Serving())
 
 
@@ -116,7 +116,7 @@ async def test_an_account_that_is_none_of_an_administrator_is_no_recovery(statio
         await people.open(recovering=True)
         await people.accounts.add("Vera", PASSWORD, Role.VIEWER)
         await people.mark()
-    with pytest.raises(AccountsGone):
+    with pytest.raises(AccountsMissing):
         await accounts_needed(station, Serving())
 
 
@@ -127,7 +127,7 @@ async def test_a_station_from_before_gets_its_note(station: Path) -> None:
     assert content["since"]
     assert (station / FILE).stat().st_mode & 0o077 == 0, "it holds a key"
     removed(station)
-    with pytest.raises(AccountsGone):
+    with pytest.raises(AccountsMissing):
         await accounts_needed(station, Serving())
 
 

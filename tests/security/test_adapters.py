@@ -116,7 +116,7 @@ def test_no_url_of_pyserial_is_an_adapter(
 def test_the_link_itself_opens_none_either(
     terminal: str, listener: Listener, tmp_path: Path, handler: str
 ) -> None:
-    """Whoever made the settings: the last door stands where the port is opened."""
+    """Whoever made the settings: the last check is where the port is opened."""
     place = handler.format(pty=terminal, file=tmp_path / "made", port=listener.port)
     with pytest.raises(DriveError):
         open_bus(CanUrl("canopen://slcan/x", "slcan", place, 500_000))

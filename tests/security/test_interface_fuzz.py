@@ -1,4 +1,4 @@
-"""Requests that the OpenAPI document allows, made up: no 500, and no answer it does not tell of."""
+"""Random requests that the OpenAPI document allows: no 500, and only answers it describes."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@ as everybody who may write parameters; also of a CiA 402 drive that nothing else
 of drives by a maker's EDS and ESI file. (On real wires: `test_no_parameter_moves_on_wires`.)
 
 The drives are the virtual ones, with their inputs wired: what the status word says is not asked,
-but where the shaft stands. A refusal must say why, and where the thing can be done instead.
+but where the shaft is. A refusal must say why, and where the thing can be done instead.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ PLACES: tuple[tuple[str, LinkKind], ...] = (
     (EDS_DRIVE, "canopen"),
     (ESI_DRIVE, "ethercat"),
 )
-#: A shaft that moved by more than this was moved. Physics at rest is still to far less.
+#: A shaft that moved by more than this was moved. Physics at standstill is still to far less.
 STILL_RAD = 1e-3
 #: What the drive is given to react in, of its own time.
 REACTION_S = 0.25
@@ -112,7 +112,7 @@ class Scene:
         self.server.call(inject)
 
     def require_still(self, after: str) -> None:
-        """The shaft stands where it stood, the motor has no power and nothing enabled it."""
+        """The shaft is where it stood, the motor has no power and nothing enabled it."""
 
         def look() -> tuple[float, bool]:
             self.link.pass_s(REACTION_S)

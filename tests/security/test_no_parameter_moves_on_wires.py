@@ -136,7 +136,7 @@ class Wires:
         return float(self._ask(place, "shaft"))
 
     def require_still(self, place: Place, after: str) -> None:
-        """The shaft stands where it stood, and nothing enabled the motor."""
+        """The shaft is where it stood, and nothing enabled the motor."""
         reported = str(self._ask(place, "read", index=0x6041, subindex=0))
         word, own = int.from_bytes(bytes.fromhex(reported), "little"), place.family == "ds_c"
         assert cia402.decode_state(word, echoes_control=own) is not State.OPERATION_ENABLED, after

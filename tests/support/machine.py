@@ -31,7 +31,7 @@ class Stopwatch:
     def busy(self) -> bool:
         """Whether the machine was too busy for what happened to mean anything.
 
-        Where the kernel does not tell, it counts as busy.
+        Where the kernel does not report, it counts as busy.
         """
         waited_us, before_us = _waited_us(), self._waited_us
         if waited_us is None or before_us is None:
@@ -88,7 +88,7 @@ class OwnTime:
 
 
 def within(limit_s: float, condition: Callable[[], object], what: str = "") -> Any:
-    """`until`, where the product promises it after ``limit_s`` of `OwnTime` at most."""
+    """`until`, where the product has to do it within ``limit_s`` of `OwnTime` at most."""
     with OwnTime(with_children=True) as took:
         value = until(condition, what=what)
     assert took.s < limit_s, f"it took {took.s:.2f} s: {what}"
@@ -129,7 +129,7 @@ class ApiWatch:
 
 
 def _runnable_ns(process: str) -> dict[str, int]:
-    """For how long each thread has waited for a processor; none where the kernel does not tell."""
+    """For how long each thread has waited for a processor; none if the kernel reports none."""
     reported = {}
     for thread in Path(f"/proc/{process}/task").glob("*/schedstat"):
         # A thread may end while it is looked at.

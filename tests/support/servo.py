@@ -112,7 +112,7 @@ class Servo(MemoryLink):
 
 
 async def bench_with(servo: Servo, folder: Path) -> tuple[Bench, ConnectedDrive]:
-    """A bench with this servo at station 1, its monitor at rest."""
+    """A bench with this servo at station 1, its monitor at standstill."""
     bench = Bench(folder, {URL: lambda: servo})
     connected = await bench.connect(URL, 1, "mms7", "X")
     await connected.monitor.close()

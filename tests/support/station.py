@@ -24,7 +24,7 @@ from backend.people.station import People
 from backend.station.bench import Bench
 from backend.station.demo import DemoBench
 
-#: What takes longer hangs. It is no check of the product: where that promises a time, a test says
+#: What takes longer hangs. It is no check of the product: where that guarantees a time, a test says
 #: so with a time of its own.
 HANG_S = 60.0
 
@@ -137,10 +137,10 @@ class Station:
         return str(drive["id"])
 
     def remove(self, *drives: str) -> None:
-        """Whatever a test left them doing: stopped, awaited, and taken out.
+        """Whatever a test left them doing: stopped, awaited, and removed.
 
-        An axis whose cable was pulled is put back in order once it answers again. That job is not
-        stopped by anybody, and the drive stays until it has ended.
+        An axis whose cable was pulled is set up again in order once it answers again. That job is
+        not stopped by anybody, and the drive stays until it has ended.
         """
         self.http.post("/stop", json={})
         for job in self.ok(self.http.get("/jobs")):

@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 FloatArray = npt.NDArray[np.float64]
-#: Rise of the end winding at rated torque, in K (class F beside 40 °C, with a reserve).
+#: Rise of the end winding at rated torque, in K (class F next to 40 °C, with a reserve).
 RATED_RISE_K = 105.0
 _COPPER = 0.00393
 

@@ -1,4 +1,4 @@
-"""Answers of tools carry messages beside their sentences; older ones the sentences alone."""
+"""Answers of tools carry messages next to their sentences; older ones the sentences alone."""
 
 from __future__ import annotations
 

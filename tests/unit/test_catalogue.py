@@ -134,7 +134,7 @@ def test_every_code_has_words() -> None:
 
 
 def _calls() -> Iterator[tuple[str, ast.Call, str]]:
-    """Every call that begins with a code: where it stands, the call, the code."""
+    """Every call that begins with a code: where it is, the call, the code."""
     for source in _sources():
         for node in source.calls:
             for each in node.args:

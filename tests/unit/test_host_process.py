@@ -88,7 +88,7 @@ async def test_a_process_that_cannot_be_started_is_a_lost_link_and_leaves_nothin
 async def test_a_process_that_is_slow_to_start_is_waited_for_and_one_that_hangs_is_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A restart that gave up while the child was still loading would begin anew for ever."""
+    """A restart that gave up while the child was still loading would begin again for ever."""
     process = host()
     sockets: list[socket.socket] = []
 

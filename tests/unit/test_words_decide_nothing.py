@@ -72,7 +72,7 @@ ALLOWED: dict[tuple[str, str], str] = {
     (
         "backend/recording/library.py",
         "fitting = [s for s in found if all(word in s.words() for word in words)]",
-    ): "a person searches recordings by the words in their descriptions",
+    ): "a person searches recordings by words of their descriptions",
     (
         "backend/audit/trail.py",
         "for word in self.words.split():",

@@ -50,7 +50,7 @@ def outcome(**parts: object) -> Outcome:
     values = {
         "family": "m6l", "motion": "jog", "trouble": "none", "verdict": "stopped",
         "answer_s": 0.3, "stood_s": 0.1, "degrees": 9.0, "shaft_rpm_at_answer": 0.0,
-        "steps": (), "speed_said": 0.0,
+        "steps": (), "speed_reported": 0.0,
     }  # fmt: skip
     return Outcome(**{**values, **parts})  # type: ignore[arg-type]
 

@@ -33,7 +33,7 @@ _SPEED_SHARE, _SPEED_POWER, _STATED = (0.0, 0.35), (1.0, 2.0), 0.15
 _SATURATION = (0.0, 0.07)
 #: Copper has 0.39 %/K at 20 °C: of the hot resistance, per rated rise of 60 to 125 K.
 _COPPER = (0.0, 0.35)
-#: A catalogue's time constant is that of a motor on some flange; this far it is believed.
+#: A catalogue's time constant is that of a motor on some flange; this far it is trusted.
 _TIME_CONSTANT = (0.75, 1.3)
 #: Searched for a moment up to this many time constants.
 _LONGEST = 12.0

@@ -45,7 +45,7 @@ class Candidate:
     """One row of the table.
 
     ``bandwidth_hz`` (-3 dB), ``overshoot_percent`` and ``settling_s`` (2 %) are of the speed
-    loop; ``nominal`` margins are predicted for the axis as measured, ``promised`` is the worst
+    loop; ``nominal`` margins are predicted for the axis as measured, ``guaranteed`` is the worst
     over all shifts less what a measurement may be off; ``phase_cost_deg`` is what the notches
     take at the crossover. ``filters`` are the corners that the design counts on.
     """
@@ -55,7 +55,7 @@ class Candidate:
     bandwidth_hz: float | None
     position_bandwidth_hz: float | None
     nominal: Margins
-    promised: Goals
+    guaranteed: Goals
     phase_cost_deg: float
     overshoot_percent: float
     settling_s: float | None
@@ -125,7 +125,7 @@ def _candidate(search: LoopSearch, found: Found, marks: tuple[Mark, ...]) -> Can
         TURN * hz * search.inertia_kgm2, hz / INTEGRAL_RATIO, _position_gain(f, loops, hz), hz
     )
     row = described(
-        f, plant.response(), filters, gains, worst_of(loops).promised, notches=shape.notches,
+        f, plant.response(), filters, gains, worst_of(loops).guaranteed, notches=shape.notches,
         filters=search.filters[shape.choice],
     )  # fmt: skip
     cost = _phase_cost(search, found, filters, row.nominal.crossover_hz)
@@ -133,7 +133,7 @@ def _candidate(search: LoopSearch, found: Found, marks: tuple[Mark, ...]) -> Can
 
 
 def described(
-    f: FloatArray, plant: ComplexArray, fixed: ComplexArray, gains: Gains, promised: Goals, *,
+    f: FloatArray, plant: ComplexArray, fixed: ComplexArray, gains: Gains, guaranteed: Goals, *,
     notches: tuple[Notch, ...], filters: LoopFilters,
 ) -> Candidate:  # fmt: skip
     """Prediction and step of a loop on a plant; ``fixed`` is all of the loop but its gains."""
@@ -148,7 +148,7 @@ def described(
         bandwidth_hz=bandwidth(f, closed).minus_3db_hz,
         position_bandwidth_hz=bandwidth(f, outer).minus_3db_hz,
         nominal=margins(f, loop),
-        promised=promised,
+        guaranteed=guaranteed,
         phase_cost_deg=0.0,
         overshoot_percent=metrics.overshoot_percent,
         settling_s=metrics.settling_s,

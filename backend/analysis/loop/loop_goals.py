@@ -70,8 +70,8 @@ class Worst:
         )
 
     @property
-    def promised(self) -> Goals:
-        """As a promise, after the reserve."""
+    def guaranteed(self) -> Goals:
+        """What is guaranteed: these less the reserve."""
         db, deg, factor = RESERVE
         return Goals(self.gain_margin_db - db, self.phase_margin_deg - deg, self.ms * factor)
 

@@ -288,7 +288,7 @@ def _ranked(model: MechanicalModel, highest_hz: float) -> list[float]:
     """Resonances that rise, the highest first.
 
     A mode above ``highest_hz`` stands for whatever is stiffer than what was measured: where it
-    lies exactly nobody knows, so it gets no notch.
+    lies exactly is not known, so it gets no notch.
     """
     heights = [
         (model.height_db(mode), mode.frequency_hz)

@@ -1,10 +1,10 @@
 """The plant as a closed loop shows it, where the loop answers otherwise than was predicted.
 
-With play an axis is another linear system for every way of driving it: a best linear approximation
-belongs to its class of excitations (Pintelon & Schoukens, *System Identification*, 2012, section
-3.4). What a design needs is the one within its own loop, so identification and design take turns
-(Van den Hof & Schrama, *Identification and control: closed-loop issues*, Automatica 31, 1995).
-The controller is known; what the open loop is off by is the plant's.
+With backlash an axis is another linear system for every way of driving it: a best linear
+approximation belongs to its class of excitations (Pintelon & Schoukens, *System Identification*,
+2012, section 3.4). What a design needs is the one within its own loop, so identification and design
+take turns (Van den Hof & Schrama, *Identification and control: closed-loop issues*, Automatica 31,
+1995). The controller is known; what the open loop is off by is the plant's.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def seen_in_loop(plant: MeasuredPlant, lines: LoopLines, controller: ComplexArra
     The plant that it was is kept as one that the axis may be as well.
 
     Raises:
-        ValueError: too few lines tell the plant better than a model of it would.
+        ValueError: too few lines show the plant better than a model of it would.
     """
     f, steep = lines.frequency_hz, 1.0 / np.abs(1.0 - lines.closed)
     deviation = np.nan_to_num(lines.deviation, nan=np.inf)

@@ -61,7 +61,7 @@ class BandVerdict:
 
 @dataclass(frozen=True)
 class Missed:
-    """One figure that is worse than asked for; ``end`` tells which one of its interval."""
+    """One figure that is worse than asked for; ``end`` shows which one of its interval."""
 
     what: Missing
     value: float
@@ -97,9 +97,9 @@ class LoopVerdict:
     designed: BandVerdict | None = None
 
     def missed(
-        self, promised: Goals, margin_deg: float, margin_db: float, ms_ratio: float
+        self, guaranteed: Goals, margin_deg: float, margin_db: float, ms_ratio: float
     ) -> tuple[Missed, ...]:
-        """What is worse than promised, less what a margin may be off by; empty where all is kept.
+        """What is worse than guaranteed, less what a margin may be off by; empty where all is kept.
 
         The stated figures must reach the goals but for that. The worst ends of the intervals, of
         each band, must not be more than `WORST_DEG` or `WORST_DB` below it.
@@ -113,34 +113,34 @@ class LoopVerdict:
             band = self.measured.high_hz if self.measured is not None else 0.0
             found.append(Missed("coverage", self.last_crossover_hz, band))
         pairs: tuple[tuple[Missing, float, float, float], ...] = (
-            ("phase_margin", self.stated.phase_margin_deg, promised.phase_margin_deg, margin_deg),
-            ("gain_margin", self.stated.gain_margin_db, promised.gain_margin_db, margin_db),
+            ("phase_margin", self.stated.phase_margin_deg, guaranteed.phase_margin_deg, margin_deg),
+            ("gain_margin", self.stated.gain_margin_db, guaranteed.gain_margin_db, margin_db),
         )
         for what, value, limit, slack in pairs:
             if value < limit - slack:
                 found.append(Missed(what, value, limit))
-        if self.stated.ms > promised.ms * ms_ratio:
-            found.append(Missed("peak_sensitivity", self.stated.ms, promised.ms))
+        if self.stated.ms > guaranteed.ms * ms_ratio:
+            found.append(Missed("peak_sensitivity", self.stated.ms, guaranteed.ms))
         reported = {each.what for each in found}
         ends = (
-            *_short(self.measured, "measured", promised),
-            *_short(self.designed, "predicted", promised),
+            *_short(self.measured, "measured", guaranteed),
+            *_short(self.designed, "predicted", guaranteed),
         )
         return (*found, *(each for each in ends if each.what not in reported))
 
 
-def _short(band: BandVerdict | None, end: End, promised: Goals) -> list[Missed]:
-    """The worst ends of a band's intervals that are too far below a promise."""
+def _short(band: BandVerdict | None, end: End, guaranteed: Goals) -> list[Missed]:
+    """The worst ends of a band's intervals that are too far below a guaranteed value."""
     if band is None:
         return []
     found = []
     phase, gain, peak = band.phase_margin_deg, band.gain_margin_db, band.peak_sensitivity
-    if phase is not None and phase.low < promised.phase_margin_deg - WORST_DEG:
-        found.append(Missed("phase_margin", phase.low, promised.phase_margin_deg, end))
-    if gain is not None and gain.low < promised.gain_margin_db - WORST_DB:
-        found.append(Missed("gain_margin", gain.low, promised.gain_margin_db, end))
-    if peak is not None and peak.high > promised.ms * _WORST_RATIO:
-        found.append(Missed("peak_sensitivity", peak.high, promised.ms, end))
+    if phase is not None and phase.low < guaranteed.phase_margin_deg - WORST_DEG:
+        found.append(Missed("phase_margin", phase.low, guaranteed.phase_margin_deg, end))
+    if gain is not None and gain.low < guaranteed.gain_margin_db - WORST_DB:
+        found.append(Missed("gain_margin", gain.low, guaranteed.gain_margin_db, end))
+    if peak is not None and peak.high > guaranteed.ms * _WORST_RATIO:
+        found.append(Missed("peak_sensitivity", peak.high, guaranteed.ms, end))
     return found
 
 
@@ -162,14 +162,14 @@ def judge(
     shown_gain_db: float | None = None,
     late_s: tuple[float, float] | None = None,
     size: tuple[float, float] | None = None,
-    beside: ComplexArray | None = None,
+    alternatives: ComplexArray | None = None,
 ) -> LoopVerdict:
     """The verdict on a loop.
 
     ``loops`` [m, n] on the dense grid ``frequency_hz`` are all that the loop may be, ``nominal``
     [n] the one that was measured as predicted. ``lines`` None: nothing was measured. ``late_s`` and
     ``size`` (logarithm) are what the measured lines show the loop to have beyond its prediction,
-    each with its deviation; None where they tell nothing. ``beside`` [k, n] are loops that no
+    each with its deviation; None where they show nothing. ``alternatives`` [k, n] are loops that no
     design counts on and no measurement excludes above its band: where a raised gain excludes none
     of them either, they widen what is stated there.
     """
@@ -187,7 +187,7 @@ def judge(
     if shown_gain_db is not None:
         more = possible * 10 ** (shown_gain_db / 20.0)
         left = possible[np.asarray(stable(more))]
-        # Where nothing in the set explains what was seen, the set is wrong, and tells nothing.
+        # Where nothing in the set explains what was seen, the set is wrong, and shows nothing.
         contradicted = not left.size
         possible = possible if contradicted else left
     over = np.abs(possible) > 1.0
@@ -200,8 +200,8 @@ def judge(
     designed = _beyond(frequency_hz, possible, nominal_only, top)
     sound = bool(np.all(stable(possible)))
     every = possible
-    if beside is not None and shown_gain_db is not None:
-        others = _moved(frequency_hz, beside, gain, delay)
+    if alternatives is not None and shown_gain_db is not None:
+        others = _moved(frequency_hz, alternatives, gain, delay)
         others = others[np.asarray(stable(others * 10 ** (shown_gain_db / 20.0)))]
         every = np.concatenate([possible, others])
     beyond = _beyond(frequency_hz, every, nominal_only, top, threshold.PER_OCTAVE, shown_gain_db)
@@ -290,9 +290,10 @@ def _moved(
 
 
 def excluding_db(
-    verdict: LoopVerdict, frequency_hz: FloatArray, loops: ComplexArray, promised: Goals
+    verdict: LoopVerdict, frequency_hz: FloatArray, loops: ComplexArray, guaranteed: Goals
 ) -> float:
-    """The gain that no loop is stable with that misses the promise; 0 where none misses it.
+    """The gain that no loop is stable with that misses the guaranteed margin; 0 where none misses
+    it.
 
     ``loops`` as in `judge`. A loop misses it by more than the worst end of an interval may. A loop
     that is stable with more gain than that, in dB, is none of them.
@@ -304,9 +305,9 @@ def excluding_db(
         if not worst.stable:
             continue
         misses = (
-            worst.phase_margin_deg < promised.phase_margin_deg - WORST_DEG
-            or worst.gain_margin_db < promised.gain_margin_db - WORST_DB
-            or worst.ms > promised.ms * _WORST_RATIO
+            worst.phase_margin_deg < guaranteed.phase_margin_deg - WORST_DEG
+            or worst.gain_margin_db < guaranteed.gain_margin_db - WORST_DB
+            or worst.ms > guaranteed.ms * _WORST_RATIO
         )
         least = max(least, worst.gain_margin_db if misses else 0.0)
     return least

@@ -77,7 +77,7 @@ def bandwidth(frequency_hz: FloatArray, closed: ComplexArray) -> Bandwidth:
 
     0 dB is what a drive's loop comes to at standstill; a lowest line rises above it where the
     integral overshoots, the more the further up it lies. It must lie well inside the bandwidth;
-    its phase is taken as the principal value.
+    its phase is treated as the principal value.
     """
     db = magnitude_db(closed)
     phase = phase_deg(closed)

@@ -15,8 +15,8 @@ from backend.analysis.thresholds import measured_plant as threshold
 FREQUENCY_FACTORS = threshold.FREQUENCY_FACTORS
 DAMPING_FACTORS = threshold.DAMPING_FACTORS
 BEYOND = threshold.BEYOND
-#: A line that is known to this (one deviation of its logarithm) tells as much as the model there:
-#: so much does a mode that is off by a per cent turn the lines beside it.
+#: A line that is known to this (one deviation of its logarithm) shows as much as the model there:
+#: so much does a mode that is off by a per cent turn the lines next to it.
 AS_THE_MODEL = np.radians(10.0)
 
 
@@ -90,7 +90,7 @@ def measured_plant(
 ) -> MeasuredPlant:  # fmt: skip
     """Join a corrected measurement with its model.
 
-    A model that is ``fitted`` to all lines counts beside each of them by how exactly that line is
+    A model that is ``fitted`` to all lines counts next to each of them by how exactly that line is
     known: one that friction or noise hides would else decide a design by its error.
 
     The ratio measurement/model is smooth, so it may be interpolated between lines where the

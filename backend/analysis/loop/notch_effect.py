@@ -5,7 +5,7 @@ reported torques is the notch, blurred by what sampling folds back: the held set
 images of every line above half the sample rate, which pass the notch untouched, so that a deep
 notch looks shallow. The shape is therefore fitted through hold and sampling.
 
-Beside a closed speed loop the reference makes the torque. There 1/T = 1/(N·C) + P, where T is the
+With a closed speed loop the reference makes the torque. There 1/T = 1/(N·C) + P, where T is the
 torque per reference, C the controller, N the notch and P the mechanics (Åström & Murray, *Feedback
 Systems*, 2nd ed. 2021, section 12.1). With P read as speed over torque that is T = N·C·(1 - V): the
 speed V is measured, and friction with it, so that no model of the mechanics is needed.
@@ -35,7 +35,7 @@ class NotchEffect:
     """The notch that explains a measured ratio, and what is left of it (median, relative).
 
     ``deviation`` is the median standard deviation of the lines that were used; 0 where the
-    measurement does not tell it.
+    measurement does not report it.
     """
 
     notch: Notch
@@ -60,7 +60,7 @@ class LoopLines:
         """From spectra of periods: ``sent`` [lines], the others [periods, lines].
 
         Raises:
-            ValueError: fewer than two periods, which tell nothing of noise.
+            ValueError: fewer than two periods, which show nothing of noise.
         """
         if len(torque) < 2:
             raise ValueError("fewer than two whole periods were recorded")
@@ -100,7 +100,7 @@ def fit_effect_in_loop(
     frequency_hz: FloatArray, plain: LoopLines, notched: LoopLines, loop: LoopModel,
     path: SignalPath,
 ) -> NotchEffect:  # fmt: skip
-    """The same beside a closed speed loop, ``loop`` being its controller without the notch.
+    """The same with a closed speed loop, ``loop`` being its controller without the notch.
 
     What the reference alone makes of torque is the plain torque and what the loop took of it by
     the speed. Best above the crossover, where the loop takes little.
@@ -128,7 +128,7 @@ def fit_effect_in_loop(
     if np.count_nonzero(good) < threshold.LEAST_LINES:
         raise ValueError(
             f"only {np.count_nonzero(good)} lines are known to {threshold.KNOWN_TO:.0%} "
-            "beside the loop"
+            "with the loop closed"
         )
     scale = np.abs(forward[good])
     seen = _Seen(

@@ -37,7 +37,7 @@ def estimate_coulomb(s: LineSpectra, path: SignalPath, quantity: Quantity) -> fl
     if limit <= 0.0:
         return 0.0
     # By their noise first: behind a coarse encoder the upper lines drown friction, and elsewhere
-    # the lower ones tell it best. What play does drowns it in all but the lowest.
+    # the lower ones show it best. What play does drowns it in all but the lowest.
     low = np.asarray(s.frequency_hz <= threshold.LOWEST * s.frequency_hz[0], dtype=np.float64)
     by_noise = _torque_weight(s, plain)
     found, share = _least(s, plain, turned, by_noise, limit)
@@ -52,9 +52,9 @@ def estimate_coulomb(s: LineSpectra, path: SignalPath, quantity: Quantity) -> fl
 
 
 def scatter_left(s: LineSpectra, path: SignalPath, quantity: Quantity, coulomb_nm: float) -> float:
-    """Share of the scatter between realisations that is left with this friction taken out.
+    """Share of the scatter between realisations that is left with this friction removed.
 
-    It tells which of two ways to know the direction of motion is better; 1 without friction.
+    It shows which of two ways to know the direction of motion is better; 1 without friction.
     """
     if coulomb_nm <= 0.0 or len(s.sent) < 2:
         return 1.0
@@ -94,7 +94,7 @@ def _scatter(
     coulomb_nm: float, s: LineSpectra, plain: list[ComplexArray], turned: list[ComplexArray],
     weight: FloatArray,
 ) -> float:  # fmt: skip
-    """What no linear mechanics explain with this friction taken out, as torque."""
+    """What no linear mechanics explain with this friction removed, as torque."""
     inputs = [u - coulomb_nm * d for u, d in zip(plain, turned, strict=True)]
     g, _, _ = instrument_estimate(s, inputs)
     errors = np.array(
@@ -104,7 +104,7 @@ def _scatter(
 
 
 def _torque_weight(s: LineSpectra, inputs: list[ComplexArray]) -> FloatArray:
-    """One over the noise variance of each line as a torque; alike where one period tells none."""
+    """One over the noise variance of each line as a torque; alike where one period shows none."""
     g, _, _ = instrument_estimate(s, inputs)
     errors = [y / g - u for y, u in zip(s.response, inputs, strict=True)]
     freedom = s.used - len(errors)

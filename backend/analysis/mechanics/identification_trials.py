@@ -72,7 +72,7 @@ class Task:
         self, path: SignalPath, coulomb_nm: float | None = None, motion: SampledFit | None = None,
         start: Solution | None = None,
     ) -> Trial:  # fmt: skip
-        """Estimates and fit with one path; ``motion`` is a fit before, which tells the images."""
+        """Estimates and fit with one path; ``motion`` is a fit before, which shows the images."""
         if self.quantity == "closed_loop":
             raise ValueError("mechanics are identified from torque, not from a loop's reference")
         views = self.views(path, coulomb_nm)
@@ -147,7 +147,7 @@ class Task:
         return last
 
     def balanced(self, trial: Trial) -> tuple[Task, Trial]:
-        """The same refined with friction as the balance of torques tells it at reversals.
+        """The same refined with friction as the balance of torques shows it at reversals.
 
         The round whose friction leaves the realisations most alike: a balance that is off bends
         friction and damping against each other.
@@ -164,8 +164,8 @@ class Task:
                 self.records, self.quantity, last.fit, friction_nm, lag_s
             )
             task = replace(self, records=reported)
-            anew = n == 0 and _hidden_by_friction(trial)
-            last = task.trial(trial.path, None, motion, None if anew else last.solution)
+            fresh = n == 0 and _hidden_by_friction(trial)
+            last = task.trial(trial.path, None, motion, None if fresh else last.solution)
             least = best[1].views.velocity.scatter_left
             if last.views.velocity.scatter_left < threshold.AS_ALIKE * least:
                 best = task, last
@@ -200,7 +200,7 @@ class Task:
     ) -> Uncertainty:
         """How far path and mechanics may be off together.
 
-        ``by_torque`` is the path that the torque alone tells, where the trial has another one.
+        ``by_torque`` is the path that the torque alone shows, where the trial has another one.
         """
         closed = self.quantity == "torque_injection"
         covariance = path_covariance(

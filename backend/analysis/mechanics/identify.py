@@ -2,7 +2,7 @@
 
 The steps of tuning.md section 2 in one call: a direct estimate; a continuous model fitted
 through hold and sampling that also finds the delay; the direct estimate again, with the delay
-and the folded images taken out. The corrected lines stay measurements: the model only supplies
+and the folded images removed. The corrected lines stay measurements: the model only supplies
 the ratio between what sampling shows and what is there.
 """
 
@@ -61,7 +61,7 @@ _HOLDS: tuple[Hold, ...] = ("zero", "linear")
 class Identification:
     """Everything about one measurement of the mechanics.
 
-    ``direct`` is the estimate with only hold, current loop and delay divided out and its honest
+    ``direct`` is the estimate with only hold, current loop and delay divided out and its
     band (0.25 of the sample rate); ``corrected`` has the folded images removed as well and holds
     to 0.4; ``fit`` is the model that did it. When no model fits (``trusted`` False), both are the
     plain estimate with a band of 0.1 of the sample rate. Where ``distortion`` shows play, the
@@ -111,10 +111,10 @@ def identify_with_path(
     records: tuple[Record, ...], path: SignalPath, quantity: Quantity, *, hold_known: bool,
     inertia: KnownInertia | None = None, loop: ReferenceLoop | None = None,
 ) -> Identification:  # fmt: skip
-    """As `identify_mechanics`, with what ``path`` does not tell found from the recording.
+    """As `identify_mechanics`, with what ``path`` does not give found from the recording.
 
-    The torque alone cannot always tell whether setpoints are interpolated; the motion can: a
-    wrong answer leaves a delay that is negative, or a roll-off that no mechanics have. Beside a
+    The torque alone cannot always show whether setpoints are interpolated; the motion can: a
+    wrong answer leaves a delay that is negative, or a roll-off that no mechanics have. Next to a
     closed loop, path and mechanics need each other, and are refined in turn. ``inertia`` is the
     whole axis', where moves have shown it. ``loop`` is the closed loop, where its
     reference has shown it: the path, too, is known then.
@@ -134,7 +134,7 @@ def identify_with_path(
         task, trials, dropped = _by_motion(task, paths, corner_known)
     best = trials[0]
 
-    def again(fit: SampledFit) -> SignalPath:  # only beside a closed loop
+    def again(fit: SampledFit) -> SignalPath:  # only with a closed loop
         known = replace(path, hold=fit.path.hold)
         return find_paths(
             task.records, known, loop_closed=True, hold_known=True, motion=fit, controller=task.loop
@@ -164,11 +164,11 @@ def _by_motion(
 ) -> tuple[Task, list[Trial], bool]:
     """Trials without the reported torque, where that cannot be the mechanics' input; else with it.
 
-    A torque that is reported late, or a copy of the demand, tells another path than the one to the
+    A torque that is reported late, or a copy of the demand, shows another path than the one to the
     mechanics. Collocated mechanics are passive, which the model's are by construction: a lag that
     is not there leaves them unexplained. So both holds are tried with ordinary paths that the
-    motion alone moves, and taken where that explains the motion clearly better. The last value
-    tells whether they were.
+    motion alone moves, and used where that explains the motion clearly better. The last value
+    shows whether they were.
 
     A path that is odd by itself is tried from the motion's mechanics first: a search from nothing
     with a wrong path finds no end for long.
@@ -206,7 +206,7 @@ def _explains(one: SampledFit, other: SampledFit, by: float, share: float) -> bo
 
 
 def _odd(task: Task, path: SignalPath, corner_known: bool) -> bool:
-    """Whether the path that the reported torque tells is none of a torque that acts."""
+    """Whether the path that the reported torque shows is none of a torque that acts."""
     if any(record.torque is None for record in task.records):
         return False
     corner = path.current_bandwidth_hz or USUAL_CURRENT_HZ
@@ -245,7 +245,7 @@ def _beyond_passive(trial: Trial) -> bool:
 
 
 def _identification(task: Task, trial: Trial, uncertainty: Uncertainty) -> Identification:
-    """The estimates with what the fit found taken out."""
+    """The estimates with what the fit found removed."""
     views, path, fit = trial.views, trial.path, trial.fit
     spoilt = distortion(task.records, path, task.quantity, views.velocity)
     by_place = inertia_by_place(task.records, fit.path, task.quantity, views.velocity.coulomb_nm)
@@ -254,7 +254,7 @@ def _identification(task: Task, trial: Trial, uncertainty: Uncertainty) -> Ident
         return frf if by_place is None else by_place.charged(frf)
 
     if fit.error > max(TRUSTED_ERROR, 1.5 * fit.noise):
-        # A filter of the speed that nobody tells would stay in the lines; the position has none.
+        # A filter of the speed that nothing states would stay in the lines; the position has none.
         if views.position is not None and path.response_bandwidth_hz is None:
             plain = unexplained(views.position, trial.solution, 1)
         else:

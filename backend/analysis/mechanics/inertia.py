@@ -17,8 +17,8 @@ import scipy
 
 from backend.analysis.mechanics.load_swing import find_swings, lag_of_load, lag_slopes
 from backend.analysis.mechanics.load_terms import (
-    NOTHING_BESIDE,
-    Beside,
+    NO_LOAD_TERMS,
+    FoundTerms,
     Motion,
     Terms,
     find_terms,
@@ -65,8 +65,8 @@ class InertiaResult:
     r2: float
     identifiable: bool
     reasons: tuple[Reason, ...]
-    beside: Beside = NOTHING_BESIDE
-    """What the torque depends on beside inertia and friction."""
+    load_terms: FoundTerms = NO_LOAD_TERMS
+    """What the torque depends on in addition to inertia and friction."""
 
 
 def _smoothing_kernel(sample_rate_hz: float, cutoff_hz: float) -> FloatArray:
@@ -134,7 +134,7 @@ def estimate_inertia(
 
     ``torque_nm`` is the motor's torque. ``minimum_speed_rad_s`` defaults to 5 % of the peak
     speed. The motion must be smooth between bus cycles (interpolated, or made by the drive's own
-    profile): with a reference that steps every cycle T, the torque sampled beside each step is
+    profile): with a reference that steps every cycle T, the torque sampled next to each step is
     off by half a step, about ω_speed·T/2 of the acceleration torque. ``position_rad`` [n] is the
     motor's; without it the speed is summed up. Samples at the torque limit,
     in gaps (``valid`` False) and within the filter's reach of either are left out.
@@ -177,14 +177,14 @@ def estimate_inertia(
         matrix[keep], torque[keep], bends[keep], keep,
         round(threshold.ALIKE_S * sample_rate_hz), saturated_share, motor_inertia_kgm2,
     )  # fmt: skip
-    return replace(found, beside=terms.sized(motion, sizes[_RIGID:]))
+    return replace(found, load_terms=terms.sized(motion, sizes[_RIGID:]))
 
 
 def _machine(
     rigid: FloatArray, torque: FloatArray, motion: Motion, keep: BoolArray, rate: float,
     highest_hz: float,
 ) -> tuple[Terms, FloatArray, FloatArray]:  # fmt: skip
-    """What of the machine shows in the torque beside a rigid inertia and friction.
+    """What of the machine shows in the torque in addition to a rigid inertia and friction.
 
     Returns the terms, all columns (the rigid ones, those of the terms, those of loads that
     swing) and how what was searched bends them [n, columns].
@@ -202,7 +202,7 @@ def _machine(
     terms = find_terms(np.column_stack([rigid, *swinging]), torque, motion, keep)
     known = np.column_stack([rigid, terms.columns(motion)])
     if terms != Terms():
-        # Without them they may have been taken for a load that swings.
+        # Without them they may have been mistaken for a load that swings.
         swinging, slopes = lags(known)
     bends = np.column_stack([np.empty((torque.size, 0)), *slopes, *terms.slopes(motion)])
     return terms, np.column_stack([known, *swinging]), bends

@@ -51,9 +51,9 @@ class InertiaByPlace:
 def inertia_by_place(
     records: tuple[Record, ...], path: SignalPath, quantity: Quantity, coulomb_nm: float
 ) -> InertiaByPlace | None:
-    """The inertia's part that goes with the place; None where nothing tells one.
+    """The inertia's part that goes with the place; None where nothing shows one.
 
-    ``coulomb_nm`` is the friction that is taken out of the torque.
+    ``coulomb_nm`` is the friction that is removed from the torque.
     """
     first = records[0].excitation
     if quantity == "closed_loop" or first.segments or not first.period_samples:
@@ -93,7 +93,7 @@ def inertia_by_place(
     matrix, rhs = np.concatenate([a.real, a.imag]), np.concatenate([b.real, b.imag])
     x = np.linalg.lstsq(matrix, rhs, rcond=None)[0]
     rest = rhs - matrix @ x
-    # Realisations share one response, so that one of them tells nothing.
+    # Realisations share one response, so that one of them shows nothing.
     freedom = max(rest.size * (len(reported) - 1) / len(reported) - 2.0, 1.0)
     covariance = np.linalg.pinv(matrix.T @ matrix) * float(rest @ rest) / freedom
     amplitude = float(np.hypot(*x))

@@ -1,6 +1,6 @@
 """Where a chain may have one more load: many ways are tried, images included, and ranked.
 
-Each way is a load at a place of the chain; what only gain and delay tell apart is one way.
+Each way is a load at a place of the chain; what only gain and delay distinguish is one way.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from backend.analysis.thresholds import load_search as threshold
 
 
 def with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
-    """The most promising starts with one more load, by trying very many on some lines."""
+    """The best starts with one more load, by trying very many on some lines."""
     view = best_view(problem.views)
-    lines = telling_lines(view, found)
+    lines = informative_lines(view, found)
     f = view.f[lines]
     weight = np.minimum(view.weight[lines], 100.0).astype(np.float32)
     cycles_per_sample = (f * problem.period_s).astype(np.float32)
@@ -188,7 +188,7 @@ class _Trial:
         )
 
 
-def telling_lines(view: View, found: Found, count: int = 35) -> npt.NDArray[np.int64]:
+def informative_lines(view: View, found: Found, count: int = 35) -> npt.NDArray[np.int64]:
     """Some lines evenly, and those that are explained worst so far."""
     rest = np.hypot(*np.split(_residuals_of(view, found), 2))
     even = np.linspace(0, view.f.size - 1, min(count, view.f.size)).astype(np.int64)
@@ -202,7 +202,7 @@ def _residuals_of(view: View, found: Found) -> FloatArray:
 
 
 def _new_loads(x: FloatArray, place: int, grid_hz: FloatArray, worst_hz: FloatArray) -> FloatArray:
-    """All loads [n, 4] that are tried at one place: added to what is there, or taken from it.
+    """All loads [n, 4] that are tried at one place: added to what is there, or removed from it.
 
     Where the explanation fails most, there is an antiresonance or a resonance.
     """

@@ -72,7 +72,7 @@ def find_swings(
     highest_hz: float,
     most: int = 2,
 ) -> tuple[Swing, ...]:
-    """Modes up to ``highest_hz`` that the torque [n] shows beside ``others`` [n, columns].
+    """Modes up to ``highest_hz`` that the torque [n] shows next to ``others`` [n, columns].
 
     ``others`` begins with the acceleration. A mode counts only while it takes half of what was
     left unexplained, as an inertia that is positive and smaller than the whole.

@@ -1,9 +1,10 @@
-"""Torques that some machines need beside inertia and friction, shown by the moves themselves.
+"""Torques that some machines need in addition to inertia and friction, shown by the moves
+themselves.
 
 A fan, a pump or a stirrer takes a torque that grows with the square of its speed; a spring, an arm
 or a load out of balance one that depends on the place (`place_torque`); and friction is larger near
 standstill (Stribeck 1902). Left out, they pass for inertia, for play, or turn friction negative. A
-term is taken up only where it clearly explains what the
+term is accepted only where it clearly explains what the
 others leave, so that an axis without it is judged as if there were no such thing.
 """
 
@@ -33,7 +34,7 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Beside:
+class FoundTerms:
     """What the terms come to: the largest torque of a fan in the recording, half the span of what
     the machine takes by its place, in Nm; 0 where there is none.
 
@@ -47,12 +48,12 @@ class Beside:
     torque_nm: FloatArray
 
 
-NOTHING_BESIDE = Beside(0.0, 0.0, (), np.empty(0))
+NO_LOAD_TERMS = FoundTerms(0.0, 0.0, (), np.empty(0))
 
 
 @dataclass(frozen=True)
 class Terms:
-    """What the torque is made of beside inertia and friction.
+    """What the torque is made of in addition to inertia and friction.
 
     ``static_rad_s`` is the speed within which static friction falls, 0 where there is none;
     ``periods_rad`` are those of torques that depend on the place.
@@ -75,22 +76,22 @@ class Terms:
         return np.column_stack(parts)
 
     def may_hide(self, before: Terms) -> bool:
-        """Whether what these have more than ``before`` is taken up beside noise, too."""
+        """Whether what these have more than ``before`` is accepted next to noise, too."""
         if self.static_rad_s != before.static_rad_s:
             return False
         return self.periods_rad == before.periods_rad or self.periods_rad[-1] > COGGING_RAD
 
-    def sized(self, motion: Motion, sizes: FloatArray) -> Beside:
+    def sized(self, motion: Motion, sizes: FloatArray) -> FoundTerms:
         """What they come to; ``sizes`` begins with those of `columns`."""
         columns = self.columns(motion)
         if not columns.shape[1]:
-            return NOTHING_BESIDE
+            return NO_LOAD_TERMS
         made = columns * sizes[: columns.shape[1]]
         at = int(self.fan) + int(self.static_rad_s > 0)
         # What repeats more than twice in a turn is the motor's own cogging, not the machine's.
         reported = [i for i, period in enumerate(self.periods_rad) if period > COGGING_RAD]
         place = sum(made[:, at + 2 * i] + made[:, at + 2 * i + 1] for i in reported)
-        return Beside(
+        return FoundTerms(
             float(np.max(np.abs(made[:, 0]))) if self.fan else 0.0,
             0.5 * float(np.ptp(place)),
             tuple(self.periods_rad[i] for i in reported),
@@ -110,7 +111,7 @@ class Terms:
 
 
 def find_terms(others: FloatArray, torque_nm: FloatArray, motion: Motion, keep: BoolArray) -> Terms:
-    """The terms that the torque [n] shows beside ``others`` [n, columns].
+    """The terms that the torque [n] shows next to ``others`` [n, columns].
 
     The third of ``others`` is the direction of motion, whose size is the Coulomb friction.
     """

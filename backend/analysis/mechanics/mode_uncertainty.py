@@ -1,12 +1,12 @@
-"""How exactly a fit tells its modes: frequency, damping and part in the response.
+"""How exactly a fit shows its modes: frequency, damping and part in the response.
 
 The covariance of the fit's parameters carried over to the modes by their slopes (Pintelon &
-Schoukens, *System Identification*, 2012, section 2.4), and beside it what all lines may be off by
-together, which no covariance of single lines shows: the friction that was taken out of them acts
+Schoukens, *System Identification*, 2012, section 2.4), and next to it what all lines may be off by
+together, which no covariance of single lines shows: the friction that was removed from them acts
 like damping, by the same share everywhere.
 
 What friction adds to the damping of a mode is the same however much that mode is damped by itself;
-and lines beside a mode that is narrower than their distance tell its damping by their phase, in
+and lines next to a mode that is narrower than their distance show its damping by their phase, in
 proportion. So the range of a damping is stated by what is added to it and not as a factor, and
 where it is not known to half of itself it begins at zero.
 """
@@ -41,7 +41,7 @@ class ModeUncertainty:
     ) -> ModeUncertainty:  # fmt: skip
         """Wider by what the model leaves open: ``distortion`` and ``by_place`` [lines] of the band.
 
-        A line's phase beside a mode turns by 1/damping of a relative change of its frequency. An
+        A line's phase next to a mode turns by 1/damping of a relative change of its frequency. An
         inertia moves a frequency by half of what it moves the lines above it, as its root.
         """
         phase = float(np.interp(mode.frequency_hz, frequency_hz, distortion))
@@ -70,7 +70,7 @@ def mode_uncertainties(
     """For each mode of the model at ``x``, in its order.
 
     ``covariance`` is that of ``x``; ``together`` are, per view, one deviation [lines] of the
-    logarithm that is common to all lines; ``friction_seen`` whether friction was taken out.
+    logarithm that is common to all lines; ``friction_seen`` whether friction was removed.
     """
     here = _modes(problem, x)
     if here.size == 0:

@@ -2,7 +2,7 @@
 
 A chain grows load by load where a search over all ways to add one finds that one is missing, as
 long as the Bayesian information criterion gains (Schwarz, Ann. Statist. 6 (1978) 461). What no
-chain explains (damping elsewhere than beside a spring) a free sum of modes may, from there.
+chain explains (damping elsewhere than next to a spring) a free sum of modes may, from there.
 """
 
 from __future__ import annotations
@@ -23,7 +23,11 @@ from backend.analysis.mechanics.fit_problem import (
     View,
     best_view,
 )
-from backend.analysis.mechanics.load_search import telling_lines, with_one_more, with_one_more_mode
+from backend.analysis.mechanics.load_search import (
+    informative_lines,
+    with_one_more,
+    with_one_more_mode,
+)
 from backend.analysis.mechanics.mechanical_model import RIGID_PARAMETERS, TURN
 from backend.analysis.response.frf import Frf, valid_band_hz
 from backend.analysis.response.sampled_model import LoopModel, SampledFit
@@ -187,8 +191,10 @@ def _grown(problem: Problem, start: FloatArray, max_modes: int) -> Found:
 
 
 def _best_end(problem: Problem, now: Found, starts: list[FloatArray]) -> Found:
-    """Where the starts lead: all of them on few lines first, the most promising on all lines."""
-    coarse = problem.thinned(telling_lines(best_view(problem.views), now, threshold.COARSE_LINES))
+    """Where the starts lead: all of them on few lines first, the best on all lines."""
+    coarse = problem.thinned(
+        informative_lines(best_view(problem.views), now, threshold.COARSE_LINES)
+    )
     looked = sorted(
         (coarse.solve(x, threshold.COARSE_STEPS, bound=True) for x in starts), key=lambda t: t.score
     )

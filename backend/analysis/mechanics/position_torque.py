@@ -1,4 +1,4 @@
-"""Torque that depends on where the axis stands: springs, arms, loads out of balance, cogging.
+"""Torque that depends on where the axis is: springs, arms, loads out of balance, cogging.
 
 An arm on a gear needs T = A·sin(kθ + φ) to be held, an unbalanced rotor the same with one period
 to a turn, and a spring or a counterweight on a lever is that sine where it is nearly straight. One
@@ -8,7 +8,7 @@ turn.
 
 An axis that is accelerated at one end of its way and braked at the other has the sign of its
 acceleration tied to its place, so that such a torque, left out, passes for inertia: a pull that
-grows along the way makes J too small. Moves of different accelerations over one way tell the two
+grows along the way makes J too small. Moves of different accelerations over one way show the two
 apart.
 """
 
@@ -39,8 +39,8 @@ def angle_of(velocity_rad_s: FloatArray, sample_rate_hz: float) -> FloatArray:
 def place_columns(angle_rad: FloatArray, period_rad: float, smooth: Smooth) -> FloatArray:
     """The two shapes of a torque of this period along the axis [n, 2], as ``smooth`` leaves them.
 
-    The mean over the recording is taken out: it belongs to the constant torque. What passes in
-    less than four samples is left out, as its samples would tell of a slower one.
+    The mean over the recording is removed: it belongs to the constant torque. What passes in
+    less than four samples is left out, as its samples would indicate a slower one.
     """
     phase = _TURN / period_rad * angle_rad
     seen = np.abs(np.gradient(phase)) < 0.25 * _TURN
@@ -55,7 +55,7 @@ def find_period(
     keep: BoolArray,
     smooth: Smooth,
 ) -> float:
-    """The period in rad that explains most of the torque [n] beside ``others`` [n, columns].
+    """The period in rad that explains most of the torque [n] next to ``others`` [n, columns].
 
     Whether it is worth having, the caller judges.
     """

@@ -1,8 +1,8 @@
 """What friction did while the speed reversed, from the balance of torques.
 
-Between two samples an axis that reverses may stop, stick and start again: its sampled speed tells
+Between two samples an axis that reverses may stop, stick and start again: its sampled speed shows
 the mean of the friction's sign there to about a third only, and 50 such reversals a second leave
-a tenth of the friction in the data. The torques tell it better. What drove the motor, less what
+a tenth of the friction in the data. The torques show it better. What drove the motor, less what
 its own inertia took and what the mechanics behind it drew, is the friction; where the speed does
 not reverse it must come out as plus or minus the whole Coulomb torque, which shows how exactly the
 balance is known, and takes out of it what is slow (gravity, what the mechanics are off by).
@@ -26,11 +26,11 @@ def with_balanced_reversals(
     records: tuple[Record, ...], quantity: Quantity, fit: SampledFit, coulomb_nm: float,
     lag_s: float,
 ) -> tuple[Record, ...]:  # fmt: skip
-    """The records with directions of motion that the balance of torques tells, by this fit.
+    """The records with directions of motion that the balance of torques shows, by this fit.
 
     ``lag_s`` is how late the speed is reported (:func:`line_spectra.speed_lag_s`). They are as
     they were where there is no friction or no inertia at the motor, where samples are missing, and
-    where the balance tells less than the speed: behind a coarse encoder, or with mechanics that
+    where the balance shows less than the speed: behind a coarse encoder, or with mechanics that
     the fit has not right.
     """
     by_torque = sum(mode.residue for mode in fit.model.modes) + fit.model.gain
@@ -144,7 +144,7 @@ def _bands(
     """Spectra [bins] of the true velocity at ``f`` and at what is folded there from f - fs.
 
     Speed and position are samples of one motion that are folded differently, so that both
-    together tell twice the band (Papoulis, IEEE Trans. Circuits Syst. 24 (1977) 652). Without a
+    together show twice the band (Papoulis, IEEE Trans. Circuits Syst. 24 (1977) 652). Without a
     position nothing is known of what is folded.
     """
     rate, corner = fit.path.sample_rate_hz, fit.path.response_bandwidth_hz

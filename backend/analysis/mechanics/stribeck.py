@@ -3,7 +3,7 @@
 T(v) = Tg + sign(v)·(Tc + Ts·exp(-(|v|/vs)^δ)) + b·v (Armstrong-Hélouvry, Dupont, Canudas de Wit,
 "A survey of models, analysis tools and compensation methods for the control of machines with
 friction", 1994). For each vs and δ of a grid it is linear; the interval of a value spans all
-pairs that the data do not tell from the best one. Any units: torque and speed as given.
+pairs that the data do not distinguish from the best one. Any units: torque and speed as given.
 """
 
 from __future__ import annotations
@@ -105,10 +105,10 @@ class SpeedModel:
             size = np.abs(self.speed[side])
             order = np.argsort(size)
             at = np.geomspace(size.min(), size.max(), threshold.CURVE)
-            beside = np.interp(np.log(at), np.log(size[order]), left[side][order])
+            remainder = np.interp(np.log(at), np.log(size[order]), left[side][order])
             back = slice(None, None, -1 if sign < 0 else 1)
             speeds += (sign * at)[back].tolist()
-            values += (self.best.at(sign * at) + beside)[back].tolist()
+            values += (self.best.at(sign * at) + remainder)[back].tolist()
         return tuple(speeds), tuple(values)
 
 

@@ -40,7 +40,7 @@ class Contradiction:
     phase_deg: float
     frequency_hz: float
     filter_hz: float | None
-    """A real pole that the fit found beside friction: the output may be filtered there."""
+    """A real pole that the fit found in addition to friction: the output may be filtered there."""
 
 
 def without_filter(found: ForeignResponse, filter_hz: float | None) -> ForeignResponse:

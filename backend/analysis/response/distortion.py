@@ -1,7 +1,7 @@
 """What moves an axis between the excited lines: friction, and what friction does not explain.
 
 On a linear axis nothing but noise lies on the empty bins of a multisine. Coulomb friction puts
-some there, of which its torque by the direction of motion tells how much; what is left is play in
+some there, of which its torque by the direction of motion shows how much; what is left is play in
 the mechanics, or friction of another kind (Pintelon & Schoukens, *System Identification*, 2012,
 section 4.4). The two act at other times: friction that is not simply Coulomb's (sticking, a
 bristle's bend) does so where the speed reverses, play where the torque in the coupling does.
@@ -52,7 +52,7 @@ class Detected:
 
 @dataclass(frozen=True)
 class Distortion:
-    """Motion on empty bins relative to that on the lines around; noise is taken out.
+    """Motion on empty bins relative to that on the lines around; noise is removed.
 
     ``share`` [lines] is what friction does not explain; ``level`` its median in the upper band,
     ``before`` the same with friction. ``at_reversals`` is how much of it, as torque, falls on
@@ -132,7 +132,7 @@ def distortion(
     upper = f >= threshold.LOWEST * path.sample_rate_hz
     if np.count_nonzero(upper) < threshold.FEWEST:
         return none
-    # Where noise rules, what is left after it is taken out is noise.
+    # Where noise rules, what is left after it is removed is noise.
     highest = f >= threshold.HIGHEST * path.sample_rate_hz
     if not _stands_out(rest, noise, upper, threshold.ABOVE_NOISE):
         if not _stands_out(rest, noise, highest, threshold.FAR_ABOVE_NOISE):
@@ -140,7 +140,7 @@ def distortion(
             return Distortion(quiet, detected=detected)
         upper = highest
     return Distortion(
-        # What lies below the first empty bins is shown by all of them, not by one beside a valley.
+        # What lies below the first empty bins is shown by all of them, not by one next to a valley.
         np.asarray(np.interp(frf.frequency_hz, f, share, left=float(np.median(share)))),
         float(np.median(share[upper])), float(np.median(plain[upper])), _ratio(falls), detected,
     )  # fmt: skip

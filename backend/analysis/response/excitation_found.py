@@ -1,7 +1,7 @@
 """Which excitation a recorded input holds: a repeated period, a chirp, or noise.
 
 A periodic input is the better instrument by far (Pintelon & Schoukens, *System Identification*,
-2012, chapter 2): its periods tell noise, and averaging them leaves no leakage.
+2012, chapter 2): its periods show noise, and averaging them leaves no leakage.
 """
 
 from __future__ import annotations
@@ -146,7 +146,7 @@ def _period(u: FloatArray) -> int:
 def _is_chirp(u: FloatArray) -> bool:
     """One tone at a time whose frequency keeps moving as it does, perhaps to and fro.
 
-    Beside it there may be a slow motion that keeps the axis from sticking.
+    Next to it there may be a slow motion that keeps the axis from sticking.
     """
     width = max(u.size // 64, 64)
     _f, _t, parts = scipy.signal.stft(u, nperseg=width, noverlap=width // 2, boundary=None)
@@ -187,7 +187,7 @@ def excited_lines(amplitude: FloatArray, deviation: FloatArray) -> IntArray:
     """Bins of one period that the input excites, without bin 0 and the highest.
 
     ``amplitude`` [bins] of the mean period, ``deviation`` [bins] of that mean. Distortion of a
-    measured input lies on the other bins, which a gap in the ordered amplitudes tells apart.
+    measured input lies on the other bins, which a gap in the ordered amplitudes distinguishes.
     """
     usable = np.arange(1, amplitude.size - 1)
     a = amplitude[usable]

@@ -114,7 +114,7 @@ def estimate_periodic(
 ) -> Frf:
     """Period-synchronous estimate over all realisations and periods.
 
-    With ``position`` the velocity is taken from the records' position: no speed filter lies in
+    With ``position`` the velocity is calculated from the records' position: no speed filter lies in
     the way, images arrive weaker, and the noise is that of the encoder.
 
     ``coulomb_nm`` is friction whose torque is subtracted (units of the torque; the response must
@@ -130,7 +130,7 @@ def estimate_periodic(
     inputs = continuous_input(s, path, quantity, coulomb_nm, position=position)
     g, _, s_ur = instrument_estimate(s, inputs)
     # What friction did to the answer is known in part only; that is charged to the band (more of
-    # it would also weigh lines less that tell the speed filter well).
+    # it would also weigh lines less that show the speed filter well).
     plain = instrument_estimate(s, continuous_input(s, path, quantity, position=position))[0]
     reported = all(record.known_direction is not None for record in records)
     # Where friction takes most of the torque, a share of it is much of what is left.

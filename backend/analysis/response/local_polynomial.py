@@ -15,7 +15,7 @@ from backend.analysis.signals.arrays import ComplexArray, FloatArray, IntArray
 from backend.analysis.thresholds import local_polynomial as threshold
 
 _ORDER = 2
-#: Unknowns of a window: both polynomials. So many equations more tell the scatter.
+#: Unknowns of a window: both polynomials. So many equations more show the scatter.
 _UNKNOWNS = 2 * (_ORDER + 1)
 
 

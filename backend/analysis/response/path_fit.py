@@ -1,6 +1,6 @@
 """Hold, delay and current loop between the sent setpoints and the torque, from the recording.
 
-The sampled torque is what the setpoints cause by a short difference equation, and beside a
+The sampled torque is what the setpoints cause by a short difference equation, and next to a
 closed loop what that makes of the sampled speed. Both are fitted together, line by line.
 """
 
@@ -42,10 +42,10 @@ def find_paths(
 ) -> tuple[SignalPath, ...]:
     """The paths that explain the reported torque, best first; one for each hold that may be.
 
-    ``path`` tells what is known: its hold (``hold_known``), its current loop unless None; its
+    ``path`` shows what is known: its hold (``hold_known``), its current loop unless None; its
     delay is only used where no torque was recorded. Interpolation is recognised by the torque
-    alone where the current loop is known or slow; else the mechanics' fit must tell. ``motion``
-    is such a fit with a path found before: it tells how the samples of a closed loop's own torque
+    alone where the current loop is known or slow; else the mechanics' fit must show. ``motion``
+    is such a fit with a path found before: it shows how the samples of a closed loop's own torque
     and of the speed differ from what they are samples of. ``controller`` is the closed loop's,
     where it is known.
 
@@ -62,12 +62,12 @@ def path_covariance(
     records: tuple[Record, ...], path: SignalPath, *, loop_closed: bool, corner_known: bool,
     motion: SampledFit | None = None, controller: LoopModel | None = None,
 ) -> FloatArray:  # fmt: skip
-    """How exactly the torque tells a path that it was found with: cycles and log of the corner.
+    """How exactly the torque shows a path that it was found with: cycles and log of the corner.
 
     Covariance [2, 2], or [1, 1] without a corner. What the torque leaves open is as unusual as
     drives are: those in step with the bus take setpoints at its cycles, and a corner that a
-    drive tells is meant to be one of first order. ``controller`` is the closed loop's, where it is
-    known.
+    drive reports is meant to be one of first order. ``controller`` is the closed loop's, where it
+    is known.
     """
     usual = [threshold.STEADY if at_whole_cycles(path) else threshold.UNSTEADY]
     if path.current_bandwidth_hz is not None:
@@ -162,7 +162,7 @@ class PathFit:
 
     def best(self, hold: Hold) -> tuple[SignalPath, float]:
         """The best delay and corner with this hold, and what they leave unexplained."""
-        # A sample just behind a step tells most of the delay, and only if a start is near.
+        # A sample just behind a step shows most of the delay, and only if a start is near.
         cycles = np.sort(
             [
                 n + part

@@ -50,7 +50,7 @@ def reference_gain(
     """Controller and path that explain the recorded torque.
 
     ``records`` have the reference as what was sent, in the unit of the response.
-    ``integral_rad_s`` is the corner a of the integral; None: the recording tells. ``motion`` is
+    ``integral_rad_s`` is the corner a of the integral; None: the recording shows. ``motion`` is
     a fit of the mechanics as in `find_paths`: a light axis' own speed is sampled, too.
 
     Raises:

@@ -31,7 +31,7 @@ class ReferencePath:
     late_std_s: float
     misfit: float
     closed: ComplexArray
-    """The closed loop with this hold and, where it is sure, this delay taken out."""
+    """The closed loop with this hold and, where it is sure, this delay removed."""
     loop_late_s: tuple[float, float] = (0.0, threshold.LOOP_LATE_S)
     loop_size: tuple[float, float] = (0.0, threshold.LOOP_SIZE)
     """Delay and size (logarithm) of the loop beyond the predicted, each with its deviation."""
@@ -63,7 +63,7 @@ def _fitted(
     hold: Hold, f: FloatArray, closed: ComplexArray, expected: ComplexArray, s: ComplexArray,
     weight: FloatArray, rate_hz: float,
 ) -> ReferencePath:  # fmt: skip
-    """Delay of the reference beside delay and size of the loop, by robust linear least squares."""
+    """Delay of the reference and delay and size of the loop, by robust linear least squares."""
     rows = np.log(closed / expected)
     turn = -2j * np.pi * f
     columns = np.column_stack([turn, s * turn, s])

@@ -28,7 +28,7 @@ _GAIN = float(np.hypot(threshold.BY_TEMPERATURE, threshold.BY_PLACE))
 #: Phase by sampling.
 _TURN = 0.01
 #: Two runs differ by the variances of both; at half the level noise and what friction distorts are
-#: twice as large beside the lines, so that the other one's variance is four times this one's.
+#: twice as large next to the lines, so that the other one's variance is four times this one's.
 _BOTH = 1.0 + 2.0**2
 
 

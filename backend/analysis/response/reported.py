@@ -1,8 +1,8 @@
 """What the reported speed and torque are, beyond what an estimate takes them to be.
 
-The reported speed is taken to be the true one through one lag and one delay, and the reported
+The reported speed is assumed to be the true one through one lag and one delay, and the reported
 torque to be behind the current loop. Some drives report the mean speed of several cycles, or the
-torque that they command. The position tells the first, a torque that follows at once the second.
+torque that they command. The position shows the first, a torque that follows at once the second.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def mean_cycles(records: tuple[Record, ...]) -> int | None:
     """Cycles whose mean the reported speed is, by the positions; None where it is no mean.
 
     A speed that is the way of several cycles over their time has nulls within the band, which no
-    lag has, and tells nothing that the positions do not.
+    lag has, and shows nothing that the positions do not.
     """
     if any(r.position is None or r.excitation.segments for r in records):
         return None
@@ -62,7 +62,7 @@ def current_uncertainty(frequency_hz: FloatArray) -> ComplexArray:
 
 
 def slow_uncertainty(frequency_hz: FloatArray, corner_hz: float) -> ComplexArray:
-    """Logarithm of what one lag of this corner may be beside two of the same delay.
+    """Logarithm of what one lag of this corner may be next to two of the same delay.
 
     A slow torque is an ordinary current loop behind a filter as well as one slow lag.
     """

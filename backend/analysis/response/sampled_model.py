@@ -151,7 +151,7 @@ def seen_response(
     *,
     position_delay_s: float | None = None,
 ) -> ComplexArray:
-    """What the direct estimate (torque_mode, or torque_injection with a loop) would return.
+    """What the direct estimate (torque_mode, or torque_injection with a closed loop) would return.
 
     ``delay_s`` is the delay from torque to reported velocity beyond the one in ``path``; with
     ``position_delay_s``, that to the position, the estimate is the one from the position.

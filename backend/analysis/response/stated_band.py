@@ -1,4 +1,4 @@
-"""What is charged to the stated band of an estimate, beyond what its scatter tells."""
+"""What is charged to the stated band of an estimate, beyond what its scatter shows."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ def unexplained(raw: Frf, solution: Solution, view: int) -> Frf:
 
 
 def ended_where_unknown(frf: Frf) -> Frf:
-    """The band ends where a model alone tells the lines, and tells most of them too roughly.
+    """The band ends where a model alone shows the lines, and shows most of them too roughly.
 
     A resonance beyond half the sample rate may fold back more than the axis itself does there.
-    Lines that are uncertain below others that are not, as beside an antiresonance, end no band.
+    Lines that are uncertain below others that are not, as next to an antiresonance, end no band.
     """
     f, (low, high) = frf.frequency_hz, frf.valid_band_hz
     direct_hz = DIRECT_SHARE * frf.sample_rate_hz
@@ -77,7 +77,7 @@ def distorted(frf: Frf, share: FloatArray) -> Frf:
 def pooled(parts: list[Frf]) -> Frf:
     """Each line by what is known best; the errors of two views of one motion may be the same.
 
-    A third view is made of the other two, and taken where it is better than both together.
+    A third view is made of the other two, and used where it is better than both together.
     """
     if len(parts) == 1:
         return parts[0]

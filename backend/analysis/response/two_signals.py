@@ -32,7 +32,7 @@ def ways_of(
 ) -> list[Way]:
     """From velocity, from position where there is one, and then from both together.
 
-    ``path`` is the one that the estimates were made with: what it does not tell of the speed's
+    ``path`` is the one that the estimates were made with: what it does not report of the speed's
     filter the fit does.
     """
     f = velocity.frequency_hz
@@ -55,7 +55,7 @@ def _without_first_image(velocity: Way, position: Way, fit: SampledFit) -> Way:
 
     Speed and position are samples of one motion that are folded differently: what comes back from
     f - fs arrives in the position weaker by f/(f - fs), in the speed with its filter. Two samples
-    of one motion tell twice the band (Papoulis, IEEE Trans. Circuits Syst. 24 (1977) 652).
+    of one motion show twice the band (Papoulis, IEEE Trans. Circuits Syst. 24 (1977) 652).
     """
     f = velocity.lines.frequency_hz
     folded = f - velocity.lines.sample_rate_hz

@@ -1,7 +1,7 @@
 """How far a line may be off because path and mechanics that correct it are not known exactly.
 
 The fit's parameters and those of the path (delay in cycles, log of the current loop's corner) have
-one joint covariance: what the recorded torque leaves open of the path, the motion may tell, and
+one joint covariance: what the recorded torque leaves open of the path, the motion may show, and
 what both leave open is charged to the lines by their slopes (linear propagation, Pintelon &
 Schoukens, *System Identification*, 2012, section 2.4).
 """
@@ -33,7 +33,7 @@ class Shifted:
 class Uncertainty:
     """One standard deviation per view and line, as the logarithm: real is size, imaginary phase.
 
-    ``corrected`` for lines with images taken out, ``direct`` for those with them. ``path_step`` is
+    ``corrected`` for lines with images removed, ``direct`` for those with them. ``path_step`` is
     where torque and motion together would have the path, from where it was taken.
     """
 

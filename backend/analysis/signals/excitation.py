@@ -3,7 +3,7 @@
 Amplitudes are dimensionless (1.0 is the peak of the exciting part); the player scales them to
 torque, speed or position. Every signal starts and ends at zero. With ``integrations`` the
 ramps carry a small correction, so that an ideal axis (torque: two integrations, velocity: one,
-position: none) comes to rest at the place where it began and does not drift meanwhile.
+position: none) stops at the place where it began and does not drift meanwhile.
 
 Here is the multisine; :mod:`chirp`, :mod:`prbs` and :mod:`stepped_sine` make the others.
 Source: Pintelon & Schoukens, *System Identification: A Frequency Domain Approach* (2012),

@@ -37,7 +37,7 @@ class Record:
     ``response`` [n] is velocity or position, ``torque`` [n] the reported torque (needed for
     *torque_injection*), ``valid`` [n] False where a cycle was lost or late, ``position`` [n] the
     integral of a velocity ``response`` as the drive reports it. ``told_direction`` [n] is the mean
-    true direction of motion between each sample and the next where more than the speed tells it.
+    true direction of motion between each sample and the next where more than the speed shows it.
     """
 
     excitation: Excitation
@@ -135,7 +135,7 @@ def _half_of(segment: Segment, half: int) -> slice:
 
 
 def tone_amplitudes(signal: FloatArray, e: Excitation, halves: list[int]) -> ComplexArray:
-    """Amplitudes [halves, tones] of a stepped sine, least squares beside mean and drift."""
+    """Amplitudes [halves, tones] of a stepped sine, least squares in addition to mean and drift."""
     found = np.zeros((len(halves), len(e.segments)), dtype=np.complex128)
     for i, segment in enumerate(e.segments):
         for j, half in enumerate(halves):
@@ -149,7 +149,7 @@ def tone_amplitudes(signal: FloatArray, e: Excitation, halves: list[int]) -> Com
 
 
 def period_spectra(signal: FloatArray, e: Excitation, periods: list[int]) -> ComplexArray:
-    """Spectra [periods, lines], with the drift between the periods taken out.
+    """Spectra [periods, lines], with the drift between the periods removed.
 
     A drift of s per sample would leak onto every line; the difference of the means of two
     periods is exactly s·N for a periodic signal plus drift, whatever the signal is.
@@ -242,7 +242,7 @@ def own_torque(record: Record, path: SignalPath) -> FloatArray:
 def speed_lag_s(records: tuple[Record, ...], path: SignalPath) -> float:
     """How much later the speed is reported than the position, in s: a filter, or a mean.
 
-    Without positions it is what ``path`` tells of a filter.
+    Without positions it is what ``path`` reports of a filter.
     """
     reported = path.response_bandwidth_hz
     known = 0.0 if reported is None else 1.0 / (2 * np.pi * reported)
@@ -282,7 +282,7 @@ def _direction(velocity: FloatArray, lag_s: float, rate_hz: float) -> FloatArray
     """Mean sign of the velocity between each sample and the next.
 
     A filtered speed changes its sign late, and what it then does is not the filtered sign: its
-    lag is taken out of it before (as of a first-order filter). What swings near half the sample
+    lag is removed from it before (as of a first-order filter). What swings near half the sample
     rate is no straight line from sample to sample; it is interpolated as the band allows.
     """
     fine = scipy.signal.resample_poly(velocity, threshold.FINER, 1, window=("kaiser", 8.0))
@@ -373,7 +373,7 @@ def mean_spectra(
 ) -> tuple[FloatArray, FloatArray, ComplexArray, ComplexArray]:
     """Lines in Hz, and cross spectra with the injection of itself, the torque and the velocity.
 
-    Sums over the records' means; torque as reported, nothing taken from it.
+    Sums over the records' means; torque as reported, nothing removed from it.
 
     Raises:
         ValueError: every period has a gap.

@@ -1,4 +1,4 @@
-"""Phases of a multisine that make its peak small beside its power.
+"""Phases of a multisine that make its peak small relative to its power.
 
 Source: Guillaume et al., IEEE Trans. Instrum. Meas. 40 (1991) 982.
 """

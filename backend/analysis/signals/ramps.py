@@ -32,7 +32,7 @@ def settled_ramp(ramp: FloatArray, integrations: int, targets: tuple[float, floa
 def ramped_periods(
     period: FloatArray, periods: int, ramp_samples: int, integrations: int
 ) -> FloatArray:
-    """Ramp in, ``periods`` repetitions, ramp out; the axis ends at rest where it began."""
+    """Ramp in, ``periods`` repetitions, ramp out; the axis ends at standstill where it began."""
     n = period.size
     if ramp_samples == 0:
         return np.tile(period, periods)

@@ -1,4 +1,4 @@
-"""What still swings from before when the evaluated periods begin, taken out of a recording.
+"""What still swings from before when the evaluated periods begin, removed from a recording.
 
 A hardly damped axis takes longer to settle than anybody wants to wait. Between one period and
 the next all that the excitation causes is the same; what differs is the free swing, a few decaying

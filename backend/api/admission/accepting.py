@@ -1,6 +1,6 @@
 """Connections that were accepted and have said nothing yet: bounded, the oldest go first.
 
-Until a TLS handshake is done the server's protocol knows nothing of a connection, and each takes a
+Until a TLS handshake is done the server's protocol has no data of a connection, and each takes a
 file descriptor; with none left nobody is accepted any more, STOP included. So the listening
 socket itself counts them.
 """

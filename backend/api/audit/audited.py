@@ -26,7 +26,7 @@ _ACTIONS: dict[str, Action] = {
 }  # fmt: skip
 _DRIVE = "/drives/{drive_id}"
 #: Routes whose changes are recorded where they happen: value by value, as jobs, or as what people
-#: do. `tests/security/test_every_change_is_told.py` asks each of them.
+#: do. `tests/security/test_every_change_is_reported.py` asks each of them.
 REPORTED_THERE = frozenset(
     f"{method} {API}{path}"
     for method, paths in {
@@ -60,7 +60,7 @@ REPORTED_THERE = frozenset(
     for path in paths
 )  # fmt: skip
 #: Routes that compute or read, and change nothing that stays. (Some records of faults are read
-#: through a selector, which is written and put back; each such write is reported as a write.)
+#: through a selector, which is written and restored; each such write is reported as a write.)
 CHANGES_NOTHING = frozenset(
     f"POST {API}{path}"
     for path in (
@@ -95,7 +95,7 @@ class AuditedAnswers:
             await self._app(scope, receive, send)
             return
         matched = next(iter(self._policy.needs(scope["method"], scope["path"])), None)
-        # The name may be gone when the answer comes: a drive that was taken off the bench.
+        # The name may be gone when the answer comes: a drive that was removed from the axis list.
         axis = self._name_of(matched.drive) if matched and matched.drive else ""
         body = _Body(receive)
         query = dict(parse_qsl(scope["query_string"].decode("latin-1")))
@@ -104,7 +104,7 @@ class AuditedAnswers:
         async def when_safe(message: Message) -> None:
             if message["type"] == "http.response.start":
                 if matched is not None and message["status"] < 400:
-                    self._tell(matched, scope, axis, said)
+                    self._notify(matched, scope, axis, said)
                 # While the audit has a problem everybody is informed of it; waiting would not help.
                 if not self._audit.problem:
                     await self._audit.settled(WAIT_S)
@@ -116,8 +116,8 @@ class AuditedAnswers:
         finally:
             asked.reset(token)
 
-    def _tell(self, matched: Matched, scope: Scope, axis: str, said: Asked) -> None:
-        """Record a change that nobody else tells."""
+    def _notify(self, matched: Matched, scope: Scope, axis: str, said: Asked) -> None:
+        """Record a change that nobody else shows."""
         if matched.route in REPORTED_THERE or matched.route in CHANGES_NOTHING:
             return
         path: str = scope["path"]

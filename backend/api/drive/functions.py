@@ -78,7 +78,7 @@ async def fault_history(connected: TheDrive) -> FaultHistoryInfo:
 
 @router.post(f"{_DRIVE}/fault-history/read")
 async def read_fault_history(bench: TheBench, connected: Controlled) -> FaultHistoryInfo:
-    """The drive's own record, read now; a selector is written and put back where it takes one."""
+    """The drive's own record, read now; a selector is written and restored where it takes one."""
     entries = await read_history(connected.axis)
     bench.journal.add(
         text("journal.fault-history-read", drive=connected.drive.name), drive=connected.drive.id
@@ -259,7 +259,7 @@ def counted(connected: ConnectedDrive, plan: GearPlan) -> list[str]:
 
 
 async def _greatest_rpm(connected: ConnectedDrive) -> float | None:
-    """Greatest motor speed, or the rated one, where the drive tells it in rpm."""
+    """Greatest motor speed, or the rated one, where the drive reports it in rpm."""
     for role in ("max_speed", "rated_speed"):
         parameter = connected.drive.profile.by_role.get(role)
         if parameter is None or parameter.unit != "rpm" or connected.drive.key(role) is None:

@@ -142,7 +142,7 @@ class AxisStopInfo(Message):
 class StopResult(Message):
     """What STOP reached."""
 
-    stopped: list[str] = Field(description="drives whose axis stands by what it measures")
+    stopped: list[str] = Field(description="drives whose axis is at standstill by what it measures")
     failed: dict[str, str] = Field(
         description="all others: not reached, coasting or still moving, and what to do"
     )

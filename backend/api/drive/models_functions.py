@@ -140,7 +140,7 @@ class GearPlanInfo(Message):
     range_travel: float = Field(description="travel of 2^31 user increments")
     max_speed: float | None = Field(description="travel per second at the greatest motor speed")
     max_speed_rpm: float | None
-    acts: str = Field(description="when a change acts, in words")
+    acts: str = Field(description="when a change acts, as text")
     notes: str
     source: str
     warnings: list[str]
@@ -153,7 +153,7 @@ class GearPlanInfo(Message):
 class GearWritten(Message):
     """The gear as written."""
 
-    before: dict[str, int] = Field(description="raw values that take it back")
+    before: dict[str, int] = Field(description="raw values that undo it")
     waits: dict[str, str] = Field(description="key to what must happen before it acts")
 
 

@@ -21,7 +21,7 @@ class ScaleInfo(Message):
     origin: Origin
     source: str = Field(description="objects, file or the manual's place")
     uncertainty: Uncertainty | None = Field(description="why it is not certain")
-    why: str = Field(description="the same in words, or empty")
+    why: str = Field(description="the same as text, or empty")
     remedy: str = Field(description="how it becomes certain, or empty")
 
 

@@ -1,4 +1,4 @@
-"""What a motion changed for its own length and could not put back: put it back, or leave it."""
+"""What a motion changed for its own length and could not restore: restore it, or leave it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ router = APIRouter(prefix="/drives/{drive_id}")
 
 @router.post("/jobs/put-back", status_code=202)
 async def put_back(bench: TheBench, people: ThePeople, me: Me, connected: Controlled) -> JobInfo:
-    """Restore every pending value of the drive, while its axis stands.
+    """Restore every pending value of the drive, while its axis is at standstill.
 
     Where one of them can put energy into the motor (a mode, the function of a terminal), the right
     to move is needed, too.

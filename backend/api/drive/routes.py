@@ -70,7 +70,7 @@ async def faults(connected: TheDrive) -> list[ActiveFault]:
 async def transition(
     bench: TheBench, connected: Controlled, request: TransitionRequest
 ) -> AxisState:
-    """Drive the power state machine. Enabling aims the setpoint at where the axis stands."""
+    """Drive the power state machine. Enabling aims the setpoint at where the axis is."""
     goal = State(request.goal)
     mode = None if request.mode is None else _mode(connected, request.mode)
     await _alone(bench, connected, goal.value, lambda: connected.axis.transition(goal, mode))
@@ -235,8 +235,8 @@ async def write_motion_setting(
     """Write a setting that can start a motion at once; only while the motor has no power.
 
     Functions of terminals, control sources and the mapping of process data. The shaft is watched:
-    where it begins to turn, the setting is put back and the axis is stopped. The grant is for this
-    one write and ends with it; ``reason`` stands in log and audit.
+    where it begins to turn, the setting is restored and the axis is stopped. The grant is for this
+    one write and ends with it; ``reason`` is in log and audit.
     """
     _require_known(connected, key)
     drive = connected.drive

@@ -101,7 +101,7 @@ class HealthAttempt(BaseModel):
 
 
 class HealthPermissionInfo(BaseModel):
-    """The standing permission of an axis' health check. ``ended`` says why it permits nothing."""
+    """The standing permission of an axis' health check. ``ended`` states why it permits nothing."""
 
     person: str
     given: datetime

@@ -152,7 +152,7 @@ async def withdraw_health_permission(
 async def trigger_health(connected: Controlled, schedule: TheSchedule) -> JobInfo:
     """A controller asks for a run. Without a standing permission for it nothing moves.
 
-    ``GET /jobs/{id}`` tells how far it is, ``GET /drives/{id}/health`` what has changed.
+    ``GET /jobs/{id}`` shows how far it is, ``GET /drives/{id}/health`` what has changed.
     """
     return convert.job(await schedule.triggered(connected))
 

@@ -1,7 +1,7 @@
 """Health checks that begin without a person: on a schedule, or when a controller asks for one.
 
 Each needs the standing permission of somebody who may move the axis (`backend.health.permission`),
-and the axis free and at rest. Otherwise nothing moves, and what was in the way is noted.
+and the axis free and at standstill. Otherwise nothing moves, and what was in the way is noted.
 """
 
 from __future__ import annotations
@@ -219,7 +219,7 @@ class Unattended:
         self._running[permission.id] = job
         at = self._now()
         if self._gone(permission):
-            self._end(permission)  # it was taken back while the exchange was started
+            self._end(permission)  # it was undone while the exchange was started
         task = asyncio.create_task(self._watch(permission, job, at, cause), context=by_itself())
         self._ends.add(task)
         task.add_done_callback(self._ends.discard)
@@ -237,10 +237,10 @@ class Unattended:
         outcome = ends.get(job.state, "failed")
         await self._note(permission, Attempt(at=at, cause=cause, outcome=outcome, why=why))
         if outcome == "done":
-            await self._tell_changes(permission)
+            await self._log_changes(permission)
 
-    async def _tell_changes(self, permission: Permission) -> None:
-        """What has changed stands in the log, as nobody waits for the result."""
+    async def _log_changes(self, permission: Permission) -> None:
+        """What has changed is in the log, as nobody waits for the result."""
         connected = self._bench.connected_drives.get(permission.drive)
         if connected is None:
             return
@@ -363,7 +363,7 @@ async def _require_rest(connected: ConnectedDrive) -> None:
     """The axis has no power and stands, by position and speed.
 
     Raises:
-        Busy: somebody else has enabled or turns it. DriveError: it does not tell.
+        Busy: somebody else has enabled or turns it. DriveError: it does not report.
     """
     axis, name = connected.axis, connected.drive.name
     watch = SpeedWatch(axis, await units_of(axis))

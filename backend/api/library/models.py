@@ -62,7 +62,7 @@ class LibraryPage(Message):
 
     entries: list[LibraryEntry]
     total: int
-    problems: list[str] = Field(description="files that could not be taken into the library")
+    problems: list[str] = Field(description="files that could not be added to the library")
     shared: bool = Field(description="other stations may have the same library")
 
 
@@ -78,7 +78,7 @@ class LibraryChange(Message):
 
     notes: str | None = Field(default=None, max_length=4000)
     tags: list[TagText] | None = Field(default=None, max_length=20)
-    deleted: Literal[False] | None = Field(default=None, description="false takes it back")
+    deleted: Literal[False] | None = Field(default=None, description="false undoes it")
 
 
 class StoredSet(SetFileInfo):

@@ -110,7 +110,7 @@ async def library_tags(bench: TheBench) -> list[TagCount]:
 
 @router.get("/{entry_id}")
 async def library_entry(bench: TheBench, entry_id: int) -> LibraryEntry:
-    """One entry, also one that was put aside."""
+    """One entry, also one that was archived."""
     entry = await bench.records.store.call(_entry, bench, entry_id)
     return convert_library.entry(entry, bench.records.station)
 
@@ -185,14 +185,14 @@ async def fetch_library_entry(
 async def change_library_entry(
     bench: TheBench, recordings: TheRecordings, entry_id: int, change: LibraryChange
 ) -> LibraryEntry:
-    """Change notes or tags, or take back what was put aside."""
+    """Change notes or tags, or take back what was archived."""
 
     def work() -> Entry:
         records = bench.records
         entry = _entry(bench, entry_id)
         tags = tuple(change.tags) if change.tags is not None else None
         if entry.kind == "recording" and entry.station == records.station:
-            # A recording's remarks lie beside its file, and go with it.
+            # A recording's remarks lie next to its file, and go with it.
             recordings.library.annotate(entry.name, notes=change.notes, tags=tags, kept=None)
         if change.deleted is False:
             entry = records.library.undelete(entry_id)

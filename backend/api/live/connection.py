@@ -55,7 +55,7 @@ from drivers.texts.message import text
 
 #: Messages that wait for a slow page; states, values and drive lists coalesce and do not count.
 QUEUE = 500
-#: A connection that has not taken a message for this long is closed.
+#: A connection that has not accepted a message for this long is closed.
 SEND_TIMEOUT_S = 10.0
 
 
@@ -108,7 +108,7 @@ class Connection:
         for task in done:
             error = None if task.cancelled() else task.exception()
             # A page may go in the middle of a message, or sleep for so long that its messages
-            # wait for ever; both are ordinary ends. Samples and words are sent beside each other:
+            # wait for ever; both are ordinary ends. Samples and words are sent next to each other:
             # the one finds the line closed, the other that it is known to be.
             known_closed = self._socket.application_state is WebSocketState.DISCONNECTED
             if isinstance(error, RuntimeError) and known_closed:
@@ -268,7 +268,8 @@ class Connection:
         for drive in drives | self.watched:
             if (connected := self._bench.connected_drives.get(drive)) is None:
                 continue
-            # A drive that was taken off the bench and put back is another one of the same name.
+            # A drive that was removed from the axis list and added again is another one of the same
+            # name.
             watchers = connected.monitor.watchers
             if (self.id in watchers) is not (drive in drives):
                 watchers ^= {self.id}

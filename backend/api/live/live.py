@@ -1,4 +1,4 @@
-"""The live websocket of all pages: what the bench tells goes to those that look at it."""
+"""The live websocket of all pages: what the bench reports goes to those that look at it."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class LiveHub:
         self.bench.authority.end_of(session, text("motion.session-is-over"))
 
     def _lowered(self, session: str) -> None:
-        """An account may move nothing any more: what it still moves is brought to rest."""
+        """An account may move nothing any more: what it still moves is stopped."""
         for connection in self._each():
             if connection.identity.session == session:
                 connection.release(None, "the account has another role now")

@@ -12,7 +12,7 @@ Binary frames carry one scope block or several, one behind the other, little end
 
 Sequence and dropped samples are of one stream of a subscription: channels that the cyclic exchange
 carries and channels that are polled are streams of their own; the others' columns are NaN. After
-another ScopeInfo the sequence begins anew.
+another ScopeInfo the sequence begins again.
 """
 
 from __future__ import annotations

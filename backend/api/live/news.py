@@ -1,4 +1,4 @@
-"""What a bench tells its pages: made once for all that look."""
+"""What a bench reports its pages: made once for all that look."""
 
 from __future__ import annotations
 

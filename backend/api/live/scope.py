@@ -2,7 +2,7 @@
 
 A subscription may be carried by several streams: what the cyclic exchange brings with every cycle,
 and what is polled. When an exchange starts or ends, or a drive comes back, the streams are made
-anew by themselves and the page is informed with another ScopeInfo.
+again by themselves and the page is informed with another ScopeInfo.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ SendBytes = Callable[[bytes], Awaitable[None]]
 
 @dataclass(slots=True)
 class _Running:
-    """A subscription. ``signature`` changes when its streams must be made anew."""
+    """A subscription. ``signature`` changes when its streams must be made again."""
 
     request: ScopeStart
     signature: object
@@ -48,14 +48,14 @@ class _Running:
 
 
 class ScopeStreams:
-    """All subscriptions of one connection. ``tell`` queues a text message to the page."""
+    """All subscriptions of one connection. ``notify`` queues a text message to the page."""
 
     def __init__(
-        self, bench: Bench, name: str, tell: Callable[[BaseModel], None], send: SendBytes
+        self, bench: Bench, name: str, notify: Callable[[BaseModel], None], send: SendBytes
     ) -> None:
         self._bench = bench
         self._name = name
-        self._tell = tell
+        self._notify = notify
         self._send = send
         self._running: dict[int, _Running] = {}
         #: Ending a poll may take as long as a mute drive; STOP and jog never wait for that.
@@ -81,7 +81,7 @@ class ScopeStreams:
             ) from error
 
     def bench_changed(self) -> None:
-        """Drives or exchanges changed; streams that this concerns are made anew."""
+        """Drives or exchanges changed; streams that this concerns are made again."""
         if not self._changed:
             self._changed = True
             with contextlib.suppress(asyncio.QueueFull):  # whatever waits there sees it as well
@@ -141,7 +141,7 @@ class ScopeStreams:
             self._refuse(request, error)
             self._running[request.subscription] = _Running(request, signature, [])
             return
-        self._tell(ScopeInfo(subscription=request.subscription, channels=described))
+        self._notify(ScopeInfo(subscription=request.subscription, channels=described))
         for stream, _ in streams:
             stream.ready = self._ready
         self._running[request.subscription] = _Running(request, signature, streams)
@@ -149,7 +149,7 @@ class ScopeStreams:
 
     def _refuse(self, request: ScopeStart, error: DriveError) -> None:
         problem = problem_of(error)
-        self._tell(ScopeInfo(subscription=request.subscription, channels=[], problem=problem))
+        self._notify(ScopeInfo(subscription=request.subscription, channels=[], problem=problem))
 
     async def _subscribe(self, request: ScopeStart) -> _Streams:
         columns: dict[str, list[int]] = {}

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 class Shared:
     """A message that the first page to send it makes; the others take the same text.
 
-    ``make`` may return None where there is nothing to tell any more.
+    ``make`` may return None where there is nothing to report any more.
     """
 
     def __init__(self, make: Callable[[], BaseModel | None]) -> None:

@@ -39,7 +39,7 @@ class LogIn(Message):
 
 
 class SetUp(Message):
-    """The first administrator; ``code`` stands in the terminal of the machine."""
+    """The first administrator; ``code`` is in the terminal of the machine."""
 
     code: Code
     name: PersonName

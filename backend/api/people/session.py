@@ -107,7 +107,7 @@ async def log_out(people: ThePeople, record: TheRecord, me: Me) -> Response:
 async def set_up(
     request: Request, response: Response, people: ThePeople, record: TheRecord, body: SetUp
 ) -> Session:
-    """Make the first administrator, with the code that stands in the terminal."""
+    """Make the first administrator, with the code that is in the terminal."""
     people.require_accounts()
     secret, begun = await people.accounts.set_up(
         body.code, body.name, body.password, address_of(request), client_of(request)

@@ -43,7 +43,7 @@ def _store(bench: Bench) -> ReportStore:
 
 @router.post("/drives/{drive_id}/reports", status_code=201)
 async def make_report(bench: TheBench, connected: TheDrive, request: ReportRequest) -> ReportInfo:
-    """Evaluate the measurements of an axis anew and write its report. Nothing moves."""
+    """Evaluate the measurements of an axis again and write its report. Nothing moves."""
     changes = change_log(bench).read(connected.drive.id)
     first = changes[0].time if changes else None
     chosen = await asyncio.to_thread(_chosen, bench, connected, request.measurements, first)

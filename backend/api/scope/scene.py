@@ -1,6 +1,6 @@
 """The 3D scene from our own origin: viser's page, and its websocket passed through.
 
-viser listens on loopback only and knows no log-in, so nobody reaches it but through here. Nothing
+viser listens on loopback only and has no log-in, so nobody reaches it but through here. Nothing
 that a page sends is passed on: the scene is for looking, and viser would open a tunnel to a server
 on the internet for who asks for one.
 """
@@ -95,7 +95,7 @@ async def _until_gone(socket: WebSocket) -> None:
 
 
 def _protocol() -> str:
-    """viser's client and server must be of one version; the subprotocol tells."""
+    """viser's client and server must be of one version; the subprotocol shows."""
     return f"viser-v{version('viser')}"
 
 

@@ -224,7 +224,7 @@ class Gate:
         connection = self._own_connection(scope, identity)
         named = header(scope["headers"], CONNECTION_HEADER.encode())
         if connection is None:
-            # Routes believe the header, so one that is not true does not reach them.
+            # Routes trust the header, so one that is not true does not reach them.
             scope["headers"] = [
                 (key, value) for key, value in scope["headers"] if key != CONNECTION_HEADER.encode()
             ]

@@ -35,7 +35,7 @@ MOST_PER_ADDRESS = 100
 #: (`backend.api.admission.requests`, `backend.api.security.socket`), so that there always is one.
 MOST_CONNECTIONS = 800
 
-#: Frames beside messages at once, and a second. A page of ours answers a ping every 5 s.
+#: Frames next to messages at once, and a second. A page of ours answers a ping every 5 s.
 _FRAMES = (100.0, 20.0)
 
 _open: Counter[str] = Counter()
@@ -55,7 +55,7 @@ def _beginnings() -> Beginnings:
 
 
 class AcceptingConfig(uvicorn.Config):
-    """With the listening sockets, which want to know when a connection has begun."""
+    """With the listening sockets, which need to know when a connection has begun."""
 
     accepting: Sequence[AcceptingSocket] = ()
 

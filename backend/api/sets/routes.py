@@ -107,7 +107,7 @@ async def upload_set(
 
 @router.delete("/sets/{file}", status_code=204)
 async def delete_set(bench: TheBench, file: str) -> Response:
-    """Put a set aside; it can be taken back on the Files page."""
+    """Archive a set; it can be restored on the Files page."""
     await _existing(bench, file)
     await bench.records.store.call(bench.sets.delete, file)
     return Response(status_code=204)

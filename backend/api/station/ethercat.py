@@ -55,7 +55,7 @@ _FIRMWARE_BODY = {
 async def ethercat_segment(bench: TheBench, url: Annotated[str, Query()]) -> EthercatSegment:
     """An opened segment: its stations in the order of the cable, ports, clocks, punctuality.
 
-    Answers as well while the segment cannot be asked; ``problem`` then says why.
+    Answers as well while the segment cannot be asked; ``problem`` then states the reason.
     """
     link = opened_segment(bench, url)
     survey, problem = Survey((), ()), ""
@@ -181,7 +181,7 @@ async def _require_loadable(connected: ConnectedDrive, link: EthercatLink, stati
     """The drive is the one that was connected, and not enabled.
 
     A drive without valid firmware stays in INIT or BOOT: it cannot be enabled, and only its
-    EEPROM tells which it is.
+    EEPROM shows which it is.
     """
     drive = connected.drive
     seen = next((s for s in (await link.survey()).stations if s.station == station), None)

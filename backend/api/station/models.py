@@ -189,11 +189,11 @@ class Lease(Message):
 
 
 class PendingRestoreValue(Message):
-    """A parameter that a motion changed and could not put back, as the link was lost."""
+    """A parameter that a motion changed and could not restore, as the link was lost."""
 
     key: str
     name: str
-    raw: float | str = Field(description="what it was before; writing it puts it back")
+    raw: float | str = Field(description="what it was before; writing it restores it")
     unapplied: bool = Field(description="it is back, but does not act yet")
 
 
@@ -216,7 +216,7 @@ class DriveSummary(Message):
     unsaved: int = Field(description="parameters in the drive but not in its memory")
     pending: int = Field(description="parameters waiting for write-settings, enable or power-off")
     pending_restores: list[PendingRestoreValue] = Field(
-        description="what a motion could not put back"
+        description="what a motion could not restore"
     )
     lease: Lease
     quality: Quality

@@ -79,7 +79,7 @@ class ImportedDescription(Message):
 
 
 class ReadDictionaryRequest(Message):
-    """Make a profile from what a drive tells of its own objects."""
+    """Make a profile from what a drive reports of its own objects."""
 
     url: str
     station: int = Field(ge=0, le=65535)

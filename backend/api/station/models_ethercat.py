@@ -17,7 +17,7 @@ class SegmentPort(Message):
     rx_errors: int
     invalid_frames: int
     forwarded_errors: int
-    findings: list[str] = Field(description="which cable the counters accuse, in words")
+    findings: list[str] = Field(description="which cable the counters accuse, as text")
 
 
 class SegmentStation(Message):
@@ -127,7 +127,7 @@ class EepromDifference(Message):
 
 
 class EepromComparison(Message):
-    """The EEPROM of a slave beside a file."""
+    """The EEPROM of a slave next to a file."""
 
     bytes: int
     sound: bool

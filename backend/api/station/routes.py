@@ -164,12 +164,12 @@ async def connect(
     connected = await bench.connect(
         request.url, request.station, request.profile, request.name, found=found
     )
-    _tell_connected(bench, connected, request.url, request.station)
+    _log_connected(bench, connected, request.url, request.station)
     await connected.monitor.refresh()
     return convert.drive_summary(bench, connected)
 
 
-def _tell_connected(bench: Bench, connected: ConnectedDrive, url: str, station: int) -> None:
+def _log_connected(bench: Bench, connected: ConnectedDrive, url: str, station: int) -> None:
     where = f"{connected.drive.profile.drive}, {url}, station {station}"
     bench.audit.add(Fact("station", "connected", connected.drive.name, where))
 
@@ -204,7 +204,7 @@ async def add_port(
     """
     check = None if request.accept_difference else require_same_drive
     await bench.add_port(connected.drive.id, request.url, request.station, check)
-    _tell_connected(bench, connected, request.url, request.station)
+    _log_connected(bench, connected, request.url, request.station)
     return convert.drive_summary(bench, connected, connection)
 
 

@@ -177,7 +177,7 @@ def _gains(speed_hz: float, integral_hz: float, position_1_s: float, inertia_kgm
 async def undo_tuning(bench: TheBench, connected: Controlled, request: Undo) -> Undo:
     """Put back what a change returned as `before`; returns what was there until now.
 
-    With the change's `after` nothing is put back over what somebody else has written since.
+    With the change's `after` nothing is restored over what somebody else has written since.
     """
     with bench.motion.keeping_still(connected):
         now = {key: await connected.drive.raw(key) for key in request.before}

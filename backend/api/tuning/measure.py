@@ -128,7 +128,7 @@ def _conclude(
 ) -> None:
     """Keep with the raw data what was concluded from them.
 
-    Of several files of a kind (designs that were taken back) the last one made the result.
+    Of several files of a kind (designs that were undone) the last one made the result.
     """
     kinds = {store.head(file).kind: file for file in files}
     parts = dict.fromkeys(kinds, result) if tool.parts is None else tool.parts(result)

@@ -1,4 +1,4 @@
-"""Routes of stored measurements: list, evaluate anew, take in, hand out, delete."""
+"""Routes of stored measurements: list, evaluate again, take in, hand out, delete."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def _listed(bench: Bench) -> list[MeasurementInfo]:
 
 @router.get("/measurements/{name}")
 async def read_measurement(bench: TheBench, name: str) -> MeasurementContent:
-    """One measurement, evaluated anew from its raw data and compared with its first result."""
+    """One measurement, evaluated again from its raw data and compared with its first result."""
     found = await asyncio.to_thread(load_measurement, bench, name)
     made = await asyncio.to_thread(evaluate, found)
     settings = found.meta.get("settings")

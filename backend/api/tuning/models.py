@@ -144,7 +144,7 @@ class MeasurementInfo(Message):
 
 
 class MeasurementContent(Message):
-    """Its settings, and its result evaluated anew from the raw data."""
+    """Its settings, and its result evaluated again from the raw data."""
 
     info: MeasurementInfo
     settings: dict[str, object]

@@ -12,13 +12,13 @@ class Verdict(StrEnum):
     """What the measured motion says of an axis after STOP."""
 
     STOPPED = "stopped"
-    """Speed and position both say that it stands."""
+    """Speed and position both say that it is at standstill."""
     COASTING = "coasting"
     """It has no power and slows down by itself."""
     STILL_MOVING = "still_moving"
     """It goes on, or what it measures contradicts itself."""
     UNREACHABLE = "unreachable"
-    """The drive was not reached, or does not tell how it moves."""
+    """The drive was not reached, or does not report how it moves."""
 
 
 class StepCode(StrEnum):

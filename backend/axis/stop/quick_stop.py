@@ -1,4 +1,4 @@
-"""How hard a drive brakes on STOP, beside how hard a motion brakes by itself.
+"""How hard a drive brakes on STOP, next to how hard a motion brakes by itself.
 
 Quick stop brakes by 6085h (CiA 402-2 clause 8.4.6), which some makers ship at a sixtieth of what
 people move with: an R6L's 131072 inc/s² are 60 rpm/s, so STOP from 300 rpm would take 5 s.
@@ -33,7 +33,7 @@ def quick_stop_keys(drive: Drive) -> tuple[str, ...]:
 async def raise_quick_stop(drive: Drive, before: Mapping[str, Raw]) -> None:
     """Let STOP brake at least as hard as the motion that is about to begin; lower nothing.
 
-    An option code by which a quick stop coasts is changed to one that brakes. The caller puts back
+    An option code by which a quick stop coasts is changed to one that brakes. The caller restores
     what `quick_stop_keys` names, to the values in ``before``.
     """
     await _let_it_brake(drive, before)
@@ -55,14 +55,14 @@ async def raise_quick_stop_from(
 
     It is the only brake of an axis without a loop: one that leaves its envelope at 1500 rpm would
     go on for 25 s and 310 revolutions with the 60 rpm/s that an R6L is shipped with.
-    The caller puts back what `quick_stop_keys` names, to the values in ``before``.
+    The caller restores what `quick_stop_keys` names, to the values in ``before``.
     """
     await _let_it_brake(drive, before)
     pair = _pair(drive)
     if pair is None or pair[0].unit != units.spec.acceleration:
         return
     if not units.scales.acceleration.certain:
-        # Nobody knows what a larger number would do; the drive's own ramp stays.
+        # It is not known what a larger number would do; the drive's own ramp stays.
         return
     quick, needed = before.get(pair[0].key), units.acceleration_raw(speed_rpm / STOP_S)
     if isinstance(quick, int) and quick < needed:

@@ -23,7 +23,7 @@ _SLOW, _QUICK = (1, 5), (2, 6)
 
 @dataclass(frozen=True, slots=True)
 class StopSettings:
-    """As they were read last; None is an object that the drive lacks or does not tell."""
+    """As they were read last; None is an object that the drive lacks or does not report."""
 
     option: int | None = None
     halt_option: int | None = None

@@ -197,7 +197,7 @@ def _add(archive: zipfile.ZipFile, name: str, path: Path) -> Part:
 
 
 def read_manifest(archive: zipfile.ZipFile, shown: str) -> dict[str, Part]:
-    """Parts by name, all of them plain relative names, and none beside them in the archive.
+    """Parts by name, all of them plain relative names, and none other in the archive.
 
     Raises:
         BackupFailed: not a backup, of a newer version, or not whole.

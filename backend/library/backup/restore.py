@@ -34,7 +34,7 @@ def restore(
 ) -> Restored:
     """Unpack a backup into a state folder, and library and audit into an empty ``database``.
 
-    Blocks. An existing folder is refused, or with ``replace`` kept beside under another name.
+    Blocks. An existing folder is refused, or with ``replace`` kept under another name.
 
     Raises:
         BackupFailed: the archive is not whole, or the folder is in use; nothing was changed.
@@ -123,7 +123,7 @@ def _fill(folder: Path, database: str) -> int:
 
 
 def _put_in_place(fresh: Path, folder: Path) -> Path | None:
-    """The new folder takes the old one's place, which stays beside; back again if that fails."""
+    """The new folder takes the old one's place, which is kept; back again if that fails."""
     aside = None
     if folder.exists() and any(path.name != FolderLock.NAME for path in folder.iterdir()):
         aside = folder.with_name(f"{folder.name}.before-{datetime.now(UTC):%Y%m%d-%H%M%S}")

@@ -3,7 +3,7 @@
 The cookie opens nothing. It only sets its owner apart from strangers: their tries at the same
 name, however many, use up neither its budget nor its turn. (The method is OWASP's "slow down
 online guessing attacks with device cookies".) It names the account by its number and is signed
-with a key that the station keeps beside its database.
+with a key that the station keeps next to its database.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The note beside the database that this station has accounts.
+"""The note next to the database that this station has accounts.
 
 A database file that was emptied, lost or replaced looks like a station that never had any, and
 such a station lets whoever reaches it do everything. So that there are accounts also stands in
@@ -21,7 +21,7 @@ FILE = "accounts.json"
 _KEY_BYTES = 32
 
 
-class AccountsGone(NotAllowed):
+class AccountsMissing(NotAllowed):
     """The station has had accounts, and its database has none."""
 
     kind = "accounts-gone"
@@ -50,7 +50,7 @@ class AccountsMarker:
         """The note, or None where there is none; one that is damaged still says that there is one.
 
         Raises:
-            AccountsGone: it cannot be read, so that nobody can tell.
+            AccountsMissing: it cannot be read, so that nobody can know.
         """
         try:
             content = json.loads(self.path.read_bytes())
@@ -60,7 +60,7 @@ class AccountsMarker:
         except (ValueError, KeyError, TypeError):
             return Marker("", b"")
         except OSError as error:
-            raise AccountsGone(
+            raise AccountsMissing(
                 "people.cannot-read-not-known",
                 value=str(self.path),
                 path=str(self.path),
@@ -68,7 +68,7 @@ class AccountsMarker:
             ) from error
 
     def write(self) -> Marker:
-        """Note that there are accounts, unless that is noted; a damaged note is written anew.
+        """Note that there are accounts, unless that is noted; a damaged note is written again.
 
         Raises:
             StorageFailed: it cannot be written.
@@ -86,14 +86,14 @@ class AccountsMarker:
         """A station that has had accounts still has an administrator.
 
         Raises:
-            AccountsGone: it has none; the message says how to recover on purpose.
+            AccountsMissing: it has none; the message says how to recover on purpose.
         """
         found = self.read()
         if found is None or set_up:
             return
         folder = self.path.parent
         since = f" since {found.since}" if found.since else ""
-        raise AccountsGone(
+        raise AccountsMissing(
             "people.station-accounts-database-no",
             value=str(database),
             since=since,

@@ -100,7 +100,7 @@ class HashTurns:
 
     def _pass_on(self) -> None:
         following = self._known.next() or self._strangers.next()
-        # It stays taken in between: who comes now does not get in before who was called.
+        # It stays in use in between: who comes now does not get in before who was called.
         self._busy = following is not None
         if following is not None:
             following.set_result(None)

@@ -38,7 +38,7 @@ async def announced(
     )
     try:
         try:
-            # Asks first whether somebody has the name (clause 8.1), then tells it twice.
+            # Asks first whether somebody has the name (clause 8.1), then announces it twice.
             await (await responder.async_register_service(service))
         except (OSError, Error) as error:
             failed(str(error) or type(error).__name__)

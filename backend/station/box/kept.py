@@ -28,7 +28,7 @@ def read(folder: Path) -> Box | None:
     """What was set up; None where nothing was.
 
     Raises:
-        NotAllowed: the file cannot be read. Then nobody knows which port is the office's.
+        NotAllowed: the file cannot be read. Then it is not known which port is the office's.
     """
     file = folder / FILE
     try:

@@ -48,7 +48,7 @@ def require_not_office(folder: Path, url: str) -> None:
     """EtherCAT floods a network with frames that no office computer understands.
 
     Raises:
-        NotAllowed: ``url`` is EtherCAT on the office's port, or nobody knows which that is.
+        NotAllowed: ``url`` is EtherCAT on the office's port, or it is not known which that is.
         OutOfRange: no bus URL.
     """
     bus = parse_url(url)

@@ -242,7 +242,7 @@ class FaultCapture:
         return path.name
 
     async def _evidence(self, reason: str, when: float) -> Evidence:
-        # The rings go on; what matters is taken before the slow reading of parameters.
+        # The rings go on; what matters is used before the slow reading of parameters.
         self._forget_old()
         blocks, values = [(tap, b) for _, tap, b in self._blocks], list(self._values)
         connected_drives = list(self._bench.connected_drives.values())

@@ -1,4 +1,4 @@
-"""What is written down about the axes beside the samples: identity, parameters, link, faults."""
+"""What is written down about the axes next to the samples: identity, parameters, link, faults."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def identity(bench: Bench, connected: ConnectedDrive) -> dict[str, Any]:
 async def parameters(
     connected: ConnectedDrive, *, fresh: bool, timeout_s: float
 ) -> list[dict[str, Any]]:
-    """Settings of the drive with the time each was read; what cannot be read says why.
+    """Settings of the drive with the time each was read; what cannot be read states the reason.
 
     ``fresh`` reads all of them now, else only those that were never read. After ``timeout_s``
     it goes on with what it has.

@@ -320,7 +320,7 @@ class Recorder:
             self._timer.cancel()
         await self._leave()
         if self._writer is not None:
-            with contextlib.suppress(StorageFailed):  # `_failed` tells it
+            with contextlib.suppress(StorageFailed):  # `_failed` shows it
                 await asyncio.to_thread(self._writer.close, {"reason": reason, "problem": ""})
             if empty and not self.problem:
                 # Nothing was asked to be kept: the trigger never came.
@@ -338,7 +338,7 @@ class Recorder:
         loop = asyncio.get_running_loop()
 
         def reported(error: StorageFailed) -> None:
-            with contextlib.suppress(RuntimeError):  # the loop is closed: nobody left to tell
+            with contextlib.suppress(RuntimeError):  # the loop is closed: nobody left to notify
                 loop.call_soon_threadsafe(self._failed, error)
 
         return reported

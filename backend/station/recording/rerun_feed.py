@@ -185,7 +185,7 @@ class RerunFeed:
         }
 
     def _signature(self) -> object:
-        """What a change of the bench must change for the arrangement to be made anew."""
+        """What a change of the bench must change for the arrangement to be made again."""
         sessions = {d: id(m.axis.session) for d, m in self._bench.connected_drives.items()}
         names = {d: m.drive.name for d, m in self._bench.connected_drives.items()}
         return self._wanted(), sessions, names

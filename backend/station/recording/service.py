@@ -145,7 +145,7 @@ class Recordings:
         for name in gone:
             self.bench.journal.add(text("journal.recording-pruned", name=name))
 
-    # --- what is written down beside the samples ----------------------------------------
+    # --- what is written down next to the samples ----------------------------------------
 
     def _fault(self, drive: str, text: str) -> None:
         for recorder in list(self.running.values()):

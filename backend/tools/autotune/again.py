@@ -1,8 +1,8 @@
-"""A tuned loop that answers otherwise than predicted tells what its axis is within it.
+"""A tuned loop that answers otherwise than predicted shows what its axis is within it.
 
 The verification is a measurement of the axis as it is used, which no measurement without the loop
 replaces where there is play. What it says of the plant is joined with what was known, the design
-is judged anew and where it must be made anew, and then verified by realisations that nobody has
+is judged again and where it must be made again, and then verified by realisations that nobody has
 seen before: the prediction never rests on the data that it is held against.
 """
 
@@ -34,7 +34,7 @@ from drivers.texts.message import Text, joined, text
 
 #: What came of it. *same*: the design holds for the axis as its loop shows it, too, and was
 #: verified once more; *other*: another one took its place; *not kept*: that one was verified and
-#: taken back; *none*: no design keeps the goals; *time*: too little was left; *unclear*: too few
+#: undone; *none*: no design keeps the goals; *time*: too little was left; *unclear*: too few
 #: lines of the loop are known.
 Outcome = Literal["same", "other", "not kept", "none", "time", "unclear"]
 
@@ -58,7 +58,7 @@ class Figures:
 
 @dataclass(frozen=True)
 class Again:
-    """The first verification beside what was predicted for it, and what was made of that.
+    """The first verification compared with what was predicted for it, and what was made of that.
 
     ``predicted`` and ``measured`` are of the same lines, for which the axis was moved for
     ``motion_s``. ``gain_ratio`` is the second design's
@@ -131,9 +131,9 @@ async def first_that_holds(
 async def again(
     trials: Trials, first: Applied, how: Designing
 ) -> tuple[Applied | None, Again | None]:
-    """Where the verification contradicts the prediction: the plant from the loop, verified anew.
+    """Where the verification contradicts the prediction: the plant from the loop, verified again.
 
-    Returns what is in force then, and nothing beside it where the prediction stands. Nothing is in
+    Returns what is in force then, and nothing next to it where the prediction stands. Nothing is in
     force where the same design did not meet its prediction the second time.
 
     Raises:
@@ -260,7 +260,7 @@ def _designed(
     """
     axis, check = trials.axis, trials.check
     mark = how.mark if how.mark in candidate.marks else next(iter(candidate.marks), how.mark)
-    goals = goals_for(how.load, mark).with_reserve() if candidate.marks else trials.promised
+    goals = goals_for(how.load, mark).with_reserve() if candidate.marks else trials.guaranteed
     made, sound = judged(
         axis, check.facts, plant, candidate.gains, candidate.notches, candidate.filters, goals
     )
@@ -288,7 +288,7 @@ async def _in_place_of(
     await take_back(axis, first.before)
     check = replace(trials.check, pairs_before=MOST_PAIRS, plant=plant)
     applied = await first_kept(
-        axis, trials.session, check, [second], trials.promised, trials.tried, trials.progress,
+        axis, trials.session, check, [second], trials.guaranteed, trials.tried, trials.progress,
         trials.keep, None, trials.time_left,
     )  # fmt: skip
     if applied is None and fall_back:

@@ -38,12 +38,12 @@ class Applied:
 
 async def first_kept(
     axis: Axis, session: CyclicSession, check: Check, candidates: Sequence[Candidate],
-    promised: Goals, tried: list[Text], progress: Progress, keep: Keep | None,
+    guaranteed: Goals, tried: list[Text], progress: Progress, keep: Keep | None,
     softer: Softer | None = None, time_left: TimeLeft | None = None,
 ) -> Applied | None:  # fmt: skip
-    """The first candidate that meets its prediction stays; ``tried`` says why others do not.
+    """The first candidate that meets its prediction stays; ``tried`` states why others do not.
 
-    ``candidates`` are tried in their order; what is ``promised`` is what was asked for, which a
+    ``candidates`` are tried in their order; what is ``guaranteed`` is what was asked for, which a
     more careful one may keep where it does not reach its own goals. One with torque ripple only
     is tried again with less gain, as ``softer`` makes it, before a slower one is. The last one that
     ``time_left`` allows is the most careful of all.
@@ -67,13 +67,13 @@ async def first_kept(
         raw = await plan(axis, candidate, check.inertia_kgm2, check.motor_inertia_kgm2)
         earlier = {key: await axis.drive.raw(key) for key in raw}
         # Noted for the next server: killed here, this one would leave what nobody has verified.
-        with axis.drive.pending_restores.borrowed(earlier):
+        with axis.drive.pending_restores.temporary(earlier):
             before = await write_settings(axis, raw)
             written = datetime.now(UTC)
             try:
                 with clock.verifying():
                     verified = await verify(
-                        axis, session, check, candidate, promised, reported, keep, clock
+                        axis, session, check, candidate, guaranteed, reported, keep, clock
                     )
             except DriveError as error:
                 await take_back(axis, before)

@@ -46,9 +46,9 @@ def si_raw(parameter: Parameter, value: float) -> int:
 
 @dataclass(frozen=True, slots=True)
 class AxisFacts:
-    """None where neither the drive nor the profile tells.
+    """None where neither the drive nor the profile reports.
 
-    ``rated_torque_nm`` is what 100 % of torque is; 1.0 stands in its place where it is unknown
+    ``rated_torque_nm`` is what 100 % of torque is; 1.0 is in its place where it is unknown
     (``torque_known`` False), so that "Nm" then means "of rated torque".
     ``interpolates`` is whether cyclic setpoints are reached linearly (60C2h).
     """

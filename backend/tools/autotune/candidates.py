@@ -32,7 +32,7 @@ _UNMET: dict[LoadClass, Text] = {
 
 @dataclass(frozen=True)
 class Design:
-    """All candidates, fastest first; ``caution`` says why they are careful, None where not."""
+    """All candidates, fastest first; ``caution`` states why they are careful, None where not."""
 
     load: LoadClass
     candidates: tuple[Candidate, ...]
@@ -130,7 +130,7 @@ def cautious_design(
 ) -> Design:  # fmt: skip
     """Gains alone, safe for whatever the axis may be, slower than a design on a model.
 
-    An axis with play is now the whole and now the motor alone.
+    An axis with backlash is now the whole and now the motor alone.
     """
     plant = plant_of(mechanics, inertia_kgm2, facts, cautious=True)
     table = candidates_for(

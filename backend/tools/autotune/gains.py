@@ -41,7 +41,7 @@ class GainState:
 
 
 def spec_of(drive: Drive) -> GainSpec:
-    """Raises NotAllowed where the profile knows no gains."""
+    """Raises NotAllowed where the profile has no gains."""
     if drive.profile.gains is None:
         raise NotAllowed(
             "autotune.profile-not-name-gains", drive=drive.name, profile_title=drive.profile.title
@@ -218,7 +218,7 @@ def _inertia_raw(
 
 
 async def rotor_inertia(axis: Axis, given_kgm2: float | None = None) -> float | None:
-    """The motor's own inertia: given, or from the drive where it tells."""
+    """The motor's own inertia: given, or from the drive where it shows."""
     return given_kgm2 or await si(axis.drive, axis.drive.key("motor_inertia"))
 
 

@@ -45,9 +45,9 @@ async def learn_notches(
     outcome: inertia_evaluation.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
     progress: Progress, time_left: TimeLeft | None = None,
 ) -> Text | None:  # fmt: skip
-    """Measure what no manual prints, where it is worth it: beside the loop where one is needed.
+    """Measure what no manual prints, where it is worth it: with the loop where one is needed.
 
-    A load that pulls needs one, and an axis whose mechanics were measured beside one.
+    A load that pulls needs one, and an axis whose mechanics were measured with one.
 
     Returns why the design goes without notches; None where it does not.
     """
@@ -61,8 +61,8 @@ async def learn_notches(
     clock = time_left or TimeLeft()
     # Where friction rules, a torque that is off by little makes a speed that is off by much.
     ruled = how.scheme == "free" and mechanics.loop != "none"
-    beside = _held(how, facts, outcome) or ruled
-    takes_s = notch_trials.least_s(axis.drive) * (1.0 if beside else threshold.FREE)
+    in_loop = _held(how, facts, outcome) or ruled
+    takes_s = notch_trials.least_s(axis.drive) * (1.0 if in_loop else threshold.FREE)
     repeats = clock.learning()
     if not repeats.allow((1.0 + clock.lossy) * takes_s):
         if meaning_of(axis.drive) is None:
@@ -71,7 +71,7 @@ async def learn_notches(
         return None
     home = await axis.position_raw()
     try:
-        if beside:
+        if in_loop:
             meaning = await measure_meaning_in_loop(
                 axis, session, how.envelope, facts, mechanics, found.inertia_kgm2.value,
                 progress, repeats,

@@ -60,7 +60,7 @@ class Present:
         )
 
     def reported(self, design: Candidate, tried: bool) -> Text | None:
-        """That a design is slower than what the axis had, and why it is taken all the same."""
+        """That a design is slower than what the axis had, and why it is accepted all the same."""
         if not self.slower(design) or not self.speed_nms:
             return None
         share = design.gains.speed_nms / self.speed_nms
@@ -124,19 +124,19 @@ def judged(
     loops = speed_loop(f, plant.shifted(), fixed, gains)
     worst = worst_of(loops)
     candidate = described(
-        f, plant.response(), fixed, gains, worst.promised, notches=notches, filters=filters
+        f, plant.response(), fixed, gains, worst.guaranteed, notches=notches, filters=filters
     )
     return candidate, worst.meets(goals) and stable_with_less_gain(loops)
 
 
 @dataclass
 class Trials:
-    """Everything that is verified on one axis, in turn; ``tried`` says why what failed did."""
+    """Everything that is verified on one axis, in turn; ``tried`` states why what failed did."""
 
     axis: Axis
     session: CyclicSession
     check: Check
-    promised: Goals
+    guaranteed: Goals
     progress: Progress
     keep: Keep | None
     tried: list[Text] = field(default_factory=list)
@@ -153,7 +153,7 @@ class Trials:
             DriveError: the drive has a fault, or the link is lost; nothing stays written.
         """
         check = self.check
-        self.had = await present(self.axis, check.facts, plant, check.inertia_kgm2, self.promised)
+        self.had = await present(self.axis, check.facts, plant, check.inertia_kgm2, self.guaranteed)
         slower = [c for c in order if self.had.slower(c)]
         applied = await self._designs([c for c in order if c not in slower], plant)
         if applied is None and slower and self.had.sound and self._may_stay():
@@ -195,12 +195,12 @@ class Trials:
             )
             made, sound = await asyncio.to_thread(
                 judged, self.axis, self.check.facts, plant, gains, candidate.notches,
-                candidate.filters, self.promised,
+                candidate.filters, self.guaranteed,
             )  # fmt: skip
             return replace(made, marks=candidate.marks) if sound else None
 
         return await first_kept(
-            self.axis, self.session, self.check, rows, self.promised, self.tried, self.progress,
+            self.axis, self.session, self.check, rows, self.guaranteed, self.tried, self.progress,
             self.keep, softer, self.time_left,
         )  # fmt: skip
 
@@ -212,7 +212,7 @@ class Trials:
         try:
             with self.time_left.verifying():
                 verified = await verify(
-                    self.axis, self.session, self.check, candidate, self.promised,
+                    self.axis, self.session, self.check, candidate, self.guaranteed,
                     stages(self.progress), self.keep, self.time_left,
                 )  # fmt: skip
         except DriveError as error:

@@ -19,16 +19,16 @@ def by_raised_gain(missed: Missed) -> bool:
     return missed.what == "coverage" or missed.end == "predicted"
 
 
-def wanted_db(missed: tuple[Missed, ...], promised: Goals) -> float:
+def wanted_db(missed: tuple[Missed, ...], guaranteed: Goals) -> float:
     """How much more gain must be shown; where uncertain, the required margin less its tolerance."""
     if any(each.what != "coverage" for each in missed):
-        return promised.gain_margin_db - WORST_DB
-    return min(promised.gain_margin_db - threshold.NOT_SHOWN_DB, threshold.MOST_SHOWN_DB)
+        return guaranteed.gain_margin_db - WORST_DB
+    return min(guaranteed.gain_margin_db - threshold.NOT_SHOWN_DB, threshold.MOST_SHOWN_DB)
 
 
 def raised_to(
     axis: Axis, facts: AxisFacts, plant: MeasuredPlant | None, candidate: Candidate,
-    verdict: LoopVerdict | None, promised: Goals, missed: tuple[Missed, ...],
+    verdict: LoopVerdict | None, guaranteed: Goals, missed: tuple[Missed, ...],
 ) -> float:  # fmt: skip
     """By how many dB the gain is raised: what must be shown, or more, where that shows the goals.
 
@@ -39,13 +39,13 @@ def raised_to(
     Raises:
         NotAllowed, ValueError: a part of the loop has no known meaning.
     """
-    least = wanted_db(missed, promised)
+    least = wanted_db(missed, guaranteed)
     predicted = verdict.predicted if verdict is not None else None
     if verdict is None or plant is None or predicted is None or predicted.gain_margin_db is None:
         return least
     f = plant.frequency_hz
     every = loops_of(axis, facts, candidate, f, plant.shifted())
-    excludes = excluding_db(verdict, f, every, promised) + threshold.SURELY_DB
+    excludes = excluding_db(verdict, f, every, guaranteed) + threshold.SURELY_DB
     most = max(
         predicted.gain_margin_db.value - threshold.KEPT_BACK_DB, least + threshold.AT_ONCE_DB
     )
@@ -53,13 +53,13 @@ def raised_to(
 
 
 def not_shown(
-    verdict: LoopVerdict | None, promised: Goals, shown: GainSteps, missed: tuple[Missed, ...]
+    verdict: LoopVerdict | None, guaranteed: Goals, shown: GainSteps, missed: tuple[Missed, ...]
 ) -> list[Text]:
     """What raising the gain leaves open above the measured band; empty where nothing."""
     if verdict is None:
         return []
-    said = in_words(misses(verdict, promised))
-    wanted = wanted_db(missed, promised)
+    said = in_words(misses(verdict, guaranteed))
+    wanted = wanted_db(missed, guaranteed)
     if shown.shown_db < wanted - MARGIN_DB:
         top = 0.0 if verdict.measured is None else verdict.measured.high_hz
         said.append(

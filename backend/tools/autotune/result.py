@@ -50,7 +50,7 @@ class MarginsInfo(_Part):
 
 
 class GoalsInfo(_Part):
-    """The worst margins that were promised or found; None where they are not finite."""
+    """The worst margins that were guaranteed or found; None where they are not finite."""
 
     gain_margin_db: float | None
     phase_margin_deg: float | None

@@ -1,7 +1,7 @@
 """From an unknown axis to a tuned and verified one, in named steps that all can be cancelled.
 
 Pre-checks, inertia, frequency response, candidates, apply, verify. What is applied stays only
-if the verification keeps what was promised; on every other way out the drive's parameters are
+if the verification keeps what was guaranteed; on every other way out the drive's parameters are
 as they were before.
 """
 
@@ -81,7 +81,7 @@ class AutotuneResult:
 
     ``before`` holds raw values that undo what was applied, empty when nothing was written, also
     because ``applied`` is what the axis had. ``tried`` says
-    of designs that were taken back why; ``notes`` what the design does without. ``cautious``: no
+    of designs that were undone why; ``notes`` what the design does without. ``cautious``: no
     model could be relied on. ``again``: what was made of a loop that answered otherwise than
     predicted. ``expected`` is the prediction for ``applied``, read where the verification was.
     """
@@ -324,9 +324,9 @@ async def apply_and_verify(
         settings.motor_inertia_kgm2, found.inertia.result.coulomb_nm.value,
         await axis.position_raw(),
     )  # fmt: skip
-    promised = goals_for(found.load, settings.mark)
+    guaranteed = goals_for(found.load, settings.mark)
     clock = time_left or TimeLeft()
-    trials = Trials(axis, session, check, promised, progress, keep, time_left=clock)
+    trials = Trials(axis, session, check, guaranteed, progress, keep, time_left=clock)
 
     def designing(mark: Mark) -> Designing:
         plant = plant_of(found.mechanics, inertia, facts, cautious=found.cautious)

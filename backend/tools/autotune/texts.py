@@ -107,7 +107,7 @@ def _row(each: CandidateInfo) -> tuple[Cell, ...]:
 
 
 def _figures(applied: CandidateInfo, verified: VerifiedInfo) -> Grid:
-    """What was predicted beside what the verification states."""
+    """What was predicted compared with what the verification states."""
     goals, read = applied.promised, verified.sweep.margins
     stated = verified.verdict.stated if verified.verdict else None
     phase, gain, peak = (

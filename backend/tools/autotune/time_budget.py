@@ -55,7 +55,7 @@ class TimeLeft:
     def pairs(self, first_s: float, most: int, looks: int = 0) -> int:
         """How many pairs of realisations there is time for, where the first took ``first_s``.
 
-        Beside so many ``looks``, further verifications, where there is time for all of them.
+        Next to so many ``looks``, further verifications, where there is time for all of them.
         """
         left_s = self.until_s - self.raising_s - time.monotonic() - threshold.AROUND_S
         spare_s = looks * (first_s + threshold.AROUND_S)

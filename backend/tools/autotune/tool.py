@@ -55,7 +55,10 @@ def answer_of(result: AutotuneResult, after: Mapping[str, int] | None = None) ->
 
 def candidate_info(candidate: Candidate) -> CandidateInfo:
     """One row of the table of designs."""
-    return CandidateInfo.model_validate(figures_of(candidate))
+    figures = figures_of(candidate)
+    # Stored results have named the guaranteed margins so since their first version.
+    figures["promised"] = figures.pop("guaranteed")
+    return CandidateInfo.model_validate(figures)
 
 
 def _verified(verified: Verified, result: AutotuneResult) -> VerifiedInfo:

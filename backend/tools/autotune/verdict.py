@@ -64,14 +64,14 @@ def fixed_of(
 
 def sharp_lines(frf: Frf) -> Lines | None:
     """The lines that margins are read from; None where they begin above the loop's bandwidth."""
-    found = telling_lines(frf)
+    found = reported_lines(frf)
     return None if found is None or np.abs(found.closed[0]) < WITHIN else found
 
 
-def telling_lines(frf: Frf) -> Lines | None:
+def reported_lines(frf: Frf) -> Lines | None:
     """The lines that noise hardly moves, up to the first gap; None where there are too few.
 
-    Of a slow loop they lie above its crossover: they tell its size and its delay all the same,
+    Of a slow loop they lie above its crossover: they show its size and its delay all the same,
     though not the margins of that crossover.
     """
     use = frf.in_band & (frf.coherence > COHERENT) & ~(frf.std_deg > BLURRED_DEG)
@@ -113,12 +113,14 @@ def verdict_of(
 
     dense = plant.frequency_hz
     every, nominal = loops(dense, plant.shifted()), loops(dense, plant.response())
-    beside = None
+    alternatives = None
     if facts.motor_inertia_kgm2:
-        beside = loops(dense, plant.motor_alone_above(facts.motor_inertia_kgm2))[None, :]
-    seen = telling_lines(frf)
+        alternatives = loops(dense, plant.motor_alone_above(facts.motor_inertia_kgm2))[None, :]
+    seen = reported_lines(frf)
     if seen is None:
-        return judge(None, dense, every, nominal, shown_gain_db=shown_gain_db, beside=beside)
+        return judge(
+            None, dense, every, nominal, shown_gain_db=shown_gain_db, alternatives=alternatives
+        )
     crossing = sharp_lines(frf) is not None
     f = seen.frequency_hz
     expected = loops(f, plant.on(f).response())
@@ -130,7 +132,7 @@ def verdict_of(
         judge(
             Lines(f, path.closed, seen.deviation) if crossing else None, dense, every, nominal,
             shown_gain_db=shown_gain_db, late_s=path.loop_late_s, size=path.loop_size,
-            beside=beside,
+            alternatives=alternatives,
         )
         for path in paths
     ]  # fmt: skip
@@ -158,6 +160,6 @@ def in_words(missed: tuple[Missed, ...]) -> list[Text]:
     return said
 
 
-def misses(verdict: LoopVerdict, promised: Goals) -> tuple[Missed, ...]:
+def misses(verdict: LoopVerdict, guaranteed: Goals) -> tuple[Missed, ...]:
     """What a verdict misses of the goals, with what a margin may be off by."""
-    return verdict.missed(promised, MARGIN_DEG, MARGIN_DB, MS_RATIO)
+    return verdict.missed(guaranteed, MARGIN_DEG, MARGIN_DB, MS_RATIO)

@@ -1,4 +1,4 @@
-"""Whether a tuned axis keeps what its design promised: measured, not believed."""
+"""Whether a tuned axis keeps what its design guaranteed: measured, not trusted."""
 
 from __future__ import annotations
 
@@ -55,14 +55,14 @@ HUM_PERCENT = threshold.HUM_PERCENT
 
 @dataclass(frozen=True)
 class Verified:
-    """The speed loop as measured after applying, beside what was predicted.
+    """The speed loop as measured after applying, compared with what was predicted.
 
     ``hum_percent`` is set where nothing but a hum is wrong, in % of the rated torque.
     """
 
     sweep: sweep_evaluation.SweepResult
     step: step_evaluation.StepResult | None
-    promised: Goals
+    guaranteed: Goals
     predicted_bandwidth_hz: float | None
     measured_bandwidth_hz: float | None
     kept: bool
@@ -101,14 +101,14 @@ class Check:
 
 
 async def verify(
-    axis: Axis, session: CyclicSession, check: Check, candidate: Candidate, promised: Goals,
+    axis: Axis, session: CyclicSession, check: Check, candidate: Candidate, guaranteed: Goals,
     reported: tuple[Progress, Progress, Progress], keep: Keep | None,
     time_left: TimeLeft | None = None,
 ) -> Verified:  # fmt: skip
     """Stand still, measure the closed speed loop, make a step; ``reported``: a progress each.
 
     The loop is measured once more, with as many pairs of realisations as ``time_left`` allows,
-    where the first pair tells too little, or another bandwidth than was predicted.
+    where the first pair shows too little, or another bandwidth than was predicted.
 
     Raises:
         NotAllowed: it does not stand still, or the envelope or a fault ended it.
@@ -133,12 +133,12 @@ async def verify(
     looks = LOOKS - bool(check.pairs_before) if read else 0
     took_s = time.monotonic() - begun_s
     verdict = _verdict(axis, check, candidate, swept, None)
-    above = tuple(each for each in _misses(verdict, promised) if by_raised_gain(each))
+    above = tuple(each for each in _misses(verdict, guaranteed) if by_raised_gain(each))
     known = (axis, check.facts, check.plant, candidate)
-    clock.require_raising(steps_to(raised_to(*known, verdict, promised, above)) if above else 0)
+    clock.require_raising(steps_to(raised_to(*known, verdict, guaranteed, above)) if above else 0)
     pairs = clock.pairs(took_s, MOST_PAIRS, looks)
-    missed = worse_than(promised, read)
-    blurred = any(each.end == "measured" for each in _misses(verdict, promised))
+    missed = worse_than(guaranteed, read)
+    blurred = any(each.end == "measured" for each in _misses(verdict, guaranteed))
     blurred = blurred or (verdict is not None and verdict.measured is None)
     as_predicted = _as_predicted(candidate.bandwidth_hz, _width_of(read), threshold.DOUBTED)
     every: Frf | None = None
@@ -147,14 +147,14 @@ async def verify(
         with clock.extra():
             more = await sweep_tool.sweep(axis, session, settings, measuring, keep, again)
         every = more.frf
-        missed = worse_than(promised, sharp_margins(more))
+        missed = worse_than(guaranteed, sharp_margins(more))
         if blurred and sharp_lines(more.frf) is not None:
             verdict = _verdict(axis, check, candidate, more, None)
         swept, read = _joined(swept, read, more)
     if again.left_out:
         clock.give_up(NOT_AGAIN)
     measured = _width_of(read)
-    beyond = _misses(verdict, promised)
+    beyond = _misses(verdict, guaranteed)
     open_above = tuple(each for each in beyond if by_raised_gain(each))
     missed = missed or in_words(tuple(each for each in beyond if each not in open_above))
     why = _named(candidate, missed)
@@ -172,13 +172,13 @@ async def verify(
         why = _named(candidate, [each for each in (hums, restless_why) if each is not None])
         only_hums = hums is not None and restless_why is None
         if why is None and open_above:
-            most_db = raised_to(*known, verdict, promised, open_above)
+            most_db = raised_to(*known, verdict, guaranteed, open_above)
             shown = await gain_steps(axis, session, settings_of_step, step, most_db, stepping)
             verdict = _verdict(axis, check, candidate, swept, shown.shown_db)
-            why = _named(candidate, not_shown(verdict, promised, shown, open_above))
+            why = _named(candidate, not_shown(verdict, guaranteed, shown, open_above))
     swept = replace(swept, margins=read)
     return Verified(
-        swept, step, promised, candidate.bandwidth_hz, measured, why is None, why,
+        swept, step, guaranteed, candidate.bandwidth_hz, measured, why is None, why,
         hum_percent_of(step) if step is not None and only_hums else None, every, verdict, shown,
     )  # fmt: skip
 
@@ -193,8 +193,8 @@ def _verdict(
     return verdict_of(axis, check.facts, check.plant, candidate, swept.frf, check.hold, shown_db)
 
 
-def _misses(verdict: LoopVerdict | None, promised: Goals) -> tuple[Missed, ...]:
-    return () if verdict is None else misses(verdict, promised)
+def _misses(verdict: LoopVerdict | None, guaranteed: Goals) -> tuple[Missed, ...]:
+    return () if verdict is None else misses(verdict, guaranteed)
 
 
 def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool | None]:
@@ -268,17 +268,17 @@ def _as_predicted(
     return abs(measured_hz / predicted_hz - 1.0) <= within
 
 
-def worse_than(promised: Goals, found: dict[str, float | bool | None]) -> list[Text]:
-    """What of a measured loop is worse than promised."""
+def worse_than(guaranteed: Goals, found: dict[str, float | bool | None]) -> list[Text]:
+    """What of a measured loop is worse than guaranteed."""
     said = []
     ms, pm, gm = found.get("ms"), found.get("phase_margin_deg"), found.get("gain_margin_db")
-    if isinstance(ms, float) and ms > promised.ms * MS_RATIO:
-        said.append(text("autotune.sensitivity", have=ms, wanted=promised.ms))
-    if isinstance(pm, float) and pm < promised.phase_margin_deg - MARGIN_DEG:
-        wanted = promised.phase_margin_deg
+    if isinstance(ms, float) and ms > guaranteed.ms * MS_RATIO:
+        said.append(text("autotune.sensitivity", have=ms, wanted=guaranteed.ms))
+    if isinstance(pm, float) and pm < guaranteed.phase_margin_deg - MARGIN_DEG:
+        wanted = guaranteed.phase_margin_deg
         said.append(text("autotune.phase-margin", have_deg=pm, wanted_deg=wanted))
-    if isinstance(gm, float) and gm < promised.gain_margin_db - MARGIN_DB:
-        wanted = promised.gain_margin_db
+    if isinstance(gm, float) and gm < guaranteed.gain_margin_db - MARGIN_DB:
+        wanted = guaranteed.gain_margin_db
         said.append(text("autotune.gain-margin", have_db=gm, wanted_db=wanted))
     return said
 
@@ -286,7 +286,7 @@ def worse_than(promised: Goals, found: dict[str, float | bool | None]) -> list[T
 def otherwise(verified: Verified) -> Text | None:
     """That a tuned loop answers otherwise than predicted, though it keeps its margins; else None.
 
-    An axis with play does: how much of the time its gap is open depends on how it is driven.
+    An axis with backlash does: how much of the time its gap is open depends on how it is driven.
     """
     predicted, measured = verified.predicted_bandwidth_hz, verified.measured_bandwidth_hz
     if _as_predicted(predicted, measured):
@@ -298,7 +298,7 @@ def unseen(last_hz: float | None, verified: Verified) -> Text | None:
     """That the last crossover possible lies above what was verified; else None.
 
     The motor of a soft axis is alone above its resonances, and lighter: its loop may cross 0 dB
-    for the last time where the samples of this exchange tell nothing.
+    for the last time where the samples of this exchange show nothing.
     """
     verdict = verified.verdict
     if verdict is not None:

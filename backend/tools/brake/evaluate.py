@@ -53,7 +53,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Trials:
-    """Raw data of both directions and what is known beside them. ``test_percent`` of rated."""
+    """Raw data of both directions and what is known next to them. ``test_percent`` of rated."""
 
     trials: tuple[Trial, ...]
     sample_rate_hz: float
@@ -72,7 +72,7 @@ class Trials:
         return {**found, "way": np.concatenate(way)}
 
     def facts(self) -> dict[str, object]:
-        """For storage, beside the arrays."""
+        """For storage, with the arrays."""
         return {
             "sample_rate_hz": self.sample_rate_hz,
             "torque_step_nm": self.torque_step_nm,
@@ -168,7 +168,7 @@ class _Way:
         return float(np.median(signal[at[at.size // 2 :]])) if at.size else 0.0
 
     def _halted_at(self) -> int:
-        """First sample beside which no torque was sent any more; all of them where none."""
+        """First sample next to which no torque was sent any more; all of them where none."""
         sent = np.abs(self._trial.sent_nm) > 0
         if not self._trial.halted or not np.any(sent):
             return sent.size

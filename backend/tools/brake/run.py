@@ -262,7 +262,7 @@ def _placed(
 ) -> Trial:  # fmt: skip
     """Each sample with the part of the sequence that its cycle belongs to.
 
-    The first setpoint that came back and is not the one before the motion tells where it began.
+    The first setpoint that came back and is not the one before the motion shows where it began.
     """
     cycles, values, valid = catch.rows()
     went = np.flatnonzero(valid & (values[:, 2] != raw[0]))

@@ -21,7 +21,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "lead": (
         "The axis is energised while its holding brake stays closed, and the torque rises to the "
         "test torque, forwards and then backwards. Where the shaft moves by the slip limit, the "
-        "torque is taken away in the next cycle.",
+        "torque is removed in the next cycle.",
         "保持抱闸闭合时给轴通电，转矩先正向后反向升至测试转矩。轴移动达到打滑限值时，"
         "在下一个周期撤去转矩。",
     ),
@@ -32,9 +32,9 @@ TEXTS: dict[str, tuple[str, str]] = {
         "其下方及可及范围内不得有人。",
     ),
     "warning": (
-        "WARNING. The shaft may turn suddenly. Keep away from everything that it drives. On a "
-        "drive that knows of no brake (its output has another function) nothing but this brake "
-        "holds the axis.",
+        "WARNING. The shaft may turn suddenly. Keep away from everything that it drives. While "
+        "the drive does not control the brake (its output has another function), nothing but "
+        "this brake holds the axis.",
         "警告。轴可能突然转动，请远离其驱动的所有部件。驱动器在测试期间不控制抱闸（其输出已改为"
         "其他功能），轴仅由该抱闸保持。",
     ),

@@ -22,7 +22,7 @@ from backend.tools.tool import Arrays, Meta
 from drivers.errors import NotAllowed
 
 FloatArray = npt.NDArray[np.float64]
-#: Fewer samples tell nothing.
+#: Fewer samples show nothing.
 _FEWEST = 20
 #: Below this the axis carried nothing: % of rated, rpm.
 _IDLE_PERCENT, _IDLE_RPM = 0.5, 1.0
@@ -37,7 +37,7 @@ _CELLS = 40
 
 @dataclass(frozen=True)
 class CycleFacts:
-    """What is known of motor and drive; None where nobody tells."""
+    """What is known of motor and drive; None where unknown."""
 
     rated_torque_nm: float | None
     rated_speed_rpm: float | None
@@ -62,7 +62,7 @@ class Samples:
 
 
 def meta_of(settings: CycleSettings, facts: CycleFacts) -> dict[str, object]:
-    """For storage, beside the arrays."""
+    """For storage, with the arrays."""
     return {
         "tool": "cycle", "settings": settings.model_dump(mode="json"), "facts": asdict(facts),
     }  # fmt: skip

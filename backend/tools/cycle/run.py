@@ -80,12 +80,12 @@ async def run(run: Run, settings: CycleSettings) -> CycleResult:
 
     Raises:
         NotAllowed: the drive or the recording has no torque or no speed, or too few samples came.
-        ScaleUnknown: nobody knows the unit of the speed.
+        ScaleUnknown: the unit of the speed is unknown.
         LinkLost: the bus is gone.
     """
     axis = run.axis
     units = await axis.units()
-    # Speeds in a unit that nobody knows say nothing about power: this refuses them.
+    # Speeds in a unit that is unknown say nothing about power: this refuses them.
     units.velocity_raw(1.0)
     facts = await _facts(axis, units, settings)
     keys = {role: axis.drive.require(role) for role in _NEEDED}
@@ -118,7 +118,7 @@ async def _facts(axis: Axis, units: AxisUnits, settings: CycleSettings) -> Cycle
 
 
 async def _readable(axis: Axis, role: str) -> str | None:
-    """The key of what may be read beside torque and speed, where this drive has it."""
+    """The key of what may be read in addition to torque and speed, where this drive has it."""
     key = axis.drive.key(role)
     if key is None or axis.drive.unreachable_why(axis.drive.parameter(key)):
         return None
@@ -204,7 +204,7 @@ def _samples(
         parameter = axis.drive.parameter(keys[role])
         return np.asarray((values - parameter.offset) / parameter.scale)
 
-    def beside(role: str) -> FloatArray:
+    def reading(role: str) -> FloatArray:
         return columns[role][1] if role in columns else np.empty(0)
 
     begin = torque_s[0] if torque_s.size else 0.0
@@ -213,7 +213,7 @@ def _samples(
             torque_s - begin, raw("torque_actual", torque) * units.torque(1.0),
             raw("velocity_actual", speed) * units.velocity(1.0),
         ),
-        beside("dc_voltage"), beside("load_ratio"),
+        reading("dc_voltage"), reading("load_ratio"),
     )  # fmt: skip
 
 

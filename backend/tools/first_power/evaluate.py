@@ -51,7 +51,7 @@ class Seen:
 
 
 def facts_of(seen: Seen) -> dict[str, object]:
-    """For storage, beside the arrays."""
+    """For storage, with the arrays."""
     return asdict(seen)
 
 

@@ -130,7 +130,7 @@ def _guide(drive: Drive) -> Guide | None:
 async def _limit_inputs(drive: Drive) -> tuple[bool | None, bool | None] | None:
     """Negative and positive limit switch as they are; None where no input has both functions.
 
-    A drive whose inputs have no selectable functions tells of them by 60FDh (CiA 402-2: bit 0
+    A drive whose inputs have no selectable functions reports them by 60FDh (CiA 402-2: bit 0
     negative, bit 1 positive).
     """
     terminals = [each for each in await read_terminals(drive) if each.terminal.direction == "in"]
@@ -199,7 +199,7 @@ async def _without_loops(axis: Axis, settings: FirstPowerSettings) -> AsyncItera
     """Stops take the power off, and the drive itself limits its torque.
 
     Raises:
-        RestoreFailed: on leaving, naming what could not be put back.
+        RestoreFailed: on leaving, naming what could not be restored.
     """
     drive = axis.drive
     options = [key for key in _COASTING if key in drive.profile.by_key]
@@ -333,7 +333,7 @@ class _Test:
         return np.array([self._units.torque_raw(percent * each) for each in shape], np.int64)
 
     async def _settled(self) -> None:
-        """Wait, without torque, until the shaft stands: little friction lets it coast."""
+        """Wait, without torque, until the shaft is at standstill: little friction lets it coast."""
         deadline, last = time.monotonic() + threshold.SETTLES_S, await self._place()
         while time.monotonic() < deadline:
             await dwell(self._run.axis, self._run.session, threshold.SETTLE_LOOK_S)

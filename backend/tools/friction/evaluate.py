@@ -71,7 +71,7 @@ class Map:
         }  # fmt: skip
 
     def facts(self) -> dict[str, object]:
-        """For storage, beside the arrays."""
+        """For storage, with the arrays."""
         return {
             "sample_rate_hz": self.sample_rate_hz, "torque_step_nm": self.torque_step_nm,
             "inertia_kgm2": self.inertia_kgm2, "ripple_rpm": self.ripple_rpm,
@@ -139,7 +139,7 @@ def evaluate(data: Map, settings: FrictionSettings, facts: AxisFacts) -> Frictio
     if not any(p.speed_rpm > 0 for p in points) or not any(p.speed_rpm < 0 for p in points):
         raise NotAllowed("friction.no-speed-held-evenly", value=round(max(uneven, default=0.0), 4))
     model = _model(points, step)
-    # Friction rises and falls with the speed's own ripple: known now, it is taken out.
+    # Friction rises and falls with the speed's own ripple: known now, it is removed.
     own = ripple and _ripple(slow, settings.orders, rate, inertia, step, model)
     if not settings.ripple:
         findings.append(Finding(code="ripple_not_asked"))

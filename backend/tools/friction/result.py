@@ -41,7 +41,7 @@ class FrictionPoint(_Part):
     speed_rpm: float
     torque_percent: float
     torque_ci95_percent: tuple[float, float]
-    revolutions: float = Field(description="that the mean is taken over")
+    revolutions: float = Field(description="that the mean is calculated over")
 
 
 class Harmonic(_Part):

@@ -159,7 +159,7 @@ def _representable(speeds_rps: FloatArray, units: AxisUnits) -> list[float]:
 def speeds_of(stroke: Stroke, rate: float, slow_rps: float) -> tuple[FloatArray, FloatArray]:
     """Speed [n] in rpm and, per sample, the signed number of the plateau that it counts for.
 
-    The axis goes half a stroke back from where it stands, and comes back there at the end.
+    The axis goes half a stroke back from where it is, and comes back there at the end.
     """
     half = _positioning(-0.5 * stroke.length_rev, slow_rps, rate)
     still = np.zeros(round(threshold.DWELL_S * rate))
@@ -191,7 +191,7 @@ async def run(run: Run, settings: FrictionSettings) -> FrictionResult:
     Raises:
         OutOfRange: the limits leave nothing to measure; nothing has moved but a short first move.
         NotAllowed: 6077h does not come with every cycle or does not change, or the envelope or a
-            fault ended a motion; says why.
+            fault ended a motion; states the reason.
     """
     axis, session, envelope = run.axis, run.session, settings.envelope
     require_signals(axis, session, Mode.CSV, False)

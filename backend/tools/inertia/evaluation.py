@@ -14,7 +14,7 @@ from backend.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.inertia.result import InertiaAnswer, InertiaIntervals, RatioReference
 from backend.tools.measuring.recording import Recording
-from backend.tools.sweep.quiet_velocity import quiet_velocity
+from backend.tools.sweep.velocity_noise import velocity_without_noise
 from backend.tools.thresholds import inertia_evaluation as threshold
 from backend.tools.tool import Arrays, Meta
 from drivers.errors import NotAllowed
@@ -54,7 +54,7 @@ class InertiaOutcome:
     ends_rev: tuple[float, float] | None
     motion_s: float
     ratio_against: RatioReference | None
-    """What the load ratio compares with, in words; empty where there is no ratio."""
+    """What the inertia ratio compares with, as text; empty where there is no ratio."""
 
 
 def evaluate(recording: Recording, settings: InertiaSettings, facts: AxisFacts) -> InertiaResult:
@@ -62,7 +62,7 @@ def evaluate(recording: Recording, settings: InertiaSettings, facts: AxisFacts) 
     try:
         found = estimate_inertia(
             recording.torque_nm,
-            quiet_velocity(recording, CUTOFF_HZ),
+            velocity_without_noise(recording, CUTOFF_HZ),
             recording.sample_rate_hz,
             cutoff_hz=CUTOFF_HZ,
             torque_limit_nm=settings.envelope.torque_percent / 100.0 * facts.rated_torque_nm,
@@ -91,7 +91,8 @@ def uncertainty_of(result: InertiaResult) -> float:
 
 
 def oscillation_hz(recording: Recording, result: InertiaResult) -> float | None:
-    """Where the torque swings beside what inertia and friction explain; None where it hardly does.
+    """Where the torque swings compared with what inertia and friction explain; None where it hardly
+    does.
 
     Under its speed loop the motor follows and the load swings behind the coupling, at the
     mechanics' antiresonance.
@@ -102,8 +103,8 @@ def oscillation_hz(recording: Recording, result: InertiaResult) -> float | None:
     rest = recording.torque_nm - result.inertia_kgm2.value * np.gradient(velocity) * rate
     rest = rest - result.viscous_nms.value * velocity - result.gravity_nm.value
     rest = rest - result.coulomb_nm.value * np.sign(velocity)
-    if result.beside.torque_nm.size:
-        rest = rest - result.beside.torque_nm
+    if result.load_terms.torque_nm.size:
+        rest = rest - result.load_terms.torque_nm
     density = power_density(rest, rate, round(2.0 * rate))
     band = (density.frequency_hz >= threshold.SWING_HZ[0]) & (
         density.frequency_hz <= threshold.SWING_HZ[1]
@@ -121,7 +122,7 @@ def _reference_inertia(facts: AxisFacts) -> float | None:
 
 
 def ratio_against(facts: AxisFacts, settings: InertiaSettings) -> RatioReference | None:
-    """What the load ratio compares with; None where there is no ratio."""
+    """What the inertia ratio compares with; None where there is no ratio."""
     if settings.motor_inertia_kgm2:
         return "given"
     if facts.motor_inertia_kgm2:
@@ -193,9 +194,9 @@ def answer_of(outcome: InertiaOutcome) -> InertiaAnswer:
         method=outcome.method, **values, load_ratio=ratio,
         load_ratio_reference=outcome.ratio_against,
         ci95=InertiaIntervals(**ends, load_ratio=spread),
-        place_nm=r.beside.place_nm or None,
-        place_periods_rev=tuple(period / (2 * np.pi) for period in r.beside.periods_rad),
-        fan_nm=r.beside.fan_nm or None, r2=r.r2, reasons=r.reasons, identifiable=r.identifiable,
+        place_nm=r.load_terms.place_nm or None,
+        place_periods_rev=tuple(period / (2 * np.pi) for period in r.load_terms.periods_rad),
+        fan_nm=r.load_terms.fan_nm or None, r2=r.r2, reasons=r.reasons, identifiable=r.identifiable,
         unit="SI" if outcome.torque_known else "torque as a share of rated torque",
         ends_rev=outcome.ends_rev, motion_s=outcome.motion_s,
     )  # fmt: skip

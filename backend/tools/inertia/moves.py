@@ -158,7 +158,7 @@ async def _first_move(
 ) -> Recording:
     """The move; once more after a wait where the axis stood at its beginning.
 
-    A brake that opens some 100 ms after Operation enabled holds it meanwhile, and no bit tells.
+    A brake that opens some 100 ms after Operation enabled holds it meanwhile, and no bit shows.
     """
     start = await axis.position_raw()
 

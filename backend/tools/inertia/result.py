@@ -16,7 +16,7 @@ Reason = Literal[
 ]  # fmt: skip
 """Why data do not support an answer."""
 RatioReference = Literal["given", "drive", "stored"]
-"""A motor inertia that was given, that the drive tells, or the inertia stored in the drive."""
+"""A motor inertia that was given, that the drive reports, or the inertia stored in the drive."""
 
 _REASONS: dict[Reason, Text] = {
     "at-limit": text("inertia.at-limit"),
@@ -64,7 +64,7 @@ class InertiaAnswer(ToolResult):
     gravity_nm: float | None
     load_ratio: float | None
     load_ratio_against: str = Field(
-        default="", description="what it compares with, in words; empty without a ratio"
+        default="", description="what it compares with, as text; empty without a ratio"
     )
     load_ratio_reference: RatioReference | None = Field(
         default=None, description="what it compares with"
@@ -78,7 +78,7 @@ class InertiaAnswer(ToolResult):
         default=None, description="torque by the square of the speed, at the highest: fan, pump"
     )
     r2: float
-    verdict: str = Field(default="ok", description="of reasons, in words; ok where there are none")
+    verdict: str = Field(default="ok", description="of reasons, as text; ok where there are none")
     reasons: tuple[Reason, ...] = Field(default=(), description="why it is not identifiable")
     identifiable: bool
     unit: Literal["SI", "torque as a share of rated torque"]

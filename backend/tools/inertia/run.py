@@ -58,7 +58,7 @@ async def inertia(
 
     Raises:
         OutOfRange: settings that make no sense; nothing has moved.
-        NotAllowed: the envelope, an end or a fault ended it, or it cannot move; says why.
+        NotAllowed: the envelope, an end or a fault ended it, or it cannot move; states the reason.
     """
     _check(settings)
     require_signals(axis, session, Mode.CSV, False)

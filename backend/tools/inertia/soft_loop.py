@@ -30,7 +30,7 @@ class SoftLoop:
     ) -> float:
         """Highest torque of a move that needs ``needed_nm`` [n] to be followed exactly.
 
-        ``ahead_nm`` [n] is what is sent ahead of the loop; the axis is taken to be rigid.
+        ``ahead_nm`` [n] is what is sent ahead of the loop; the axis is assumed to be rigid.
         """
         above = [self.proportional, self.integral]
         below = [inertia_kgm2, self.proportional, self.integral]

@@ -48,8 +48,8 @@ def report(result: InertiaAnswer) -> Section:
         Row("viscous", result.viscous_nms, "N·m·s/rad" if si else "", ci95.viscous_nms),
         Row("gravity", result.gravity_nm, "N·m" if si else "", ci95.gravity_nm),
     ]
-    beside = (("place", result.place_nm), ("fan", result.fan_nm))
-    rows += [Row(name, value, "N·m" if si else "") for name, value in beside if value is not None]
+    terms = (("place", result.place_nm), ("fan", result.fan_nm))
+    rows += [Row(name, value, "N·m" if si else "") for name, value in terms if value is not None]
     verdict = (
         Note("identified", "good", {"r2": f"{result.r2:.4f}"})
         if result.identifiable

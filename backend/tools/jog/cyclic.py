@@ -136,7 +136,7 @@ async def generate(
 
     Raises:
         OutOfRange: the signal leaves the envelope; nothing has moved.
-        NotAllowed: the loop ended the motion; the reason is in words.
+        NotAllowed: the loop ended the motion; the reason is as text.
     """
     units, drive = await axis.require_certain_scales(), axis.drive
     cycle_s = _cycle(session)
@@ -323,12 +323,12 @@ async def play_through(
 
 
 def _plays(session: CyclicSession, station: int) -> bool:
-    """Whether values are still to come, where the loop tells."""
+    """Whether values are still to come, where the loop shows."""
     return _phase(session, station) is Phase.PLAYING
 
 
 def _brakes(session: CyclicSession, station: int) -> bool:
-    """Whether the loop still ramps down, where it tells."""
+    """Whether the loop still ramps down, where it shows."""
     return _phase(session, station) is Phase.BRAKING
 
 

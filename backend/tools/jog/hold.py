@@ -23,9 +23,9 @@ _EXPIRED = f"no sign of life from the page for {1e3 * RESUME_S:.0f} ms"
 class Hold:
     """The button of the person who jogs. ``clock`` gives monotonic seconds.
 
-    ``number`` is the press's, to tell its signs from those of an earlier press; signs without one
-    (0) count for any. ``paused`` is called with True when a gap begins and with False when the
-    axis goes on, with the gap's length in s so far.
+    ``number`` is the press's, to distinguish its signs from those of an earlier press; signs
+    without one (0) count for any. ``paused`` is called with True when a gap begins and with False
+    when the axis goes on, with the gap's length in s so far.
     """
 
     def __init__(

@@ -1,8 +1,8 @@
 """Which row of a sequence each recorded sample belongs to, whatever was lost on the way.
 
-A sample repeats the setpoint that went out beside it. Where cycles are missing between two runs
+A sample repeats the setpoint that went out next to it. Where cycles are missing between two runs
 of samples, the loop skipped them (the sequence then went on later), or the samples were lost (it
-went on meanwhile), or some of each; and what is lost may be the beginning. The setpoints tell.
+went on meanwhile), or some of each; and what is lost may be the beginning. The setpoints show.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ def aligned(
 ) -> tuple[FloatArray, BoolArray]:
     """Rows [n, k] of the recording, row i belonging to row i of ``sent`` [n, m].
 
-    The last m columns of each run repeat the setpoints that went out. Rows beside a gap, rows
+    The last m columns of each run repeat the setpoints that went out. Rows next to a gap, rows
     that were lost and rows whose setpoints differ are not valid. Where the setpoints stand
-    still over a gap and cannot tell, the loop is taken to have skipped the cycles, which is what
+    still over a gap and cannot show, the loop is assumed to have skipped the cycles, which is what
     happens on a computer that is busy. With ``ended_early`` the rows end where the sequence was
     broken off.
 
@@ -49,7 +49,7 @@ def aligned(
         high += missing
         if low != high:
             low, high, hits = _places(of_sent, echo, low, high)
-            if not moves:  # nothing tells; it began with the recording
+            if not moves:  # nothing shows; it began with the recording
                 low = high
             found = found or hits >= needed
         rows = np.arange(low, low + len(samples))

@@ -1,7 +1,7 @@
 """Excitations for one axis, scaled to what it may do. Pure: nothing here knows a drive.
 
 Every plan is a list of sequences in SI units at the motor, with the excitation that an estimator
-must be given. Torque falls on the axis directly or as an offset beside a closed loop, whose
+must be given. Torque falls on the axis directly or as an offset added to a closed loop, whose
 reference then makes the slow base motion that defeats stiction.
 """
 
@@ -136,7 +136,7 @@ def torque_mode(
     return tuple(Sequence(scaled(e, peak_nm, step_nm)) for e in shapes)
 
 
-def beside_loop(
+def torque_injection(
     rate: float,
     band: Band,
     room: Room,
@@ -148,7 +148,7 @@ def beside_loop(
     base: bool = True,
     waveform: Waveform = "multisine",
 ) -> tuple[Sequence, ...]:
-    """Torque offsets beside a closed speed or position loop, which makes the base motion.
+    """Torque offsets with a closed speed or position loop, which makes the base motion.
 
     Raises:
         ValueError: the room does not suffice.
@@ -257,7 +257,7 @@ def loop_reference(
 
 
 def probe(rate: float, peak_nm: float, duration_s: float, step_nm: float) -> FloatArray:
-    """A torque doublet that leaves a free rigid axis at rest where it began: s, -s, -s, s."""
+    """A torque doublet that leaves a free rigid axis at standstill where it began: s, -s, -s, s."""
     n = max(8, round(duration_s * rate / 4))
     hump = np.sin(np.pi * (np.arange(n) + 0.5) / n)
     whole = np.concatenate([hump, -hump, -hump, hump, np.zeros(max(4, n // 2))]) * peak_nm

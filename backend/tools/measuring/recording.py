@@ -71,7 +71,7 @@ class Recording:
 
 @dataclass(frozen=True)
 class Play:
-    """One sequence in raw units: the mode's own target, and torque offsets beside it if any."""
+    """One sequence in raw units: the mode's own target, and torque offsets next to it if any."""
 
     mode: Mode
     values: npt.NDArray[np.int64]
@@ -220,7 +220,7 @@ async def enabled(
 
 
 async def _forgotten(axis: Axis, session: CyclicSession) -> None:
-    """Wait until the loop no longer tells why the motion before this one ended."""
+    """Wait until the loop no longer reports why the motion before this one ended."""
     power, station = session.power(), session.station(axis.drive)
     deadline = time.monotonic() + threshold.TAIL_S
     while time.monotonic() < deadline:
@@ -408,7 +408,7 @@ def share(progress: Progress, low: float, high: float, step: Text) -> Callable[[
 
 
 async def quiet(axis: Axis, timeout_s: float = 3.0) -> None:
-    """Wait until the axis stands.
+    """Wait until the axis is at standstill.
 
     Raises:
         LinkTimeout: it does not.

@@ -1,4 +1,4 @@
-"""Putting back, once a drive answers again, what a tool could not put back when it ended."""
+"""Putting back, once a drive answers again, what a tool could not restore when it ended."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Settings for the length of a measurement: written, made effective, and put back on every exit."""
+"""Settings for the length of a measurement: written, made effective, and restored on every exit."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ async def write_settings(axis: Axis, values: Mapping[str, int]) -> dict[str, int
     """Write raw values that differ from what the drive has, and make them act.
 
     Returns what was there before, for every key. Nothing is changed unless every value can be
-    written; a failure on the way puts back what was written.
+    written; a failure on the way restores what was written.
 
     Raises:
         NotAllowed, OutOfRange: nothing was sent.
@@ -63,7 +63,7 @@ async def put_back(axis: Axis, before: Mapping[str, Raw]) -> None:
     """Write these raw values where they differ, and make them act.
 
     Raises:
-        RestoreFailed: naming what could not be put back.
+        RestoreFailed: naming what could not be restored.
     """
     drive = axis.drive
     failed: list[str] = []
@@ -102,7 +102,7 @@ async def put_back_in_time(axis: Axis, before: Mapping[str, Raw]) -> None:
     """`put_back` to its end whatever happens meanwhile, but no longer than a cleanup may take.
 
     Raises:
-        RestoreFailed: naming what could not be put back, also where a slow line left no time.
+        RestoreFailed: naming what could not be restored, also where a slow line left no time.
     """
     drive = axis.drive
     try:
@@ -122,9 +122,9 @@ async def put_back_in_time(axis: Axis, before: Mapping[str, Raw]) -> None:
 
 @asynccontextmanager
 async def temporary(axis: Axis, values: Mapping[str, int]) -> AsyncIterator[dict[str, int]]:
-    """These raw values act inside the block; yields what is put back afterwards."""
+    """These raw values act inside the block; yields what is restored afterwards."""
     drive = axis.drive
-    with drive.pending_restores.borrowed({key: await drive.raw(key) for key in values}):
+    with drive.pending_restores.temporary({key: await drive.raw(key) for key in values}):
         before = await write_settings(axis, values)
         try:
             yield before
@@ -138,7 +138,7 @@ async def stopping_hard(axis: Axis, speed_rpm: float) -> AsyncIterator[None]:
 
     Raises:
         ScaleUnknown: what a speed is, is not certain: nothing may move.
-        RestoreFailed: on leaving, where the drive's own deceleration could not be put back.
+        RestoreFailed: on leaving, where the drive's own deceleration could not be restored.
     """
     drive, units = axis.drive, await axis.require_certain_scales()
     async with axis.restoring(*await existing(drive, quick_stop_keys(drive))) as before:

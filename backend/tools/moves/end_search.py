@@ -64,7 +64,7 @@ def limited(now: int, wanted: int) -> int:
 
 @dataclass
 class _Stall:
-    """Sees in the samples as they come when a creeping axis has come to rest."""
+    """Sees in the samples as they come when a creeping axis has stopped."""
 
     slow: float
     enough: int

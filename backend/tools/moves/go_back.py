@@ -50,7 +50,7 @@ async def go_back(
                 raise
             slower *= 2.0
             await quiet(axis)
-            # What it went of that move tells nothing of the next one.
+            # What it went of that move shows nothing of the next one.
             moves.clear()
             rest = units.position(goal_raw - await axis.position_raw())
             continue

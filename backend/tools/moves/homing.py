@@ -110,7 +110,7 @@ async def _attained(axis: Axis, settings: HomingSettings, progress: Progress) ->
         elapsed = time.monotonic() - began
         attained = bool(status & homed_bit) and (own or status & cia402.STATUS_TARGET_REACHED)
         busy_seen = busy_seen or not attained
-        # A drive that was homed before may show the old verdict until it has started anew.
+        # A drive that was homed before may show the old verdict until it has started again.
         if attained and (busy_seen or elapsed > 0.3):
             return
         asked_s = time.monotonic()

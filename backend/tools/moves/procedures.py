@@ -28,7 +28,7 @@ from profiles.schema import (
 
 
 def describe(procedure: Procedure) -> list[str]:
-    """Each step in words."""
+    """Each step as text."""
     words: list[str] = []
     for step in procedure.steps:
         match step:

@@ -1,8 +1,8 @@
 """A small move by increments, which needs no scale and teaches one.
 
 The axis follows a smooth path of so many increments in CSP, slowly and with little torque; a person
-looks how far its shaft turns. Nobody knows beforehand how far that is: the first move is short, and
-each may be ten times as long as the longest before it.
+looks how far its shaft turns. It is not known beforehand how far that is: the first move is short,
+and each may be ten times as long as the longest before it.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 The same signal is played without a notch and with some of its values, all at one frequency; what
 they do is read from the reported torque (:mod:`backend.analysis.loop.notch_effect`): of a free axis
-without a loop (here), of one that a load pulls beside its closed speed loop
+without a loop (here), of one that a load pulls with its closed speed loop
 (:mod:`backend.tools.notch.in_loop`). M6-L prints no depth, R6L only levels. Every value is put
 back.
 """
@@ -75,7 +75,7 @@ async def measure_meaning(
     """Try values of the first notch on an axis that no load pulls, without a loop.
 
     ``path`` lies between setpoint and torque, as a measurement of the mechanics found it. With
-    ``still`` the axis only trembles where it stands: what a notch does to the torque shows
+    ``still`` the axis only trembles where it is: what a notch does to the torque shows
     without any travel, and friction is no part of it.
 
     Raises:
@@ -119,7 +119,7 @@ async def tried_with(
     player: Player, axis: Axis, session: CyclicSession, envelope: Envelope, facts: AxisFacts,
     progress: Progress, near_rev: float = 0.0, repeats: Repeats | None = None,
 ) -> NotchMeaning:  # fmt: skip
-    """Try values of the first notch; all are put back, and the axis where it was.
+    """Try values of the first notch; all are restored, and the axis where it was.
 
     Nearer to there than ``near_rev`` the next trial begins where the one before has ended.
     Values beyond those that it takes at least are tried as ``repeats`` allows.
@@ -180,7 +180,7 @@ async def tried_with(
 def room_to_tremble(
     envelope: Envelope, at_rev: float, ends_rev: tuple[float, float] | None
 ) -> Envelope | None:
-    """The envelope of an axis that stays where it stands; None too near to an end for it."""
+    """The envelope of an axis that stays where it is; None too near to an end for it."""
     to_end = (
         threshold.STILL_REV if ends_rev is None else min(at_rev - ends_rev[0], ends_rev[1] - at_rev)
     )
@@ -216,7 +216,7 @@ def _sequence(
         )
     except ValueError as error:
         raise NotAllowed("notch.envelope-not-allow-measure", cause=reason_of(error)) from error
-    # Another period tells no more: tried on axes that turn and on such that tremble.
+    # Another period shows no more: tried on axes that turn and on such that tremble.
     return _one_period(made[0])
 
 

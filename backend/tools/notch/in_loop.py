@@ -1,8 +1,8 @@
-"""What notch values do on an axis that must be held: measured beside its closed speed loop.
+"""What notch values do on an axis that must be held: measured with its closed speed loop.
 
 A load that pulls is never let go. The speed loop's reference is the excitation, as where a drive
-takes no torque beside a loop (:mod:`backend.tools.sweep.speed_injection`); torque and speed
-together tell the notch (:mod:`backend.analysis.loop.notch_effect`). Nothing is tried before the
+takes no torque with a loop (:mod:`backend.tools.sweep.speed_injection`); torque and speed
+together show the notch (:mod:`backend.analysis.loop.notch_effect`). Nothing is tried before the
 loop as measured is known to stay stable whatever a notch there may do.
 """
 
@@ -74,7 +74,9 @@ async def measure_meaning_in_loop(
         setup = replace(setup, by_speed=True, integral_hz=reported.integral_hz)
     plant = measured_plant(mechanics.frf, mechanics.model)
     repeats = repeats or Repeats()
-    player = _Beside(axis, session, settings, setup, plant, await axis.position_raw(), repeats)
+    player = _ClosedLoopTrial(
+        axis, session, settings, setup, plant, await axis.position_raw(), repeats
+    )
     async with temporary(axis, await filters_off(axis, settings)):
         return await tried_with(
             player,
@@ -89,7 +91,7 @@ async def measure_meaning_in_loop(
 
 
 @dataclass
-class _Beside:
+class _ClosedLoopTrial:
     """The speed loop closed, its reference excited."""
 
     axis: Axis
@@ -146,7 +148,7 @@ class _Beside:
         """Weaker where the loop answers with too much torque; lines per rad/s sent.
 
         Raises:
-            NotAllowed: also where samples are lost each time, so that nothing tells the noise.
+            NotAllowed: also where samples are lost each time, so that nothing shows the noise.
         """
         begun_s, tries = time.monotonic(), 0
         kept: tuple[ComplexArray, ComplexArray] | None = None
@@ -163,7 +165,7 @@ class _Beside:
             period = e.samples[e.first_sample :][: e.period_samples]
             found = periods_of(sent, recording)
             if kept and before is not None and np.array_equal(before, e.samples):
-                # The same was played before: its periods tell as much.
+                # The same was played before: its periods show as much.
                 found = (np.concatenate([kept[0], found[0]]), np.concatenate([kept[1], found[1]]))
             kept, before = (found, e.samples) if len(found[0]) else (kept, before)
             if len(found[0]) >= threshold.FEWEST_PERIODS:

@@ -45,7 +45,7 @@ class NotchMeaning:
         return *encode_hz_width(asked, frequency, width), None
 
     def _known(self, depth: IntegerRange) -> IntegerRange:
-        """Levels beyond the ones that were tried are not believed."""
+        """Levels beyond the ones that were tried are not trusted."""
         assert self.levels is not None
         tried = [level for level, _db in self.levels.depth_db]
         return IntegerRange(max(depth.low, min(tried)), min(depth.high, max(tried)))

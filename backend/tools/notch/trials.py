@@ -36,7 +36,7 @@ def trials_of(drive: Drive, slot: NotchSlot, centre: int) -> list[Trial]:
 
 
 def least_of(slot: NotchSlot) -> int:
-    """How many of the trials, from the first, tell what there is to tell."""
+    """How many of the trials, from the first, show what there is to show."""
     return threshold.LEAST_WIDTHS if slot.depth_key is None else threshold.LEAST_LEVELS
 
 
@@ -47,7 +47,7 @@ def least_s(drive: Drive) -> float:
 
 
 def every_s(drive: Drive) -> float:
-    """About how long it takes to try all that is worth it, beside a loop."""
+    """About how long it takes to try all that is worth it, with a closed loop."""
     slot = _slot(drive)
     return 0.0 if slot is None else threshold.TRIAL_S * (BEFORE + len(trials_of(drive, slot, 1)))
 

@@ -27,19 +27,21 @@ FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 #: A speed below this share of the commanded one is a sign, once it has lasted this long.
 _LEFT, _LASTS_S = 0.9, 0.01
-#: The commanded speed must have been constant for this long, so that no run-up is taken for a sign.
+#: The commanded speed must have been constant for this long, so that no run-up is mistaken for a
+#: sign.
 STEADY_S = 0.15
-#: The speed by position is taken over this time; slower than the greater of these is standing.
+#: The speed by position is calculated over this time; slower than the greater of these is standing.
 _WINDOW_S, _STANDS_SHARE, _STANDS_RPM = 0.02, 0.02, 3.0
 #: Rest is where no more of the way is left than this share of it, or this many revolutions.
 _SETTLED, _RESOLVED_REV = 0.002, 2e-4
-#: The noise of the torque is known without power; deviations, and the least that is told apart [%].
+#: The noise of the torque is known without power; deviations, and the least that is distinguished
+#: [%].
 _DEVIATIONS, _LEAST_PERCENT, _FILTER = 5.0, 0.3, 5
-#: Torque before the trigger must be so many times that, or its end cannot be told.
+#: Torque before the trigger must be so many times that, or its end cannot be determined.
 _DISTINCT = 3.0
 _BEFORE_S = 0.1
 #: With SS1 the power goes at standstill: below this share of the speed.
-_AT_REST = 0.1
+_AT_STANDSTILL = 0.1
 #: Above a speed limit by this share is beyond it; by so much of the test speed it did not react.
 SPEED_MARGIN, _FOLLOWED = 0.05, 0.95
 _POINTS, _SHOWN_BEFORE_S = 400, 0.2
@@ -82,7 +84,7 @@ class Trace:
         return {name: getattr(self, name) for name in _ARRAYS}
 
     def facts(self) -> dict[str, object]:
-        """For storage, beside the arrays."""
+        """For storage, with the arrays."""
         return {
             "sample_rate_hz": self.sample_rate_hz, "asked_until": self.asked_until,
             "measured_at": self.measured_at, "reports": list(self.reports),
@@ -137,7 +139,7 @@ def digest(arrays: Arrays, meta: Meta, person: str, signed: str, notes: str) -> 
 
 
 def signed(arrays: Arrays, meta: Meta, person: str, when: str, notes: str) -> dict[str, object]:
-    """What is kept beside the raw data when a person signs them.
+    """What is kept next to the raw data when a person signs them.
 
     Raises:
         ValueError: they are none of a safety check, or are signed already.
@@ -173,7 +175,7 @@ class _Check:
         self._sign: Sign | None = None if found is None else found[1]
 
     def _torque_noise(self) -> float:
-        """Below it no torque can be told: of the time before the axis was enabled."""
+        """Below it torque is not distinguished from noise; of the time before enabling."""
         enabled = np.flatnonzero(self._trace.enabled)
         quiet = self._trace.torque_percent[: enabled[0]] if enabled.size else np.empty(0)
         scatter = float(np.std(quiet)) if quiet.size > _FILTER else 0.0
@@ -303,7 +305,7 @@ class _Check:
 
     def _cut(self, at: int, free: int, speed: float) -> bool:
         """It braked by a quick stop at whose beginning our own exchange took the power away."""
-        fast = abs(float(self._speed[free])) > _AT_REST * abs(speed)
+        fast = abs(float(self._speed[free])) > _AT_STANDSTILL * abs(speed)
         return fast and bool(np.any(self._trace.quick_stop[at : free + 1]))
 
     def _exceeded(self, found: Mapping[str, object]) -> tuple[Exceeded, ...]:
@@ -338,7 +340,7 @@ class _Check:
         if (
             settings.function == "ss1" and free is not None and distinct
             and obstacle != "quick_stop_cut"
-            and abs(float(self._speed[free])) > _AT_REST * abs(speed)
+            and abs(float(self._speed[free])) > _AT_STANDSTILL * abs(speed)
         ):  # fmt: skip
             return "power_off_at_speed"
         if exceeded:

@@ -225,7 +225,7 @@ def _no_room(settings: SafetySettings, needed_rev: float) -> OutOfRange:
 class _Watch:
     """Ends the motion ``watch_s`` after the speed has left the commanded one.
 
-    Called with the rows that came since; what the drive leaves its enabled state for is told by
+    Called with the rows that came since; what the drive leaves its enabled state for is reported by
     the loop.
     """
 

@@ -173,7 +173,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "signature.do": ("Sign this record", "签署此记录"),
     "speed": ("Speed when it was triggered", "触发时的速度"),
     "torque_before": ("Torque before", "之前的转矩"),
-    "torque_noise": ("Torque that can be told apart", "可分辨的转矩"),
+    "torque_noise": ("Smallest torque that can be distinguished", "可分辨的转矩"),
     "torque_free": ("Time until the torque was gone", "转矩消失的时间"),
     "torque_after": ("Greatest torque after that", "之后的最大转矩"),
     "speed_at_free": ("Speed when the torque was gone", "转矩消失时的速度"),

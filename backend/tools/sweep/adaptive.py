@@ -1,4 +1,4 @@
-"""A speed loop's realisations, each pair as the one before shows that it tells most.
+"""A speed loop's realisations, each pair as the one before shows that it shows most.
 
 A soft loop moves a heavy axis little at high frequencies, and a coarse encoder hides what it does.
 What noise leaves open after the first pair gets the energy of those that follow.
@@ -24,7 +24,7 @@ from backend.work.jobs import Progress
 _PAIR = 2
 
 
-async def play_telling(
+async def play_informative(
     axis: Axis, session: CyclicSession, settings: SweepSettings, setup: Setup,
     sequences: tuple[excite.Sequence, ...], home: int, progress: Progress, spare: int = 0,
     repeats: Repeats | None = None,
@@ -44,22 +44,22 @@ async def play_telling(
         axis, session, settings, setup, pair, home, progress, min(spare, _PAIR), (0, count),
         repeats,
     )  # fmt: skip
-    further = await asyncio.to_thread(_more_telling, first, sequences[_PAIR:], settings, setup)
+    further = await asyncio.to_thread(_more_informative, first, sequences[_PAIR:], settings, setup)
     return first + await play_fitting(
         axis, session, settings, setup, further, home, progress, min(spare, count - _PAIR),
         (_PAIR, count), repeats,
     )  # fmt: skip
 
 
-def _more_telling(
+def _more_informative(
     first: Records, further: tuple[excite.Sequence, ...], settings: SweepSettings, setup: Setup
 ) -> tuple[excite.Sequence, ...]:
-    """Further realisations, as large as the first pair became, with weights that it tells."""
+    """Further realisations, as large as the first pair became, with weights that it shows."""
     sent = first[0][0]
     base = np.zeros(1) if sent.base is None else sent.base
     peak = float(np.max(np.abs(sent.excitation.samples - base)))
     try:
-        weight = speed_injection.telling_weight(first, setup.rate)
+        weight = speed_injection.informative_weight(first, setup.rate)
     except ValueError:
         return further
     band = excite.band_for(setup.rate, settings.f_min_hz, settings.f_max_hz)

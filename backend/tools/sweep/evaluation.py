@@ -78,12 +78,12 @@ class SweepSettings:
     """How the drive holds setpoints between cycles; None asks the drive, or the recording."""
     excitation: Waveform = "multisine"
     coulomb_nm: float | None = None
-    """Friction that is taken out of a speed loop's response; None: the recording tells."""
+    """Friction that is removed from a speed loop's response; None: the recording shows."""
     inertia_deviation: float | None = None
     pairs_before: int = 0
     """Of a loop's own response: pairs of realisations whose phases are not to be used again."""
     odd_lines: bool = False
-    """Of mechanics by a multisine: odd lines alone, which tell even and odd distortion apart."""
+    """Of mechanics by a multisine: odd lines alone, which distinguish even and odd distortion."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class SweepResult:
     current_bandwidth_hz: float | None = None
     speed_filter_hz: float | None = None
     hold: Hold | None = None
-    """What the drive tells of its loops, or what the recording showed of them."""
+    """What the drive reports of its loops, or what the recording showed of them."""
     detected: Detected | None = None
     """Noise and distortion on the lines that were left empty, where they were."""
 
@@ -129,7 +129,7 @@ def evaluate(
     """From recordings to the answer; also works on recordings that were kept.
 
     ``by_speed``: the speed loop's reference was the excitation, ``integral_hz`` its integral's
-    corner where the drive tells it.
+    corner where the drive reports it.
 
     Raises:
         ValueError: nothing can be concluded from them.
@@ -169,7 +169,7 @@ def evaluate(
 def _widened(
     found: Identification, facts: AxisFacts, quantity: Quantity, *, by_speed: bool
 ) -> tuple[Identification, tuple[Text, ...]]:
-    """Bands with what the drive does not tell of its torque, and what is said of that."""
+    """Bands with what the drive does not report of its torque, and what is said of that."""
     path, lines = found.fit.path, found.direct.frequency_hz
     said: list[Text] = []
     if facts.current_bandwidth_hz is None and commanded(path):
@@ -188,7 +188,7 @@ def _widened(
         )
         said.append(_SLOW)
     if slow and quantity == "torque_injection" and facts.torque_filter_hz is None:
-        # Beside a loop the motion alone does not tell which of the two it is.
+        # With a loop the motion alone does not show which of the two it is.
         direct = charged(found.direct, lines, np.log(lag_response(lines, corner)))
         found = replace(found, direct=direct, corrected=direct, trusted=False)
         said.append(_SLOW_OR_FILTERED)
@@ -238,7 +238,7 @@ def _mechanics(
 
 
 def _slow(corner_hz: float, facts: AxisFacts) -> bool:
-    """Whether the torque follows more slowly than the drive tells, or than current loops do."""
+    """Whether the torque follows more slowly than the drive reports, or than current loops do."""
     as_reported = facts.current_bandwidth_hz
     return corner_hz < (
         threshold.SLOW_HZ if as_reported is None else threshold.SLOWER * as_reported
@@ -286,7 +286,7 @@ def _known_inertia(settings: SweepSettings) -> KnownInertia | None:
 
 
 def completed(facts: AxisFacts, result: SweepResult) -> AxisFacts:
-    """Facts with what the mechanics' measurement found where the drive tells nothing."""
+    """Facts with what the mechanics' measurement found where the drive reports nothing."""
     return replace(
         facts,
         current_bandwidth_hz=facts.current_bandwidth_hz or result.current_bandwidth_hz,

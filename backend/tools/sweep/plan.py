@@ -36,7 +36,7 @@ class Setup:
     rigid: excite.Rigid
     torque_step_nm: float
     by_speed: bool = False
-    """Mechanics by the speed loop's reference, where no torque can be added beside the loop."""
+    """Mechanics by the speed loop's reference, where a closed loop accepts no torque."""
     integral_hz: float | None = None
 
 
@@ -81,7 +81,7 @@ def chosen_loop(axis: Axis, settings: SweepSettings, probed: Probed) -> Literal[
 
 
 def _can_offset(axis: Axis, session: CyclicSession) -> bool:
-    """Whether torque can be injected beside a closed loop."""
+    """Whether torque can be injected with a closed loop."""
     key = axis.drive.key("torque_offset")
     return key is not None and session.carries(axis.drive, key)
 
@@ -106,7 +106,7 @@ async def setup_of(
     axis: Axis, session: CyclicSession, settings: SweepSettings, facts: AxisFacts, loop: str,
     probed: Probed | None,
 ) -> Setup:  # fmt: skip
-    """Everything the excitation needs, from the envelope and what the drive tells.
+    """Everything the excitation needs, from the envelope and what the drive reports.
 
     Raises:
         DriveError: a parameter cannot be read.
@@ -171,7 +171,7 @@ def sequences_of(setup: Setup, settings: SweepSettings) -> tuple[excite.Sequence
                 setup.rate, band, setup.room, speed_injection.FIRST_RAD_S, settings.realisations,
                 settings.excitation, base=settings.base_motion,
             )  # fmt: skip
-        return excite.beside_loop(
+        return excite.torque_injection(
             setup.rate, band, setup.room, setup.torque_step_nm, share=settings.share,
             realisations=settings.realisations, position=setup.loop == "position",
             base=settings.base_motion, waveform=settings.excitation,

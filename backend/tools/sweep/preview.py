@@ -1,7 +1,7 @@
 """What a frequency response would play, before anything moves.
 
 The axis is felt before the true excitation is made, so inertia and friction are here what the
-drive tells; the true one is scaled to what was felt and stays within the same envelope.
+drive reports; the true one is scaled to what was felt and stays within the same envelope.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def _sequences(
         )  # fmt: skip
     position = "position" in (settings.loop, settings.kind.removesuffix("_loop"))
     if settings.kind == "mechanics":
-        return excite.beside_loop(
+        return excite.torque_injection(
             rate, band, room, 0.0, share=settings.share, realisations=settings.realisations,
             position=position, base=settings.base_motion, waveform=waveform,
         )  # fmt: skip

@@ -88,7 +88,7 @@ async def prepared(
         NotAllowed: no consent where it is needed, no travel limit in the drive, the axis is
             enabled, or the drive takes a negative speed for something else. Nothing has moved
             but a quarter turn at most.
-        RestoreFailed: on leaving, naming what could not be put back.
+        RestoreFailed: on leaving, naming what could not be restored.
     """
     drive = axis.drive
     await axis.require_certain_scales()

@@ -64,7 +64,7 @@ class DetectedInfo(_Part):
 class SweepAnswer(ToolResult):
     """The response [lines] with its deviations, and what is read from it.
 
-    ``coherence`` and the deviations stand beside each line; None where nothing is known of them.
+    ``coherence`` and the deviations are next to each line; None where nothing is known of them.
     ``margins`` hold from ``from_hz`` to ``to_hz``, each None where no crossing was measured.
     """
 

@@ -1,6 +1,6 @@
 """Frequency response of an axis over a bus with cyclic process data.
 
-*mechanics*: torque to velocity, either with no loop (CST) or by torque offsets beside a closed
+*mechanics*: torque to velocity, either with no loop (CST) or by torque offsets added to a closed
 speed (CSV) or position loop (CSP), as a vertical or limited axis needs. *speed_loop* and
 *position_loop*: from the loop's own reference to what the axis does.
 """
@@ -20,7 +20,7 @@ from backend.tools.measuring.repeats import Repeats
 from backend.tools.measuring.temporary import stopping_hard, temporary
 from backend.tools.moves.go_back import go_back
 from backend.tools.notch import filters as notch_tool
-from backend.tools.sweep.adaptive import play_telling
+from backend.tools.sweep.adaptive import play_informative
 from backend.tools.sweep.evaluation import SweepResult, SweepSettings, evaluate
 from backend.tools.sweep.plan import (
     Setup,
@@ -57,7 +57,7 @@ async def sweep(
 
     Raises:
         OutOfRange: settings that make no sense; nothing has moved.
-        NotAllowed: the axis cannot be measured so, or the envelope ended it; says why.
+        NotAllowed: the axis cannot be measured so, or the envelope ended it; states the reason.
         LinkLost: samples were lost; nothing is concluded from the rest.
     """
     check(settings)
@@ -143,8 +143,8 @@ class _Sweep:
         """Everything that is played with one loop."""
         axis, session, settings, home = self.axis, self.session, self.settings, self.home
         setup = await setup_of(axis, session, settings, self.facts, loop, self.probed)
-        beside = settings.kind == "mechanics" and setup.loop != "none" and not setup.by_speed
-        require_signals(axis, session, MODE_OF[setup.loop], beside)
+        in_loop = settings.kind == "mechanics" and setup.loop != "none" and not setup.by_speed
+        require_signals(axis, session, MODE_OF[setup.loop], in_loop)
         progress(0.08, text("sweep.designing-excitation"))
         sequences = await asyncio.to_thread(sequences_of, setup, settings)
         if setup.by_speed:
@@ -154,7 +154,7 @@ class _Sweep:
             )
         # A stepped sine takes too long for a second time.
         spare = 0 if settings.excitation == "stepped" else len(sequences)
-        return setup, await play_telling(
+        return setup, await play_informative(
             axis, session, settings, setup, sequences, home, progress, spare, self.repeats
         )  # fmt: skip
 

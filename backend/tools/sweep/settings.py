@@ -25,14 +25,14 @@ class SweepRequest(ToolSettings):
     )
     excitation: Waveform = Field(
         default="multisine",
-        description="a stepped sine is one tone after another, beside a closed loop, in one pair "
+        description="a stepped sine is one tone after another, with a closed loop, in one pair "
         "of realisations; the others excite the whole band at once",
     )
 
     odd_lines: bool = Field(
         default=False,
-        description="of mechanics by a multisine: odd lines alone, which tell noise, even and odd "
-        "distortion apart",
+        description="of mechanics by a multisine: odd lines alone, which distinguish noise, "
+        "even and odd distortion",
     )
 
     @property

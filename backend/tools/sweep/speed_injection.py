@@ -1,4 +1,4 @@
-"""Mechanics on a drive that takes no torque beside a closed loop: by the speed loop's reference.
+"""Mechanics on a drive that takes no torque with a closed loop: by the speed loop's reference.
 
 Whatever is added to the reference becomes torque at once by the speed gain (and by the integral
 of it), just as a torque offset would; the gain is read from the recorded torque. After that the
@@ -35,7 +35,7 @@ def sequences(
 ) -> tuple[excite.Sequence, ...]:  # fmt: skip
     """All lines alike: above the loop's bandwidth that is a torque that is alike, too.
 
-    ``weight`` [lines] makes them unlike each other, as `telling_weight` finds it.
+    ``weight`` [lines] makes them unlike each other, as `informative_weight` finds it.
 
     Raises:
         ValueError: the room does not suffice.
@@ -48,7 +48,7 @@ def sequences(
 
 @dataclass(frozen=True)
 class Size:
-    """Peaks of the excitation and of the base motion beside it, in rad/s."""
+    """Peaks of the excitation and of the base motion next to it, in rad/s."""
 
     peak_rad_s: float
     base_rad_s: float
@@ -58,7 +58,7 @@ def fitting_size(
     sequence: excite.Sequence, recording: Recording, room: excite.Room, torque_nm: float, *,
     watched: bool,
 ) -> Size:  # fmt: skip
-    """What makes a torque that peaks at ``torque_nm``, as far as the trial tells.
+    """What makes a torque that peaks at ``torque_nm``, as far as the trial shows.
 
     A soft loop makes little speed of its reference, so that the axis' own speed counts; the
     setpoints stay within a share, too. Such a loop may answer the base motion with much torque,
@@ -81,10 +81,10 @@ def fitting_size(
     return Size(peak, base * float(np.clip(left_nm / taken_nm, threshold.LEAST_BASE, 1.0)))
 
 
-def telling_weight(
+def informative_weight(
     records: tuple[tuple[excite.Sequence, Recording], ...], rate: float
 ) -> FloatArray:
-    """Weights of the lines [n] for further realisations: more where the first ones tell less.
+    """Weights of the lines [n] for further realisations: more where the first ones show less.
 
     Where one amplitude has the deviation d, the sum of all variances is least with amplitudes of
     √d. Lines that nothing will show, and those that are known, keep a share.
@@ -114,7 +114,7 @@ def speed_gain(
     records: tuple[tuple[excite.Sequence, Recording], ...], path: SignalPath,
     integral_hz: float | None, *, hold_known: bool, motion: SampledFit | None = None,
 ) -> SpeedGain:  # fmt: skip
-    """The gain that the recorded torque shows; ``integral_hz`` None: the recording tells it, too.
+    """The gain that the recorded torque shows; ``integral_hz`` None: the recording shows it, too.
 
     ``motion`` is a fit of the mechanics where there is one already.
 
@@ -133,7 +133,7 @@ def _as_torque(
     """A recording with the torque that the reference made in the excitation's place.
 
     That torque is held, but for what the integral rises within a cycle: its mean is what moves
-    the axis, and what the samples show beyond the mean is taken out of them.
+    the axis, and what the samples show beyond the mean is removed from them.
     """
     e = sequence.excitation
     mean = np.concatenate([[0.0], np.cumsum(e.samples)[:-1]]) + 0.5 * e.samples
@@ -202,9 +202,9 @@ def _rough_gain(record: Record) -> float:
 
 
 def _speed_over_peak(record: Record, gain_nms: float) -> float:
-    """Deviation of the excited speed over the peak of the excitation; 1 where nothing tells.
+    """Deviation of the excited speed over the peak of the excitation; 1 where nothing shows.
 
-    The trial itself is too small for a coarse encoder. The base motion tells the inertia: friction
+    The trial itself is too small for a coarse encoder. The base motion shows the inertia: friction
     takes torque in step with the speed, inertia a quarter of a turn before it.
     """
     e = record.excitation

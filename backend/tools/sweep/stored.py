@@ -174,5 +174,5 @@ def _direct(frf: Frf) -> DirectResponse:
 
 
 def _numbers(values: FloatArray) -> tuple[float | None, ...]:
-    """JSON knows no NaN."""
+    """JSON has no NaN."""
     return tuple(float(v) if np.isfinite(v) else None for v in values)

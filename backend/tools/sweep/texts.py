@@ -105,7 +105,7 @@ def resonances_grid(result: SweepAnswer) -> Grid:
 
 
 def margins_grid(*results: SweepAnswer, heads: tuple[str, ...] = ("value",)) -> Grid:
-    """Bandwidths and margins of one loop, or of several beside each other."""
+    """Bandwidths and margins of one loop, or of several next to each other."""
 
     def row(name: str, *shown: str) -> tuple[Cell, ...]:
         return Note(name), *shown

@@ -25,7 +25,7 @@ class LssNode:
 
 
 class LssAccess:
-    """Services of one bus. ``taken`` tells whether a node answers for a number."""
+    """Services of one bus. ``taken`` shows whether a node answers for a number."""
 
     def __init__(
         self,

@@ -81,5 +81,5 @@ class EepromAccess:
 
 
 def _readable(saved: bytes) -> int:
-    """As much as the file has, and a header at the least: for the contents beside it."""
+    """As much as the file has, and a header at the least: for the contents next to it."""
     return max(len(saved) // 128 * 128, 128)

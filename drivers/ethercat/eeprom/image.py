@@ -110,7 +110,7 @@ class Image:
 
     @property
     def trusted(self) -> bool:
-        """Whether what it says of the drive can be believed."""
+        """Whether what it says of the drive can be trusted."""
         return self.checksum_right and self.has_identity
 
     def categories(self) -> Iterator[Category]:

@@ -54,7 +54,7 @@ def plan_restore(
 ) -> Plan:
     """From a saved file. ``drive`` is what the drive's firmware says of itself (1018h).
 
-    The serial number of the drive stays where it has one that can be believed: two drives with
+    The serial number of the drive stays where it has one that can be trusted: two drives with
     one serial number could not be distinguished.
 
     Raises:

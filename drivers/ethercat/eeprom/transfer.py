@@ -17,11 +17,11 @@ from drivers.ethercat.wire.sii import CHECKSUM_WORD
 from drivers.ethercat.wire.steps import Steps
 from drivers.texts.message import Text, text
 
-Tell = Callable[[float, Text], None]
+Report = Callable[[float, Text], None]
 _PART_WORDS = 64
 
 
-def read_image(clock: Callable[[], float], tell: Tell, size: int | None = None) -> Steps[bytes]:
+def read_image(clock: Callable[[], float], report: Report, size: int | None = None) -> Steps[bytes]:
     """Everything; ``size`` [bytes] where the contents cannot be trusted to state it.
 
     Raises:
@@ -34,14 +34,14 @@ def read_image(clock: Callable[[], float], tell: Tell, size: int | None = None) 
             raise ProtocolError("ethercat.eeprom-size-unknown", stated=size)
     data = bytearray()
     while len(data) < size:
-        tell(len(data) / size, text("ethercat.eeprom-read", bytes=len(data), size=size))
+        report(len(data) / size, text("ethercat.eeprom-read", bytes=len(data), size=size))
         count = min(_PART_WORDS, (size - len(data)) // 2)
         data += yield from sii.read(len(data) // 2, count, clock)
     return bytes(data)
 
 
 def write_image(
-    present: bytes, target: bytes, clock: Callable[[], float], tell: Tell
+    present: bytes, target: bytes, clock: Callable[[], float], report: Report
 ) -> Steps[None]:
     """Write the words in which ``target`` differs from ``present``, and read everything back.
 
@@ -62,13 +62,13 @@ def write_image(
         return
     yield from sii.write(CHECKSUM_WORD, right ^ 0xFF, clock)
     for done, word in enumerate(places):
-        tell(
+        report(
             0.7 * done / len(places),
             text("ethercat.eeprom-written", words=done, count=len(places)),
         )
         yield from sii.write(word, _word(target, word), clock)
     held = yield from read_image(
-        clock, lambda share, step: tell(0.7 + 0.3 * share, step), len(target)
+        clock, lambda share, step: report(0.7 + 0.3 * share, step), len(target)
     )
     for word in range(len(target) // 2):
         if word != CHECKSUM_WORD and _word(held, word) != _word(target, word):

@@ -21,7 +21,7 @@ class AssignmentRules:
     """What may be assigned in one direction of one drive.
 
     ``free`` is the set whose contents are written, None where none can be; ``kept`` are those
-    that are assigned beside it. ``room_bytes`` is what the sync manager holds.
+    that are assigned others it. ``room_bytes`` is what the sync manager holds.
     """
 
     sets: tuple[PdoSet, ...]
@@ -44,8 +44,8 @@ def assignment_rules(profile: Profile, spec: PdoSpec, direction: Direction) -> A
     mandatory = tuple(s for s in sets if s.mandatory)
     default = _default(spec, sets, direction, listed)
     free = _free(spec, sets, direction, default, mandatory, assignable=assignable)
-    beside = mandatory if assignable else default
-    kept = tuple(s for s in beside if free is not None and s.index != free.index)
+    others = mandatory if assignable else default
+    kept = tuple(s for s in others if free is not None and s.index != free.index)
     return AssignmentRules(
         sets, default, mandatory, free, kept, assignable, _room(rules, spec, direction)
     )
@@ -111,7 +111,7 @@ def choose_fixed(
 ) -> tuple[PdoSet, ...] | None:
     """PDOs with fixed contents that carry all of ``must`` and most of ``want``.
 
-    ``keys_of`` gives the objects that a list of PDOs carries in whole bytes. One PDO beside the
+    ``keys_of`` gives the objects that a list of PDOs carries in whole bytes. One PDO others the
     mandatory ones where that is enough, the default assignment where it carries as much, several
     PDOs only where it takes them. None where no assignment carries ``must``.
     """

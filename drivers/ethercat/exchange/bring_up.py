@@ -229,7 +229,7 @@ def timeout_s(rules: StationBringUp | None, usual_s: float) -> float:
 
 
 def apply_mailbox(station: Station, rules: StationBringUp) -> None:
-    """Complete access and patience as the file says; its notes become the station's."""
+    """Complete access and timeouts as the file says; its notes become the station's."""
     if rules.complete_access is False:
         station.complete_access = False
     if rules.mailbox_ms and station.mailbox is not None:

@@ -235,7 +235,7 @@ class CyclicLoop:
                 left_s = self.cycle_ns * 1e-9 if self._invalid_run else _LOCKSTEP_WAIT_S
             ready, _, _ = select.select((self._fd,), (), (), max(left_s, _LEAST_WAIT_S))
             if not ready:
-                # Tells SOEM to give the frame up; it returns at once.
+                # Shows SOEM to give the frame up; it returns at once.
                 self._master.receive_processdata(0)
                 return -1
         wkc: int = self._master.receive_processdata(_RECEIVE_US)

@@ -124,7 +124,7 @@ class StationPlan:
     tx: Assigned
     mapped: tuple[CyclicSignal, ...]
     left_over: tuple[tuple[CyclicSignal, str], ...]
-    """Signals for polling, each with the reason in words."""
+    """Signals for polling, each with the reason as text."""
 
 
 def plan_station(
@@ -200,7 +200,7 @@ def _direction(
 
 @dataclass(frozen=True, slots=True)
 class _Room:
-    """The PDO to be filled, how much it takes, and what is assigned beside it."""
+    """The PDO to be filled, how much it takes, and what is assigned next to it."""
 
     index: int
     most: int

@@ -15,7 +15,7 @@ from drivers.ethercat.exchange.mapping import Assigned, Entry, Pdo
 from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.exchange.setup import Snapshot, StationSetup
 from drivers.ethercat.process.protocol import Message
-from drivers.ethercat.process.segment import IO_MAP_BYTES, Segment, SpoiltMap
+from drivers.ethercat.process.segment import IO_MAP_BYTES, InvalidMap, Segment
 from drivers.ethercat.process.station import Station, identify
 from drivers.ethercat.wire import coe
 from drivers.ethercat.wire.lanes import Done, LaneName, Lanes
@@ -73,7 +73,7 @@ class Preparation:
 
         Raises:
             NotAllowed: cycle, mapping or watchdog is not possible, with drive and reason.
-            FoundInPart, SpoiltMap: search or mapping were disturbed; one more search may help.
+            FoundInPart, InvalidMap: search or mapping were disturbed; one more search may help.
         """
         cycle_ns = int(message["cycle_ns"])
         if not CYCLE_NS[0] <= cycle_ns <= CYCLE_NS[1]:
@@ -149,7 +149,7 @@ class Preparation:
         # An emergency that lies in a mailbox would make SOEM's mapping fail.
         drains = {s.number: s.box.drain() for s in self._stations if s.mailbox is not None}
         self._run("mailbox", drains, "emptying the mailboxes")
-        self._promise("building the process data map")
+        self._announce_life("building the process data map")
         self._segment.map(total, entry_by_entry)
         wrong = {n: p for n, p in self._setups.items() if not self._fits(n, p)}
         if not wrong:
@@ -157,7 +157,7 @@ class Preparation:
         # Perhaps SOEM missed an answer.
         number, plan = next(iter(wrong.items()))
         reported = self._segment.sizes(number)
-        raise SpoiltMap(
+        raise InvalidMap(
             "ethercat.station-maps-bytes-outputs",
             station=number,
             reported=reported[0],
@@ -182,7 +182,7 @@ class Preparation:
         self._run("register", controls, "setting the sync managers")
 
     def _clocks_and_watchdogs(self) -> None:
-        self._promise("starting the distributed clocks")
+        self._announce_life("starting the distributed clocks")
         if self._segment.master.config_dc() and self._dc:
             starts = {
                 number: setup_.start_sync0(self._stations[number - 1], plan, time.monotonic)
@@ -235,7 +235,7 @@ class Preparation:
             number, axis, tx.unpack, rx.pack, rx.size, tx.size, wkc, bytes(rx.size), bytes(tx.size)
         )
 
-    def _promise(self, doing: str) -> None:
+    def _announce_life(self, doing: str) -> None:
         self._ring.host_lives_until(time.monotonic_ns() + int(_SETUP_S * 1e9), doing)
 
     def _run(
@@ -246,7 +246,7 @@ class Preparation:
         optional: set[int] | frozenset[int] = frozenset(),
     ) -> dict[int, T]:
         """Run one transaction per station, all at once, to the end."""
-        self._promise(doing)
+        self._announce_life(doing)
         results: dict[int, T] = {}
         errors: dict[int, DriveError] = {}
 

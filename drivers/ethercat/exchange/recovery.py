@@ -1,7 +1,7 @@
 """Setting the cyclic exchange up again after it broke off, without anybody asking.
 
 An exchange that somebody started stays wanted until somebody ends it. When its process died, its
-interface vanished or the loop gave up, it is configured and started anew as soon as the segment
+interface vanished or the loop gave up, it is configured and started again as soon as the segment
 can be reached, with growing pauses. Every axis comes back disabled: nothing here enables, and
 motions that ran before have ended.
 """
@@ -19,21 +19,21 @@ PAUSES_S = (0.3, 1.0, 3.0, 10.0)
 
 
 class Recovery:
-    """Calls ``set_up`` until it succeeds; ``tell`` gets a sentence at every change."""
+    """Calls ``set_up`` until it succeeds; ``notify`` gets a sentence at every change."""
 
     def __init__(
         self,
         ready: Callable[[], bool],
         set_up: Callable[[], Awaitable[None]],
-        tell: Callable[[str, bool], None],
+        notify: Callable[[str, bool], None],
     ) -> None:
-        """``ready`` says whether an attempt makes sense, ``tell`` whether all is well again."""
+        """``ready`` says whether an attempt makes sense, ``notify`` whether all is well again."""
         self._ready = ready
         self._set_up = set_up
-        self._tell = tell
+        self._notify = notify
         self._task: asyncio.Task[None] | None = None
         self.trouble = ""
-        """Why the exchange does not run although it is wanted, in words; else empty."""
+        """Why the exchange does not run although it is wanted, as text; else empty."""
 
     @property
     def active(self) -> bool:
@@ -69,7 +69,7 @@ class Recovery:
                 self.trouble = error.message
                 if error.text != last:
                     last = error.text
-                    self._tell(
+                    self._notify(
                         f"the cyclic exchange could not be set up again: {last};"
                         " it is tried again by itself",
                         False,
@@ -77,7 +77,7 @@ class Recovery:
                 continue
             self._task = None
             self.trouble = ""
-            self._tell(
+            self._notify(
                 "the cyclic exchange runs again; every axis is disabled until you enable it",
                 True,
             )

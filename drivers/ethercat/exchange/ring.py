@@ -79,14 +79,14 @@ class Ring:
     # Signs of life -------------------------------------------------------------------------
 
     def host_lives_until(self, deadline_ns: int, doing: str = "") -> None:
-        """The host promises to come back before ``deadline_ns`` (monotonic)."""
+        """The host announces that it comes back before ``deadline_ns`` (monotonic)."""
         if doing:
             text = doing.encode()[: _BUSY_ROOM - 1].ljust(_BUSY_ROOM, b"\0")
             self._view[_BUSY_TEXT : _BUSY_TEXT + _BUSY_ROOM] = text
         _U64.pack_into(self._view, _HOST_DEADLINE, deadline_ns)
 
     def host_deadline_ns(self) -> int:
-        """When the host should have come back; 0 before its first promise."""
+        """When the host should have come back; 0 before its first announcement."""
         return int(_U64.unpack_from(self._view, _HOST_DEADLINE)[0])
 
     def host_doing(self) -> str:

@@ -50,22 +50,22 @@ class EthercatCyclic:
         self,
         host: HostProcess,
         profiles: Mapping[int, Profile],
-        tell: Callable[[str, bool], None],
+        notify: Callable[[str, bool], None],
         note: Callable[[str, int | None], None] = lambda _text, _station: None,
     ) -> None:
-        """``tell`` gets a sentence when the exchange breaks off (False) or runs again (True).
+        """``notify`` gets a sentence when the exchange breaks off (False) or runs again (True).
 
         ``note`` gets what is commanded, with its station, for the record of the bus.
         """
         self._note = note
         self._host = host
-        self._tell = tell
+        self._notify = notify
         self._setup: Message = {}
         self._wanted = False
         self._generation = 0
         self._played: dict[int, int] = {}
         self._last_ns = 0
-        self._recovery = Recovery(lambda: self._host.running, self._set_up_again, tell)
+        self._recovery = Recovery(lambda: self._host.running, self._set_up_again, notify)
         self._profiles = profiles
         self._plans: tuple[StationPlan, ...] = ()
         self._cycle_s = 0.001
@@ -77,7 +77,7 @@ class EthercatCyclic:
         self._reader: RingReader | None = None
         self.dc = False
         self.left_over: tuple[tuple[CyclicSignal, str], ...] = ()
-        """Signals that did not fit, each with the reason in words; poll them."""
+        """Signals that did not fit, each with the reason as text; poll them."""
 
     # Cyclic --------------------------------------------------------------------------------
 
@@ -136,7 +136,7 @@ class EthercatCyclic:
         """Go to Operational and exchange process data.
 
         Raises:
-            NotAllowed: a drive refuses; the reason is its AL status code in words.
+            NotAllowed: a drive refuses; the reason is its AL status code as text.
         """
         await self._start()
         self._last_ns = 0
@@ -225,7 +225,7 @@ class EthercatCyclic:
     async def drive_to(self, station: int, goal: State, mode: int | None = None) -> None:
         """Head for a power state; the axis brakes before it leaves Operation enabled.
 
-        Returns at once; `axis_state` tells when it is there.
+        Returns at once; `axis_state` shows when it is there.
 
         Raises:
             NotAllowed: the drive has a fault, or its control word is not mapped.
@@ -279,7 +279,7 @@ class EthercatCyclic:
 
     @property
     def trouble(self) -> str:
-        """Why the exchange does not run although it is wanted, in words; else empty."""
+        """Why the exchange does not run although it is wanted, as text; else empty."""
         return self._recovery.trouble
 
     def update(self, status: Message, *, reachable: bool) -> None:
@@ -327,7 +327,7 @@ class EthercatCyclic:
 
     def _broke_off(self, why: str) -> None:
         self.shut_down()
-        self._tell(
+        self._notify(
             f"the cyclic exchange broke off: {why}; every axis stops, and the exchange is set up"
             " again by itself",
             False,

@@ -140,7 +140,7 @@ def _write_assigned(station: Station, assign: int, assigned: Assigned) -> Steps[
         try:
             yield from _write_contents(station, pdo)
         except Rejected:
-            # Its mapping is fixed: nothing has changed but the assignment, which is put back.
+            # Its mapping is fixed: nothing has changed but the assignment, which is restored.
             if assigned.assign:
                 yield from coe.download(box, assign, 0, before[:1])
             raise
@@ -163,7 +163,7 @@ def _write_contents(station: Station, pdo: Pdo) -> Steps[None]:
 def _assignments(station: Station) -> Steps[dict[str, int]]:
     """Which object assigns outputs and which inputs: those of their sync managers.
 
-    Usually 1C12h and 1C13h; 1C00h tells where a drive has them the other way round
+    Usually 1C12h and 1C13h; 1C00h shows where a drive has them the other way round
     (ETG.1000.6 clause 5.6.7.4.9: 3 is outputs, 4 is inputs).
     """
     kinds = yield from _read_list(station, 0x1C00, 1)
@@ -185,7 +185,7 @@ def _has_them_anyway(station: Station, assign: int, assigned: Assigned) -> Steps
 
 
 def reads_whole(station: Station) -> Steps[bool]:
-    """Whether the drive knows complete access, asked with the object that SOEM begins with."""
+    """Whether the drive has complete access, asked with the object that SOEM begins with."""
     try:
         yield from coe.upload(station.box, 0x1C00, 0, complete=True)
     except DriveError:
@@ -299,15 +299,15 @@ _NOT_MOVED = (
 
 
 class FoundInPart(ProtocolError):
-    """The EEPROM tells what the search did not learn: one of its frames was lost or late."""
+    """The EEPROM shows what the search did not learn: one of its frames was lost or late."""
 
 
 def check_places(station: Station, setup: StationSetup, clock: Callable[[], float]) -> Steps[None]:
-    """The process data lie in the slave's process memory, as its EEPROM must tell.
+    """The process data lie in the slave's process memory, as its EEPROM must show.
 
     Raises:
         NotAllowed: they do not; outputs would be written nowhere, or into registers.
-        FoundInPart: its EEPROM tells, but the search has not read it.
+        FoundInPart: its EEPROM shows, but the search has not read it.
     """
     managers = yield from read_again(SYNC_MANAGERS, 8 * _MANAGERS)
     if managers is None:
@@ -356,7 +356,7 @@ def restore(
     """From whatever state back to SAFEOP with all that a power cycle cleared.
 
     Raises:
-        DriveError: the slave does not follow; the reason in words.
+        DriveError: the slave does not follow; the reason as text.
     """
     yield from restore_mailbox(station, snapshot.sync_managers, clock)
     yield from write_mapping(station, setup)
@@ -406,7 +406,7 @@ def _sync0_started(setup: StationSetup) -> Steps[bool]:
     if here is None or stopped is None:
         return False
     start_ns = _sync_start(int.from_bytes(here, "little"), setup)
-    # What 990h holds cannot be read back: chips tell the next pulse there.
+    # What 990h holds cannot be read back: chips show the next pulse there.
     written = []
     if rules.activate & _SYNC1_BIT:
         written.append((yield Write(_DC_SYNC1, struct.pack("<I", rules.sync1_ns))))

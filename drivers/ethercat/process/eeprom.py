@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 from drivers.errors import Busy, DriveError, LinkLost, NotAllowed
-from drivers.ethercat.eeprom.transfer import Tell, read_image, write_image
+from drivers.ethercat.eeprom.transfer import Report, read_image, write_image
 from drivers.ethercat.process.protocol import Message
 from drivers.ethercat.process.roster import Roster
 from drivers.ethercat.process.station import Station, answers
@@ -20,7 +20,7 @@ _CALM = (AlState.INIT, AlState.PREOP)
 class EepromOperations:
     """Operations on whole EEPROMs. While one is written no search touches the segment."""
 
-    def __init__(self, roster: Roster, lanes: Lanes, progress: Callable[[Message], Tell]) -> None:
+    def __init__(self, roster: Roster, lanes: Lanes, progress: Callable[[Message], Report]) -> None:
         self._roster = roster
         self._lanes = lanes
         self._progress = progress
@@ -62,7 +62,7 @@ class EepromOperations:
         return station
 
 
-def _written(station: Station, present: bytes, target: bytes, tell: Tell) -> Steps[None]:
+def _written(station: Station, present: bytes, target: bytes, report: Report) -> Steps[None]:
     """Write where the state of the drive permits it.
 
     Raises:
@@ -76,4 +76,4 @@ def _written(station: Station, present: bytes, target: bytes, tell: Tell) -> Ste
             station=station.number,
             state_name=state_name(station.al_state),
         )
-    yield from write_image(present, target, time.monotonic, tell)
+    yield from write_image(present, target, time.monotonic, report)

@@ -1,4 +1,4 @@
-"""Reading of a station whatever tells why it does not reach Operational.
+"""Reading of a station whatever shows why it does not reach Operational.
 
 Source: ETG.1000.4 clause 6 (registers), ETG.1020 clause 22 (1C32h, 1C33h).
 """

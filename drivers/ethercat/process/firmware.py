@@ -20,7 +20,7 @@ from drivers.ethercat.wire.steps import Pause, Steps, Write
 from drivers.texts.message import Text, joined, text
 
 Where = Literal["auto", "BOOT", "PREOP"]
-Tell = Callable[[float, Text], None]
+Report = Callable[[float, Text], None]
 
 _NO_BOOT = 0x0013
 _BACK_S = 60.0
@@ -36,7 +36,7 @@ def load(
     where: Where,
     managers: bytes,
     clock: Callable[[], float],
-    tell: Tell,
+    report: Report,
 ) -> Steps[str]:
     """Send a file and bring the drive back to PREOP; returns the state in which it was taken.
 
@@ -44,23 +44,23 @@ def load(
     EEPROM names mailboxes for it.
 
     Raises:
-        Rejected, NotAllowed: the drive refused, in words; it is back in PREOP if it can be.
+        Rejected, NotAllowed: the drive refused, as text; it is back in PREOP if it can be.
         LinkTimeout, LinkLost: the transfer broke off; the message says how far it came.
     """
     boot = yield from sii.boot_mailbox(clock)
     if where == "BOOT" and boot is None:
         raise NotAllowed("ethercat.station-names-no-mailboxes", station=station.number)
     if boot is not None and where != "PREOP":
-        entered = yield from _enter_boot(station, boot, managers, clock, tell, where)
+        entered = yield from _enter_boot(station, boot, managers, clock, report, where)
         if entered:
             yield from _in_boot(
                 station, boot, name, data, password=password, managers=managers, clock=clock,
-                tell=tell,
+                report=report,
             )  # fmt: skip
             return "BOOT"
     yield from to_preop(station, clock)
-    yield from _send(station.box, name, data, password=password, tell=tell)
-    tell(1.0, text("ethercat.file-drive"))
+    yield from _send(station.box, name, data, password=password, report=report)
+    report(1.0, text("ethercat.file-drive"))
     yield from identify(station, clock)
     return "PREOP"
 
@@ -70,11 +70,11 @@ def _enter_boot(
     boot: sii.BootMailbox,
     managers: bytes,
     clock: Callable[[], float],
-    tell: Tell,
+    report: Report,
     where: Where,
 ) -> Steps[bool]:
     """False where the drive has no BOOT after all, and is in PREOP again."""
-    tell(0.0, text("ethercat.going-boot"))
+    report(0.0, text("ethercat.going-boot"))
     yield from change_state(station, AlState.INIT, clock)
     for number, (address, size, control) in enumerate(
         ((boot.out_address, boot.out_size, 0x26), (boot.in_address, boot.in_size, 0x22))
@@ -101,18 +101,18 @@ def _in_boot(
     password: int,
     managers: bytes,
     clock: Callable[[], float],
-    tell: Tell,
+    report: Report,
 ) -> Steps[None]:
     box = Mailbox(
         boot.out_address, boot.out_size, boot.in_address, boot.in_size, clock, lambda _data: None
     )
     try:
-        yield from _send(box, name, data, password=password, tell=tell)
+        yield from _send(box, name, data, password=password, report=report)
     except DriveError as error:
         after = yield from _after_failure(station, managers, clock)
         error.text = joined((error.text, after))
         raise
-    tell(1.0, text("ethercat.file-drive-starts-not"))
+    report(1.0, text("ethercat.file-drive-starts-not"))
     yield from _back(station, managers, clock)
     yield from identify(station, clock)
 
@@ -149,13 +149,13 @@ def _back(station: Station, managers: bytes, clock: Callable[[], float]) -> Step
         yield Pause(_BACK_PAUSE_S)
 
 
-def _send(box: Mailbox, name: str, data: bytes, *, password: int, tell: Tell) -> Steps[None]:
+def _send(box: Mailbox, name: str, data: bytes, *, password: int, report: Report) -> Steps[None]:
     sent = 0
 
     def progress(now: int) -> None:
         nonlocal sent
         sent = now
-        tell(
+        report(
             now / max(len(data), 1), text("ethercat.bytes-not-switch-off", now=now, bytes=len(data))
         )
 

@@ -25,7 +25,7 @@ _RESTART_PAUSE_S = (0.2, 1.0, 3.0, 10.0)
 _FAREWELL_S = 3.0
 START_S = 30.0
 """A child that hangs as it starts; one that dies is noticed at once. Loading alone takes a busy
-computer ten seconds, and a shorter time would have it begin anew for ever."""
+computer ten seconds, and a shorter time would have it begin again for ever."""
 
 
 class HostProcess:

@@ -22,7 +22,7 @@ from drivers.ethercat.process.examination import examine
 from drivers.ethercat.process.protocol import Message, error_to_wire
 from drivers.ethercat.process.requested import refuse_op, request
 from drivers.ethercat.process.roster import Roster, Send
-from drivers.ethercat.process.segment import Segment, SpoiltMap
+from drivers.ethercat.process.segment import InvalidMap, Segment
 from drivers.ethercat.process.station import Station
 from drivers.ethercat.wire import coe, esc, reading, sii
 from drivers.ethercat.wire.al_status import AlState, state_name
@@ -340,7 +340,7 @@ class Operations:
             where=message["where"],
             managers=self.roster.managers(station.number),
             clock=time.monotonic,
-            tell=lambda share, step: self._progress(message, share, step),
+            report=lambda share, step: self._progress(message, share, step),
         )
         self._loading.add(station.number)
         self.lanes.submit(station.number, "mailbox", steps, ended)
@@ -367,7 +367,7 @@ class Operations:
         for _ in range(_FIND_TRIES - 1):
             try:
                 answer = self._find_and_configure(message)
-            except (FoundInPart, SpoiltMap):
+            except (FoundInPart, InvalidMap):
                 continue
             done(answer, None)
             return
@@ -397,7 +397,7 @@ class Operations:
 
     def _play(self, message: Message, done: Done) -> None:
         first = self.roster.exchange.play(message["trajectories"])
-        self._tell_figures()
+        self._report_figures()
         done(first, None)
 
     def _renew(self, message: Message, done: Done) -> None:
@@ -406,7 +406,7 @@ class Operations:
 
     def _pause(self, message: Message, done: Done) -> None:
         self.roster.exchange.axis(message["station"]).pause()
-        self._tell_figures()
+        self._report_figures()
         done(None, None)
 
     def _halt(self, message: Message, done: Done) -> None:
@@ -420,10 +420,10 @@ class Operations:
             axis.reset_fault()
         else:
             axis.drive_to(State[message["goal"]], message["mode"])
-        self._tell_figures()
+        self._report_figures()
         done(None, None)
 
-    def _tell_figures(self) -> None:
+    def _report_figures(self) -> None:
         """Before the reply, so that nobody takes the end of an earlier motion for this one's."""
         self._send({"event": "status"} | self.status())
 

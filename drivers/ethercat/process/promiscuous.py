@@ -2,7 +2,7 @@
 
 SOEM sets the flag of the interface itself (IFF_PROMISC, netdevice(7)), which stays when the master
 is closed or killed: the computer then reads all traffic of that network for ever. A membership of
-the socket (PACKET_MR_PROMISC, packet(7)) does the same, and the kernel takes it back by itself.
+the socket (PACKET_MR_PROMISC, packet(7)) does the same, and the kernel undoes it by itself.
 """
 
 from __future__ import annotations

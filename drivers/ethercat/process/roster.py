@@ -26,14 +26,14 @@ _FIND_TRIES = 5
 _PAUSES_S = (1.0, 3.0, 10.0)
 """Between tries to mend what a search left out, or left wrong: each costs the others a moment."""
 _MENDINGS = 2
-"""After so many tries on its own a station is searched for anew: what is known may be wrong."""
+"""After so many tries on its own a station is searched for again: what is known may be wrong."""
 _ENABLES = 0x0F
 
 Send = Callable[[Message], None]
 
 
 class Roster:
-    """Knows which stations there are and how they are; tells of every change."""
+    """Knows which stations there are and how they are; reports every change."""
 
     def __init__(self, segment: Segment, lanes: Lanes, ring: Ring, send: Send) -> None:
         self.segment = segment
@@ -51,7 +51,7 @@ class Roster:
         self._next_open = 0.0
         self._search_due = False
         self._wanted, self._wanted_at = 0, 0.0
-        self._mending: dict[int, tuple[int, float]] = {}
+        self._repairing: dict[int, tuple[int, float]] = {}
         #: Stations whose last control word by mailbox enables: no search may reset them.
         self._powered: set[int] = set()
         self._managers: dict[int, bytes] = {}
@@ -143,11 +143,11 @@ class Roster:
         if station.al_state & ~ERROR_BIT == AlState.INIT and (
             station.al_state & ERROR_BIT or station.mailbox is not None
         ):
-            self._mend(station)
+            self._repair(station)
         else:
-            self._mending.pop(station.number, None)
+            self._repairing.pop(station.number, None)
 
-    def _mend(self, station: Station) -> None:
+    def _repair(self, station: Station) -> None:
         """It fell out of PREOP, as when a frame of the search was lost: nobody could stop it so.
 
         Or it never came there, as when it was switched on again and took longer to start than a
@@ -156,10 +156,10 @@ class Roster:
         number, now = station.number, time.monotonic()
         # No search takes anything from it that it still had.
         self._powered.discard(number)
-        tries, due = self._mending.get(number, (0, now))
+        tries, due = self._repairing.get(number, (0, now))
         if now < due or self.exchange.loop is not None or self.lanes.busy(number, "mailbox"):
             return
-        self._mending[number] = tries + 1, now + _PAUSES_S[min(tries, len(_PAUSES_S) - 1)]
+        self._repairing[number] = tries + 1, now + _PAUSES_S[min(tries, len(_PAUSES_S) - 1)]
         if tries == _MENDINGS:
             self._search_due = True
         elif station.mailbox is not None:
@@ -204,14 +204,14 @@ class Roster:
             self.lanes.submit(station.number, "mailbox", steps, _ignore)
 
     def al_words(self, station: Station) -> str:
-        """AL state and status of a station in words."""
+        """AL state and status of a station as text."""
         words = f"station {station.number} is in {state_name(station.al_state)}"
         if station.al_state & ERROR_BIT:
             words += f": {al_status_text(station.al_code)}"
         return words
 
     def event(self, kind: str, station: int | None, text: str, code: int | None = None) -> None:
-        """Tell the server; the figures go first, so that who looks at them sees the same."""
+        """Inform the server; the figures go first, so that who looks at them sees the same."""
         self._send({"event": "status"} | self.status())
         self._send({"event": "link", "kind": kind, "station": station, "text": text, "code": code})
 
@@ -241,7 +241,7 @@ class Roster:
         else:
             self._powered.discard(number)
 
-    def _want_search(self) -> None:
+    def _request_search(self) -> None:
         """Search again soon, with growing pauses for as long as that does not help."""
         now = time.monotonic()
         if now >= self._wanted_at:
@@ -306,7 +306,7 @@ class Roster:
         for _ in range(_FIND_TRIES):
             managers = managers or self.segment.read(number, 0x800, 16)
         if managers is None:
-            # Not a device without mailbox: one that does not answer. It is taken up when it does.
+            # Not a device without mailbox: one that does not answer. It is accepted when it does.
             self._search_due = True
             station.notes.append("it did not answer while it was being found")
         else:
@@ -330,7 +330,7 @@ class Roster:
         if not 1 <= number <= len(self.stations):
             self.attached = self.attached and bool(self.stations)
             # A drive that was without supply, or behind a cut cable, when the others were found.
-            self._want_search()
+            self._request_search()
             raise LinkLost(
                 "ethercat.no-station-found-check-supply",
                 station=number,

@@ -6,12 +6,12 @@ descriptor 0 and a second one closes a stranger's; a failed open leaks its socke
 than the slave's overwrite memory; the IO map of 4096 bytes is not checked; errors of earlier
 calls stay in a global queue and are raised by later ones.
 
-And SOEM tells answers apart by an index of four bits alone: when 16 late frames lie in the
+And SOEM distinguishes answers by an index of four bits alone: when 16 late frames lie in the
 socket, each request is at once answered by one that is 16 frames old, for ever. So late frames
 are thrown away before anything is sent, and registers are read and written by frames of our own.
 
-SOEM believes that slaves of the same vendor, product and revision have the same EEPROM, and reads
-only the first one's. Drives that tell nothing of themselves all have 0, whatever they are.
+SOEM assumes that slaves of the same vendor, product and revision have the same EEPROM, and reads
+only the first one's. Drives that show nothing of themselves all have 0, whatever they are.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ _FIND_TRIES = 3
 """A segment that stands still for a moment answers nothing, or too late and to another question."""
 
 
-class SpoiltMap(ProtocolError):
+class InvalidMap(ProtocolError):
     """SOEM took something else for an answer while it asked for the mapping.
 
-    Only a new search helps: SOEM gives every further mapping FMMUs of its own beside those of the
+    Only a new search helps: SOEM gives every further mapping FMMUs of its own next to those of the
     one that failed, which then go on writing outputs and reading inputs at the wrong places, and
     the third mapping is beyond the end of its list.
     """
@@ -209,7 +209,8 @@ class Segment:
         scrap = memoryview(self._scrap)
         try:
             ear.send(sent, MSG_DONTWAIT)
-            # What has come is taken however late it is: this process may have stood still itself.
+            # What has come is accepted however late it is: this process may have stood still
+            # itself.
             for _ in range(_MOST_STRAY):
                 left_s = max(deadline - time.monotonic(), 0.0)
                 if not select.select((ear,), (), (), left_s)[0]:
@@ -240,7 +241,7 @@ class Segment:
 
         Raises:
             NotAllowed: more process data than the IO map holds, or no search came before.
-            SpoiltMap: a drive's mapping could not be read; to be searched for and mapped again.
+            InvalidMap: a drive's mapping could not be read; to be searched for and mapped again.
         """
         if expected_bytes > IO_MAP_BYTES:
             raise NotAllowed(
@@ -262,7 +263,7 @@ class Segment:
         except pysoem.ConfigMapError as error:
             self.forget_errors()
             reported = sorted({_mapping_error(item) for item in error.error_list})
-            raise SpoiltMap(
+            raise InvalidMap(
                 "ethercat.process-data-not-mapped", reported="; ".join(reported)
             ) from error
         self.mapped = True

@@ -63,7 +63,7 @@ class Station:
 
     @property
     def identity(self) -> list[int | None]:
-        """What tells this drive from any other."""
+        """What distinguishes this drive from any other."""
         return [self.vendor_id, self.product_code, self.serial]
 
     @property
@@ -141,7 +141,7 @@ def change_state(
     """Drive the slave to ``target``, acknowledging an error first.
 
     Raises:
-        NotAllowed: the slave refused; the reason is its AL status code in words.
+        NotAllowed: the slave refused; the reason is its AL status code as text.
         LinkTimeout: it did not get there in the time of ETG.1020.
         LinkLost: it does not answer.
     """
@@ -198,7 +198,7 @@ def _refused(station: Station, target: AlState) -> NotAllowed:
 def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
     """Wait for PREOP, then fill identity, alias, ports and mailbox-reported names.
 
-    What a slave does not have stays empty; a slave that refuses PREOP keeps a note in words.
+    What a slave does not have stays empty; a slave that refuses PREOP keeps a note as text.
     """
     station.notes.clear()
     alias = yield from read_again(0x12, 2, clock)

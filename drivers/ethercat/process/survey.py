@@ -1,4 +1,4 @@
-"""A segment at one moment, as the host process tells it: places, ports, clocks, punctuality."""
+"""A segment at one moment, as the host process shows it: places, ports, clocks, punctuality."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""AL states and AL status codes in words (ETG.1000.6 clause 5.3, table 11; ETG.1020 clause 5)."""
+"""AL states and AL status codes as text (ETG.1000.6 clause 5.3, table 11; ETG.1020 clause 5)."""
 
 from __future__ import annotations
 

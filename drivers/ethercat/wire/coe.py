@@ -1,6 +1,6 @@
 """CANopen over EtherCAT: SDO transfers and complete access.
 
-Generators over `Mailbox`; no I/O. Source: ETG.1000.6 clause 5.6.2. Aborts are taken with any low
+Generators over `Mailbox`; no I/O. Source: ETG.1000.6 clause 5.6.2. Aborts are accepted with any low
 command bits and under either service number: several makers' stacks differ there.
 """
 
@@ -228,7 +228,7 @@ def stopped_first() -> NotAllowed:
 
 
 def settle(box: Mailbox, *, force: bool = False) -> Steps[None]:
-    """Make sure that no late answer can be taken for the next one.
+    """Make sure that no late answer can be mistaken for the next one.
 
     A slave answers in order. After a time-out a harmless read of another object is asked first:
     when its answer is here, everything older has come and been dropped.

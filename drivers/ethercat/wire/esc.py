@@ -41,7 +41,7 @@ class PortCounters:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a counter accuses, in words; ``port`` is None for what belongs to no cable."""
+    """What a counter accuses, as text; ``port`` is None for what belongs to no cable."""
 
     station: int
     port: int | None
@@ -95,7 +95,7 @@ def parents(stations: Sequence[PortCounters]) -> dict[int, tuple[int, int]]:
 def findings(
     stations: Sequence[PortCounters], upstream: Mapping[int, tuple[int, int]]
 ) -> list[Finding]:
-    """Which cable or connector the counters accuse, in words; empty when nothing is wrong.
+    """Which cable or connector the counters accuse, as text; empty when nothing is wrong.
 
     ``upstream`` is what `parents` reported while every station answered: while a cable is cut its
     ports no longer say what is behind them.

@@ -49,7 +49,7 @@ def write_file(
     password: int,
     on_progress: Callable[[int], None],
 ) -> Steps[None]:
-    """Send ``data`` as file ``name``; ``on_progress`` gets the number of bytes taken so far.
+    """Send ``data`` as file ``name``; ``on_progress`` gets the number of bytes accepted so far.
 
     Raises:
         Rejected: the drive refused, with its error code and text.

@@ -1,8 +1,8 @@
 """EtherCAT frames of our own: register accesses of several stations in one frame.
 
-SOEM tells answers apart by an index of four bits alone, so that a late frame may be taken for the
-answer to a later request. Ours carry an index that SOEM never gives (0 to 15 are its own), and an
-answer counts only where everything that slaves leave alone is as it was sent.
+SOEM distinguishes answers by an index of four bits alone, so that a late frame may be mistaken for
+the answer to a later request. Ours carry an index that SOEM never gives (0 to 15 are its own), and
+an answer counts only where everything that slaves leave alone is as it was sent.
 
 Source: ETG.1000.4 clauses 5.3 (frame) and 5.4 (datagrams).
 """

@@ -1,4 +1,4 @@
-"""The SDO information service: what a drive's own dictionary tells of itself.
+"""The SDO information service: what a drive's own dictionary reports of itself.
 
 Generators over `Mailbox`; no I/O. Source: ETG.1000.6 clause 5.6.3.
 """

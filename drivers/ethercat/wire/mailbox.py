@@ -76,7 +76,7 @@ class Mail(NamedTuple):
 
 
 def frame(protocol: int, counter: int, payload: bytes, size: int) -> bytes:
-    """A mailbox padded to its full ``size``: the last byte is what tells the slave of it.
+    """A mailbox padded to its full ``size``: the last byte is what shows the slave of it.
 
     Raises:
         ProtocolError: the payload does not fit.
@@ -151,7 +151,7 @@ class Mailbox:
         """Send a mail and wait for the one that ``matches``; others are dropped.
 
         With ``keep`` others are kept for the transaction that this one has overtaken. For
-        ``gone_s`` frames may be lost before the station is taken for gone.
+        ``gone_s`` frames may be lost before the station is treated as gone.
 
         Raises:
             LinkLost: the station answers no frame at all.

@@ -37,7 +37,7 @@ def read_items(
     dead: DriveError | None = None
     for index, members in groups.items():
         sizes = _sizes_of_whole(station, index, members) if dead is None else {}
-        doubted = index in station.single_only
+        single = index in station.single_only
         if sizes:
             yield Gap()
             whole = yield from _read_whole(station, index, sizes)
@@ -59,7 +59,7 @@ def read_items(
                 results[item] = error
                 if isinstance(error, LinkLost | LinkTimeout):
                     dead = error
-                    if not doubted:
+                    if not single:
                         # It answers nothing: that says nothing about whole objects.
                         station.single_only.discard(index)
         if index in station.to_prove:
@@ -134,7 +134,7 @@ def _read_whole(station: Station, index: int, sizes: dict[int, int]) -> Steps[di
 
 
 def _is_all_there_is(station: Station, index: int, sizes: dict[int, int]) -> Steps[bool]:
-    """Whether the drive's own dictionary knows no other subindices than these.
+    """Whether the drive's own dictionary has no other subindices than these.
 
     An answer as long as all of them together then holds each of them: one question instead of
     reading every entry once more.
@@ -164,7 +164,7 @@ def _prove(station: Station, index: int, sizes: dict[int, int], singles: dict[in
 def enumerate_objects(
     station: Station, on_progress: Callable[[int, int], None]
 ) -> Steps[list[Described]]:
-    """Every object and entry that the drive's own dictionary tells of."""
+    """Every object and entry that the drive's own dictionary lists."""
     indices = yield from information.list_objects(station.box)
     found: list[Described] = []
     for number, index in enumerate(indices):

@@ -22,7 +22,7 @@ MAILBOX_WORD = 0x0018
 """Offset and size of the mailbox out, of the mailbox in, and the protocols (ETG.1000.6 5.4)."""
 CONFIG_WORDS = 7
 _CATEGORIES_WORD, _SYNC_MANAGERS, _LAST = 0x0040, 41, 0xFFFF
-"""Type and length in words head every category (ETG.1000.6 table 19 and 5.4)."""
+"""Type and length in 16-bit words head every category (ETG.1000.6 table 19 and 5.4)."""
 _MOST_CATEGORIES = 64
 _SOEM_BYTES = 4096
 """SOEM takes every byte behind these for the end of the EEPROM (its EC_MAXEEPBUF)."""
@@ -135,7 +135,7 @@ def has_mailbox(clock: Callable[[], float]) -> Steps[bool]:
 def process_data_places(clock: Callable[[], float]) -> Steps[tuple[int, bool]]:
     """How many sync managers beyond the mailboxes the EEPROM puts into the process memory.
 
-    0 where it has no such category. The second value tells whether it stands where SOEM reads.
+    0 where it has no such category. The second value shows whether it stands where SOEM reads.
     Errors as `read`.
     """
     word = _CATEGORIES_WORD

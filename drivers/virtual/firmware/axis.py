@@ -174,7 +174,7 @@ class VirtualAxis:
         self.p[k.P_DYNAMIC_BRAKE] = shorted if dynamic_brake else 0.0
 
     def await_standstill(self) -> None:
-        """Raise EV_STOPPED as soon as the axis, which is not powered, has come to rest."""
+        """Raise EV_STOPPED as soon as the axis, which is not powered, has stopped."""
         self.s[k.S_STOPPED] = 0.0
         self.p[k.P_STOPPING] = 1.0
 
@@ -256,7 +256,7 @@ class VirtualAxis:
             s[k.S_ROUGH_WAIT] = float(self._jitter.integers(0, int(p[k.P_ROUGH_JITTER_STEPS]) + 1))
 
     def stop_ramp(self, braking: float) -> None:
-        """Brake to rest at this deceleration; EV_STOPPED tells when."""
+        """Brake to standstill at this deceleration; EV_STOPPED shows when."""
         loop = self.p[k.P_LOOP]
         if loop == k.LOOP_POSITION:
             self._begin(k.GEN_POSITION, k.LOOP_POSITION)
@@ -268,18 +268,18 @@ class VirtualAxis:
         self.p[k.P_STOPPING], self.p[k.P_STOP_DEC] = 1.0, braking
 
     def stop_by_torque_slope(self, slope_nm_s: float) -> None:
-        """Take the torque back at this slope; EV_STOPPED tells when the axis stands."""
+        """Reduce the torque at this slope; EV_STOPPED shows when the axis is at standstill."""
         self.run_torque(0.0, slope_nm_s)
         self.p[k.P_STOPPING] = 1.0
 
     def stop_by_torque(self, torque_nm: float) -> None:
-        """Brake with a constant torque (0 coasts under power); EV_STOPPED tells when."""
+        """Brake with a constant torque (0 coasts under power); EV_STOPPED shows when."""
         self._begin(k.GEN_TORQUE_STOP, k.LOOP_TORQUE)
         self.p[k.P_STOP_TORQUE] = torque_nm
         self.p[k.P_STOPPING] = 1.0
 
     def place(self, angle_rad: float) -> None:
-        """Turn the shaft by hand to an angle, without power and at rest; the loads follow."""
+        """Turn the shaft by hand to an angle, without power and at standstill; the loads follow."""
         x, s = self._x, self.s
         x[:] = 0.0
         x[0] = angle_rad

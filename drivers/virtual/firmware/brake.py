@@ -1,8 +1,8 @@
 """The holding brake of a motor that has one, in the order of its family (000:1360, 002:8117).
 
-Enabling: power on, the brake opens, then commands are taken. Disabling at rest: the brake closes
-and the power stays on for its time; in motion the axis stops first. A fault closes it at once,
-with the power stage.
+Enabling: power on, the brake opens, then commands are accepted. Disabling at standstill: the brake
+closes and the power stays on for its time; in motion the axis stops first. A fault closes it at
+once, with the power stage.
 """
 
 from __future__ import annotations
@@ -79,12 +79,12 @@ class HoldingBrake:
         if self._bus is not None:
             return False
         if self._without_current():
-            # The drive knows nothing of it, and takes commands against a closed brake.
+            # The drive has no data of it, and takes commands against a closed brake.
             self._axis.close_brake(True)
             return False
         late_s = self._axis.spec.rough_feedback.brake_opens_s
         if late_s is not None and self._axis.spec.motor.brake:
-            # Commands are taken at once, against a brake that still grips.
+            # Commands are accepted at once, against a brake that still grips.
             self._axis.close_brake(True)
             self._timer = self._core.schedule.after(late_s, self._opened)
             return False

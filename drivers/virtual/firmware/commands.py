@@ -70,7 +70,7 @@ class Commands:
             nonlocal last
             before, last = last, int(value)
             if last == 0 and "identify_poles" in actions.values() and self._control.poles.active:
-                # What ends it is not printed; its parameter going back is taken for the end.
+                # What ends it is not printed; its parameter going back is mistaken for the end.
                 self._control.poles.cancel()
                 self._core.axis.power_off()
             # A trigger that stays acts on its change only (003:411-414).
@@ -83,7 +83,7 @@ class Commands:
             self._actions[name]()
             if self.store is not None and self.store.busy:
                 last = 0
-                return  # its value tells of the result
+                return  # its value reports the result
             if self_clearing:
                 last = 0
                 self._core.od.put(key, 0)

@@ -20,7 +20,7 @@ from drivers.virtual.firmware.stopping import Stopping
 
 _HALT, _FAULT_RESET, _IDENTIFY = 1 << 8, 1 << 7, 1 << 11
 _OPERATING: Final = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
-_AT_REST: Final = (State.SWITCH_ON_DISABLED, State.READY, State.SWITCHED_ON)
+_AT_STANDSTILL: Final = (State.SWITCH_ON_DISABLED, State.READY, State.SWITCHED_ON)
 _STOP_OPTIONS: Final = {Command.SHUTDOWN: "605B:00", Command.SWITCH_ON: "605C:00"}
 
 
@@ -131,7 +131,7 @@ class DeviceControl:
 
     def _free(self) -> bool:
         """Whether nobody commands the axis, so that the drive may move it by itself."""
-        return self.state in _AT_REST and self._after_stop is None and not self.brake.moving
+        return self.state in _AT_STANDSTILL and self._after_stop is None and not self.brake.moving
 
     def _pole_failed(self, code: str) -> None:
         self.faults.raise_code(code)
@@ -205,7 +205,7 @@ class DeviceControl:
             self._command(decode(self.control_word))
 
     def _hold_stopped(self) -> None:
-        # Torque modes know no position lock where 6087h has taken the torque back (000:3020).
+        # Torque modes have no position lock where 6087h has reduced the torque (000:3020).
         if not (self._traits.stops.slope_in_torque and self.modes.mode in (PT, CST)):
             self._axis.hold()
 

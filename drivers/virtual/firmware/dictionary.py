@@ -177,7 +177,7 @@ class ObjectDictionary:
         return code in self.entries
 
     def find(self, index: int, subindex: int) -> Entry:
-        """Entry, or SdoAbort with the code that tells object from subindex."""
+        """Entry, or SdoAbort with the code that distinguishes object from subindex."""
         entry = self.entries.get(index << 8 | subindex)
         if entry is None:
             raise SdoAbort(ABORT_NO_SUBINDEX if index in self._subindices else ABORT_NO_OBJECT)
@@ -194,7 +194,7 @@ class ObjectDictionary:
         return list(self._subindices[index])
 
     def info(self, index: int, subindex: int) -> EntryInfo:
-        """What the SDO information service tells."""
+        """What the SDO information service shows."""
         entry = self.find(index, subindex)
         parameter = entry.parameter
         return EntryInfo(
@@ -229,7 +229,7 @@ class ObjectDictionary:
         self.assign(entry, value)
 
     def assign(self, entry: Entry, value: Raw) -> None:
-        """Store a checked value and tell whoever reacts to it."""
+        """Store a checked value and notify whoever reacts to it."""
         self.writes += 1
         before, before_active = entry.value, entry.active
         entry.value = value
@@ -250,7 +250,7 @@ class ObjectDictionary:
         return entry.active
 
     def cell(self, key: str, default: Number = 0) -> Cell:
-        """What `number` tells, looked up once: numeric entries stay numeric for good."""
+        """What `number` shows, looked up once: numeric entries stay numeric for good."""
         entry = self.numbered.get(key)
         if entry is None or isinstance(entry.active, str):
             return _Constant(default)

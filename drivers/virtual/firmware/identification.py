@@ -43,7 +43,7 @@ class Identification:
         return self._script is not None
 
     def start(self, ended: Callable[[], None]) -> None:
-        """Begin; ends by itself in "complete" or "error" and tells so."""
+        """Begin; ends by itself in "complete" or "error" and shows so."""
         self.started = True
         self._ended = ended
         self._script = self._run()

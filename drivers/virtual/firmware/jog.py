@@ -1,10 +1,10 @@
 """What a drive moves by itself, without the bus: its jog by inputs or a parameter, and homing.
 
 M6-L: inputs with functions 17 and 18 at the speed of P06.05 (000:1191-1193); the ramps P06.07 and
-P06.08 are taken to 1000 rpm, which is not printed. R6L: inputs with functions 39 and 40 at P04.04,
-with the servo off, and P04.05 and P04.06 as the times to and from 1000 rpm (002:9774-9807). Both
-inputs at once, or none, stand still. Whoever enables the axis over the bus ends it; an input that
-is still on when the axis is free again begins anew.
+P06.08 are assumed up to 1000 rpm, which is not printed. R6L: inputs with functions 39 and 40 at
+P04.04, with the servo off, and P04.05 and P04.06 as the times to and from 1000 rpm (002:9774-9807).
+Both inputs at once, or none, stand still. Whoever enables the axis over the bus ends it; an input
+that is still on when the axis is free again begins again.
 
 R6L: P12.10 "JOG running" (002:11909) is printed without values: 1 forward, 2 backward and 0 for the
 end are assumed. M6-L: P12.00 = 4 or 5 homes at once (000:3618) at the speed P12.05 with the time
@@ -44,7 +44,7 @@ class TerminalJog:
 
     @property
     def active(self) -> bool:
-        """Turning, or still coming to rest."""
+        """Turning, or still stopping."""
         return self._wanted != 0 or self._stopping
 
     def update(self, *, forward: bool, backward: bool) -> None:
@@ -106,7 +106,7 @@ class TerminalJog:
         self._wanted, self._stopping, self._ordered = 0, False, 0
 
     def stopped(self) -> None:
-        """The axis has come to rest."""
+        """The axis has stopped."""
         if not self._stopping:
             return
         self._stopping = False

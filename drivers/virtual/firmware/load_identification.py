@@ -44,7 +44,7 @@ class LoadIdentification:
         return self._script is not None
 
     def start(self) -> None:
-        """Begin swinging; the axis must be free to turn by what the drive tells."""
+        """Begin swinging; the axis must be free to turn by what the drive reports."""
         if self.active:
             return
         self._samples = []

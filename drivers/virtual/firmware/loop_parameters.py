@@ -146,7 +146,7 @@ def _write_extras(p: Parameters, loops: LoopSettings) -> None:
 def write_protections(
     p: Parameters, limits: ProtectionSettings, rated_nm: float, resistor: bool
 ) -> None:
-    """Thresholds of the protections; ``resistor`` tells whether one is fitted to brake with."""
+    """Thresholds of the protections; ``resistor`` shows whether one is fitted to brake with."""
     p[k.P_OCP_A], p[k.P_UVLO_V] = limits.over_current_a, limits.under_voltage_v
     p[k.P_OVP_V], p[k.P_BRAKE_ON_V] = limits.over_voltage_v, limits.brake_on_v
     fitted = limits.brake_enabled and resistor

@@ -232,7 +232,7 @@ class Modes:
         return bits
 
     def reached(self, halted: bool) -> bool:
-        """Bit 10 of the status word with the power stage on: target reached, or at rest."""
+        """Bit 10 of the status word with the power stage on: target reached, or at standstill."""
         item, mode = self._item, self.mode
         if halted:
             return item(k.S_ZERO_T) > 0

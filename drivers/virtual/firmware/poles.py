@@ -1,4 +1,4 @@
-"""Magnetic pole identification of a motor whose encoder does not tell its rotor's angle.
+"""Magnetic pole identification of a motor whose encoder does not report its rotor's angle.
 
 M6-L (000:1163-1181, P01.20, P24.00 to P24.10): a direct drive motor with an incremental or sin/cos
 encoder and without a Hall sensor needs it once after every power-on. In the manual mode (P24.01 =

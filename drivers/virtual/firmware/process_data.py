@@ -118,7 +118,7 @@ class OutputImage:
             try:
                 entry.setter(value)
             except SdoAbort:
-                # There is nobody to tell: what the drive refuses has no effect.
+                # Nothing is reported: what the drive refuses has no effect.
                 entry.value = entry.active = before
 
 

@@ -1,4 +1,4 @@
-"""A drive that tells of its motion otherwise than the others; see `RoughFeedbackSpec`."""
+"""A drive that reports its motion otherwise than the others; see `RoughFeedbackSpec`."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def _per_turn(code: int, position_per_rad: float) -> float:
 
 
 class RoughSpeed:
-    """606Ch as this drive tells it: late, as a mean, in steps, by a factor."""
+    """606Ch as this drive reports it: late, as a mean, in steps, by a factor."""
 
     def __init__(self, core: Core) -> None:
         self._core = core

@@ -329,7 +329,7 @@ class VirtualServo:
         without a switch; ``power_off`` switches off for ``value`` seconds.
 
         Raises:
-            ValueError: this drive knows no such trouble.
+            ValueError: this drive has no such trouble.
         """
         if what == "power_off":
             self.power_cycle(value)

@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class State(Enum):
-    """States with the status word bits that tell them (mask 0x6F)."""
+    """States with the status word bits that show them (mask 0x6F)."""
 
     NOT_READY = 0x00
     SWITCH_ON_DISABLED = 0x40

@@ -53,7 +53,7 @@ class Stopping:
         return True
 
     def coast(self) -> bool:
-        """Power off now; the state changes when the axis stands (001:882)."""
+        """Power off now; the state changes when the axis is at standstill (001:882)."""
         self._axis.power_off()
         if abs(self._axis.speed_rad_s) <= self._axis.p[k.P_STOP_SPEED]:
             return False

@@ -180,7 +180,7 @@ class Terminals:
 
     # --- touch probes ----------------------------------------------------------------------
     def set_probe_function(self, word: int) -> None:
-        """60B8h: enabling anew forgets what was latched."""
+        """60B8h: enabling again forgets what was latched."""
         rising = word & ~self._probe_function
         for probe, shift in ((0, 0), (1, 8)):
             if rising >> shift & 1 or not word >> shift & 1:

@@ -32,7 +32,7 @@ def make_trouble(
     """One trouble by name; see `VirtualServo.inject`.
 
     Raises:
-        ValueError: this drive knows no such trouble.
+        ValueError: this drive has no such trouble.
     """
     if what in _PHYSICS:
         core.axis.p[_PHYSICS[what]] = value

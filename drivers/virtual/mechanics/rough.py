@@ -19,14 +19,14 @@ class RoughTorqueSpec(BaseModel):
     although the dictionary has 60C2h. ``reported``: 6077h is the current's torque or a copy of the
     demand, behind a first-order filter of ``reported_filter_s``. ``torque_filter_s``: a first-order
     low-pass of the torque command that no parameter names. ``loop_period_s`` (50 µs or longer):
-    the torque changes once per period and the speed's difference is taken over it.
+    the torque changes once per period and the speed's difference is calculated over it.
     ``torque_constant``: true over nominal torque; 6077h stays nominal.
 
     ``presliding_rad``: friction is Dahl's (P. R. Dahl, 1968) with this rest length instead of
     Coulomb's; ``cogging_nm`` sin(``cogging_per_rev`` θ); ``drag_nm`` is a cable's hysteresis over
     ``drag_rad``. ``inertia_share`` sin(``inertia_per_rev`` θ) of the motor's inertia, and
     ``stiffness_share`` sin(``stiffness_per_rev`` θ) of the first coupling's stiffness, vary by
-    place. ``slip_per_s``: share of the first coupling's twist that a belt gives way per second.
+    place. ``slip_per_s``: share of the first coupling's twist that a belt slips per second.
     ``dip_share`` of the torque is missing for ``dip_s`` out of every ``dip_every_s``, as with a
     supply that breaks down. ``interpolation_rad`` sin(``interpolation_per_rev`` θ) is the encoder's
     error. ``jitter_s``: a cyclic setpoint acts later by up to this.

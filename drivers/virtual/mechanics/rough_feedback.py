@@ -1,4 +1,4 @@
-"""How a virtual drive may tell of its motion otherwise than the others: what real ones do."""
+"""How a virtual drive may report its motion otherwise than the others: what real ones do."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ class RoughFeedbackSpec(BaseModel):
 
     ``velocity_unit`` and ``acceleration_unit`` are codes of 60A9h and 60AAh: the drive's speeds and
     ramps are in these units, also 60FFh and 6081h. ``speed_factor`` multiplies 606Ch alone: 10 for
-    a drive that tells 0.1 rpm where it states rpm, −1 for the other sign, 0 for one that stands
+    a drive that reports 0.1 rpm where it states rpm, −1 for the other sign, 0 for one that stands
     still. ``lacks`` names objects (``6092``) that the drive does not have.
     """
 

@@ -183,7 +183,7 @@ class SwitchSpec(_Part):
 class SupplySpec(_Finite):
     """The DC supply. One that cannot sink lets regeneration raise the bus voltage.
 
-    Without ``braking_resistor`` nothing is connected where the drive wants its braking resistor
+    Without ``braking_resistor`` nothing is connected where the drive needs its braking resistor
     (the bridge B1-B2 of an EP3E is open, the terminals RB of a DS_C are empty).
     """
 

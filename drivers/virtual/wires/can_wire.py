@@ -30,7 +30,7 @@ class ClientSide(Protocol):
         """A frame of a node; lost without a word when no client listens."""
 
     def bus_off(self) -> None:
-        """Make the client's adapter go bus-off until it is opened anew."""
+        """Make the client's adapter go bus-off until it is opened again."""
 
     def error(self, kind: int) -> None:
         """A frame of the client failed: ``kind`` is a class of linux/can/error.h."""
@@ -64,7 +64,7 @@ class PythonCanSide:
         )
 
     def bus_off(self) -> None:
-        """Send the error frame with which SocketCAN tells of bus-off."""
+        """Send the error frame with which SocketCAN reports bus-off."""
         self._bus.send(
             can.Message(
                 arbitration_id=ERROR_BUS_OFF,

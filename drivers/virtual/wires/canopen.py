@@ -319,7 +319,7 @@ class CanopenNode:
             self.device.write(index, subindex, data)
 
     def _size(self, index: int, subindex: int) -> int | None:
-        """Bytes of an object whose type has a fixed length, for writes that do not tell theirs."""
+        """Bytes of an object whose type has a fixed length, for writes without a length."""
         if self._objects.owns(index):
             return len(self._objects.read(index, subindex))
         try:

@@ -232,7 +232,7 @@ def _hold(names: Sequence[str]) -> int:
 
 
 def _keeps_time(argv: Sequence[str]) -> bool:
-    """Whether a command stands for hardware, or is the master beside it, by the time of the clock.
+    """Whether a command stands for hardware, or is the master next to it, by the time of the clock.
 
     Where time follows the frames, priority would only let setpoints expire while who renews them
     waits for the processor. A server or a recorder would keep all others waiting.

@@ -43,7 +43,7 @@ class _Transfer:
 class SdoServer:
     """Answers request frames. ``read`` and ``write`` take (index, subindex[, data]).
 
-    ``size`` tells an object's bytes where its type fixes them: a write may leave its length open.
+    ``size`` shows an object's bytes where its type fixes them: a write may leave its length open.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class SdoServer:
         self._transfer: _Transfer | None = None
 
     def reset(self) -> None:
-        """Communication starts anew: a transfer under way is over."""
+        """Communication starts again: a transfer under way is over."""
         self._transfer = None
 
     def request(self, frame: bytes) -> list[bytes]:

@@ -69,7 +69,7 @@ class SlcanSide:
         self._bus_off = True
 
     def error(self, kind: int) -> None:
-        """Go error passive with a full buffer: of the kind this adapter tells nothing."""
+        """Go error passive with a full buffer: of the kind this adapter reports nothing."""
         del kind
         self._passive = True
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 
 class Refused(Exception):
-    """The controller does not take the file; the message says why."""
+    """The controller does not take the file; the message states the reason."""
 
 
 @dataclass

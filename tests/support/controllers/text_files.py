@@ -214,7 +214,7 @@ def concise(data: bytes) -> Consumed:
 
 
 def table(data: bytes) -> Consumed:
-    """The CSV: bytes and the number beside them say the same."""
+    """The CSV: bytes and the number next to them say the same."""
     found = Consumed()
     for row in csv.DictReader(io.StringIO(data.decode("utf-8-sig"))):
         written = bytes.fromhex(row["data"])

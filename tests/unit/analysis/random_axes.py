@@ -33,7 +33,7 @@ class Case:
     rate_hz: float
     loop_hz: float = 0.0
     known_lag: bool = True
-    """Whether the drive tells its current loop and its speed filter."""
+    """Whether the drive reports its current loop and its speed filter."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def played(case: Case) -> tuple[tuple[excite.Sequence, Recording], ...] | None:
     rate, drive, mechanics = case.rate_hz, case.drive, case.mechanics
     band, step = excite.band_for(rate, 5.0, None), drive.torque_step * drive.rated_nm
     if case.loop_hz:
-        sequences = excite.beside_loop(
+        sequences = excite.torque_injection(
             rate, band, ROOM, step, share=0.35, realisations=2, position=False
         )
     else:

@@ -1,4 +1,4 @@
-"""Designs against the closed loop they promise, simulated and by python-control."""
+"""Designs against the closed loop they predict, simulated and by python-control."""
 
 from dataclasses import replace
 from functools import cache
@@ -136,7 +136,7 @@ def test_notches_that_the_drive_cannot_make_are_left_out():
 
 
 def test_a_variant_of_the_mechanics_keeps_the_goals_too():
-    """An axis with play: within the gap the motor is alone, here a third of the whole."""
+    """An axis with backlash: within the gap the motor is alone, here a third of the whole."""
     third = Mechanics(RIGID.total_kgm2 / 3, (), RIGID.viscous_nms)
     alone = MechanicalModel(3.0 / RIGID.total_kgm2, 0.0)
     plant = replace(plant_of(RIGID), variants=(alone,))

@@ -110,7 +110,7 @@ def test_play_is_distinguished_from_the_steps_of_a_coarse_encoder(play):
 
 @pytest.mark.parametrize("filter_hz", [0.0, 400.0])
 def test_friction_is_what_it_is_however_late_the_speed_is_reported(filter_hz):
-    """The lag of a filtered speed shows against the position; nobody tells the filter."""
+    """The lag of a filtered speed shows against the position; nothing states the filter."""
     mechanics = Mechanics(loads=((1e-4, 20.0, 0.002),), coulomb_nm=0.06)
     drive = Drive(current_hz=1000.0, speed_filter_hz=filter_hz)
     records = []

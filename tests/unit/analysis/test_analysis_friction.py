@@ -37,7 +37,7 @@ def _spectra(coulomb_nm, seed):
 
 
 def test_friction_is_found_that_makes_a_twentieth_of_the_scatter():
-    """(40 mNm · 0.05)² beside 12² / 2 mNm² of noise, known to 1/6 from 120 lines of 3 draws."""
+    """(40 mNm · 0.05)² next to 12² / 2 mNm² of noise, known to 1/6 from 120 lines of 3 draws."""
     found = [estimate_coulomb(_spectra(0.04, seed), PATH, "torque_mode") for seed in range(12)]
     assert min(found) > 0.0
     assert np.mean(found) == pytest.approx(0.04, rel=0.15)

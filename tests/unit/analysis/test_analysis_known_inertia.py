@@ -1,4 +1,4 @@
-"""Lines hidden by friction: the inertia that moves showed, and the model beside such lines."""
+"""Lines hidden by friction: the inertia that moves showed, and the model next to such lines."""
 
 from dataclasses import replace
 

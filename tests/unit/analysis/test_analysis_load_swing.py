@@ -1,6 +1,6 @@
 """Loads that swing behind their couplings: inertia and friction in spite of them.
 
-The axes are `drive_sim`'s, which shares nothing with the product; closed forms tell the rest.
+The axes are `drive_sim`'s, which shares nothing with the product; closed forms show the rest.
 """
 
 from dataclasses import replace

@@ -1,6 +1,6 @@
-"""Machines that need torque beside inertia and friction: springs, arms, imbalance, fans.
+"""Machines that need torque torque_of inertia and friction: springs, arms, imbalance, fans.
 
-Torque is worked out from the moves themselves (inverse dynamics), which knows no estimator.
+Torque is worked out from the moves themselves (inverse dynamics), which has no estimator.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ COULOMB, VISCOUS = 0.03, 2e-4
 WAY = 2.4 * TURN
 
 
-def moved(inertia, beside=lambda angle, speed: 0.0 * angle, noise_nm=0.002, seed=1):
+def moved(inertia, torque_of=lambda angle, speed: 0.0 * angle, noise_nm=0.002, seed=1):
     """Torque and speed of the moves that the tool makes within 3 revolutions and 960 rpm."""
     speed = 960.0 / 60.0 * TURN
     gentle = max(inertia * speed / 0.15, 4 * COULOMB)
@@ -26,7 +26,7 @@ def moved(inertia, beside=lambda angle, speed: 0.0 * angle, noise_nm=0.002, seed
     )  # fmt: skip
     velocity, angle = path.velocity_rad_s, path.position_rad
     torque = inertia * path.acceleration_rad_s2 + VISCOUS * velocity
-    torque = torque + COULOMB * np.tanh(velocity / 0.05) + beside(angle, velocity)
+    torque = torque + COULOMB * np.tanh(velocity / 0.05) + torque_of(angle, velocity)
     random = np.random.default_rng(seed)
     return torque + random.normal(0.0, noise_nm, torque.size), velocity
 
@@ -57,10 +57,10 @@ def fan_on_an_arm(angle, speed):
 
 @pytest.mark.parametrize("ratio", [1, 10])
 @pytest.mark.parametrize("noise_nm", [0.002, 0.02])
-@pytest.mark.parametrize("beside", [unbalanced, arm, spring, fan, fan_on_an_arm])
-def test_inertia_and_friction_are_found_beside_it(beside, noise_nm, ratio):
+@pytest.mark.parametrize("torque_of", [unbalanced, arm, spring, fan, fan_on_an_arm])
+def test_inertia_and_friction_are_found_beside_it(torque_of, noise_nm, ratio):
     inertia = MOTOR * (1 + ratio)
-    result = found(inertia, beside, noise_nm)
+    result = found(inertia, torque_of, noise_nm)
     assert result.reasons == ()
     assert result.inertia_kgm2.value == pytest.approx(inertia, rel=0.02)
     assert result.inertia_kgm2.low <= inertia <= result.inertia_kgm2.high
@@ -71,14 +71,14 @@ def test_inertia_and_friction_are_found_beside_it(beside, noise_nm, ratio):
 
 
 def test_what_it_is_and_how_large_is_reported():
-    place = found(2 * MOTOR, unbalanced).beside
+    place = found(2 * MOTOR, unbalanced).load_terms
     assert place.place_nm == pytest.approx(0.1, rel=0.05)
     assert place.periods_rad == pytest.approx((TURN,), rel=0.01)
     assert place.fan_nm == 0.0
-    blown = found(2 * MOTOR, fan).beside
+    blown = found(2 * MOTOR, fan).load_terms
     assert blown.fan_nm == pytest.approx(3e-5 * (960.0 / 60.0 * TURN) ** 2, rel=0.05)
     assert blown.place_nm == 0.0
-    straight = found(2 * MOTOR, spring).beside
+    straight = found(2 * MOTOR, spring).load_terms
     assert straight.place_nm == pytest.approx(0.5 * 0.02 * WAY * 0.95, rel=0.1)
     assert min(straight.periods_rad) > 0.0
 
@@ -88,8 +88,8 @@ def test_what_it_is_and_how_large_is_reported():
 def test_nothing_is_seen_where_nothing_is(ratio, noise_nm):
     for seed in range(5):
         result = found(MOTOR * (1 + ratio), noise_nm=noise_nm, seed=seed)
-        assert result.beside.place_nm == 0.0
-        assert result.beside.fan_nm == 0.0
+        assert result.load_terms.place_nm == 0.0
+        assert result.load_terms.fan_nm == 0.0
 
 
 def test_friction_that_depends_on_the_direction_is_none():
@@ -97,7 +97,7 @@ def test_friction_that_depends_on_the_direction_is_none():
         return np.where(speed > 0, 0.01, -0.002) * np.abs(np.tanh(speed / 0.05))
 
     result = found(2 * MOTOR, uneven)
-    assert result.beside.periods_rad == ()
+    assert result.load_terms.periods_rad == ()
     assert result.coulomb_nm.value == pytest.approx(COULOMB + 0.006, rel=0.05)
     assert result.gravity_nm.value == pytest.approx(0.004, abs=0.001)
 
@@ -118,7 +118,7 @@ def test_cogging_is_neither_play_nor_the_machine_s(ratio):
     assert result.reasons == ()
     assert result.inertia_kgm2.value == pytest.approx(inertia, rel=0.02)
     assert result.coulomb_nm.value == pytest.approx(COULOMB, rel=0.10)
-    assert result.beside.place_nm == 0.0
+    assert result.load_terms.place_nm == 0.0
 
 
 @pytest.mark.parametrize("ratio", [1, 10])
@@ -131,4 +131,4 @@ def test_static_friction_is_no_inertia(ratio):
     assert result.reasons == ()
     assert result.inertia_kgm2.value == pytest.approx(inertia, rel=0.02)
     assert result.coulomb_nm.value == pytest.approx(COULOMB, rel=0.10)
-    assert result.beside.place_nm == result.beside.fan_nm == 0.0
+    assert result.load_terms.place_nm == result.load_terms.fan_nm == 0.0

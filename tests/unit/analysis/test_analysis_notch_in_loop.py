@@ -1,4 +1,4 @@
-"""A notch is found beside a closed speed loop, whatever friction and the mechanics do meanwhile.
+"""A notch is found with a closed speed loop, whatever friction and the mechanics do meanwhile.
 
 The loop is played step by step at 20 kHz here; nothing is shared with the estimator but the
 notch's transfer function as it is printed (004:3494-3499).

@@ -68,7 +68,7 @@ def test_a_straight_line_is_distinguished_from_a_staircase(interpolates):
     best = find_paths(records_of(case), SignalPath(1000.0), loop_closed=False, hold_known=False)[0]
     assert best.hold == ("linear" if interpolates else "zero")
     late_s = 1e-3 - (25e-6 if interpolates else 0.0)
-    # The line is one of 50 µs steps; taken for a straight one it is 20 µs off, the corner 14 %.
+    # The line is one of 50 µs steps; mistaken for a straight one it is 20 µs off, the corner 14 %.
     assert best.command_delay_s == pytest.approx(late_s, abs=5e-6)
     if interpolates:
         assert best.current_bandwidth_hz == pytest.approx(1000.0, rel=0.03)
@@ -89,7 +89,7 @@ def test_a_line_that_begins_in_its_own_cycle_is_a_line(known_hz):
 
 
 def test_a_delay_just_short_of_whole_cycles_is_found():
-    """Two samples tell it: beyond the whole cycle the misfit hardly changes any more."""
+    """Two samples show it: beyond the whole cycle the misfit hardly changes any more."""
     path = SignalPath(1000.0, current_bandwidth_hz=700.0)
     best = find_paths(
         records_of(case_of(1000.0, late_steps=39)), path, loop_closed=False, hold_known=False
@@ -108,7 +108,7 @@ def test_a_noisy_loop_leaves_no_uncertainty_of_whole_cycles():
     assert "zero" in holds
     found = identify_with_path(records, path, "torque_injection", hold_known=False)
     assert found.fit.path.hold == "zero"
-    # The filter, which nobody tells, takes the rest of what the fit finds.
+    # The filter, which nothing states, takes the rest of what the fit finds.
     assert found.fit.path.command_delay_s == pytest.approx(0.0, abs=60e-6)
     e = errors(found.corrected, ONE, 5.0, 200.0)
     assert e.magnitude_db < 0.4

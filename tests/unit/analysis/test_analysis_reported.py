@@ -23,7 +23,7 @@ RATE = 1000.0
 
 @cache
 def recorded(loop_hz=0.0, filter_hz=0.0):
-    """Two pairs of realisations with their positions, with no loop or beside the speed loop."""
+    """Two pairs of realisations with their positions, with no loop or next to the speed loop."""
     period = 750
     lines = choose_lines(5.0, 400.0, RATE / period, count=150)
     drive = replace(tuned_drive(ONE, loop_hz) if loop_hz else Drive(), speed_filter_hz=filter_hz)

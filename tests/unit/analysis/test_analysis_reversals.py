@@ -1,4 +1,4 @@
-"""Strong friction beside soft modes, images by speed and position together, and modes uncertain."""
+"""Strong friction with soft modes, images by speed and position, and uncertain modes."""
 
 from dataclasses import replace
 
@@ -41,7 +41,7 @@ def _found(case):
 
 @pytest.fixture(scope="module")
 def rubbed():
-    """A soft, hardly damped mode beside a friction of 8 % of the rated torque."""
+    """A soft, hardly damped mode next to a friction of 8 % of the rated torque."""
     mechanics = Mechanics(1.2e-4, ((1e-4, 3.0, 2e-4),), 1e-4, 0.1)
     case = _case(mechanics, 10.0)
     return case, *_found(case)
@@ -80,7 +80,7 @@ def test_a_balance_that_leaves_realisations_less_alike_is_not_believed(rubbed, m
     assert again.frf.coulomb_nm == pytest.approx(0.1, rel=0.05)
     low = errors(again.frf, case.mechanics, 5.0, 150.0)
     assert low.phase_deg < 1.5
-    # The speed tells reversals less well, and the band says so.
+    # The speed shows reversals less well, and the band says so.
     assert np.median(again.frf.std_deg) > np.median(found.frf.std_deg)
 
 
@@ -96,7 +96,7 @@ def test_speed_and_position_together_leave_no_first_image():
 
 
 def test_a_position_that_ends_elsewhere_leaks_onto_no_line():
-    """A ramp and a parabola in the position change no line of the velocity taken from it."""
+    """A ramp and a parabola in the position change no line of the velocity calculated from it."""
     _, records = _found(_case(Mechanics(loads=((1e-4, 20.0, 0.002),))))
     sequence, recording = records[0]
     path = SignalPath(1000.0, current_bandwidth_hz=1000.0)

@@ -116,7 +116,7 @@ def test_i2t_of_a_constant_overload_is_the_formula() -> None:
 
 
 def test_i2t_falls_in_pauses() -> None:
-    # 2 s at 200 % (6 of 24), 8 s at rest: all of it is gone again.
+    # 2 s at 200 % (6 of 24), 8 s at standstill: all of it is gone again.
     time = np.arange(0.0, 60.0, 0.01)
     torque = np.where(time % 10.0 < 2.0, 200.0, 0.0)
     found = i2t(Signals(time, torque, np.zeros(time.size)), 300.0, 3.0)

@@ -26,7 +26,7 @@ GRID = np.geomspace(1.0, 6000.0, 400)
 
 
 def loose(f: FloatArray) -> ComplexArray:
-    """What the loop finds of the plant over what was measured before it: 1 at rest, then 1.25."""
+    """What the loop finds of the plant over what was measured before it: 1, later 1.25."""
     return np.asarray((1.0 + 1.25j * f / 30.0) / (1.0 + 1j * f / 30.0))
 
 
@@ -72,7 +72,7 @@ def test_beyond_the_lines_and_where_the_gain_is_high_it_stays_what_it_was() -> N
     f = np.array([1.5, 3.0, 600.0, 1000.0, 3000.0])
     seen = seen_in_loop(plant(), lines(), controller(LINES))
     assert np.allclose(seen.on(f).response(), BEFORE.response(f))
-    # At 5 Hz the closed loop is 1 within a thousandth, whatever the plant is: it tells little.
+    # At 5 Hz the closed loop is 1 within a thousandth, whatever the plant is: it shows little.
     strange = lines()
     closed = strange.closed.copy()
     closed[0] *= 1.002

@@ -112,17 +112,17 @@ def test_a_delay_that_lines_show_counts_beyond_them() -> None:
 
 def test_the_worst_end_of_an_interval_counts_as_well() -> None:
     """90° - 360° x 60 Hz x 1.85 ms = 50.0°, known to +-1.96 x 4°/|S|: 3° below 48° is allowed."""
-    promised = Goals(4.0, 48.0, 2.5)
+    guaranteed = Goals(4.0, 48.0, 2.5)
     sharp = verdict_of(60.0, 1.85e-3, 400.0, deviation=0.01)
-    assert not sharp.missed(promised, 1.0, 1.0, 1.03)
+    assert not sharp.missed(guaranteed, 1.0, 1.0, 1.03)
     blurred = verdict_of(60.0, 1.85e-3, 400.0, deviation=0.1)
-    found = [(m.what, m.end) for m in blurred.missed(promised, 1.0, 1.0, 1.03)]
+    found = [(m.what, m.end) for m in blurred.missed(guaranteed, 1.0, 1.0, 1.03)]
     assert ("phase_margin", "measured") in found
 
 
 def test_a_worst_gain_margin_below_the_promise_keeps_no_design() -> None:
-    """A set that holds a loop of 6.8 dB beside the nominal 10 dB; 8 dB were promised."""
-    crossover_hz, promised = 60.0, Goals(8.0, 30.0, 2.5)
+    """A set that holds a loop of 6.8 dB next to the nominal 10 dB; 8 dB were guaranteed."""
+    crossover_hz, guaranteed = 60.0, Goals(8.0, 30.0, 2.5)
 
     def delay_for(gain_db: float) -> float:
         return float(1 / (4 * crossover_hz * 10 ** (gain_db / 20)))
@@ -135,11 +135,11 @@ def test_a_worst_gain_margin_below_the_promise_keeps_no_design() -> None:
     found = judge(lines, DENSE, every, every[0], **known)
     assert found.coverage == "measured"
     assert found.worst.gain_margin_db < 6.8
-    missed = found.missed(promised, 1.0, 1.0, 1.03)
+    missed = found.missed(guaranteed, 1.0, 1.0, 1.03)
     assert ("gain_margin", "predicted") in [(m.what, m.end) for m in missed]
     # Stable with 7.2 dB more: the loop of 6.8 dB is none of those that are left.
     shown = judge(lines, DENSE, every, every[0], shown_gain_db=7.2, **known)
-    assert not shown.missed(promised, 1.0, 1.0, 1.03)
+    assert not shown.missed(guaranteed, 1.0, 1.0, 1.03)
 
 
 def test_a_raised_gain_that_contradicts_all_that_is_possible_keeps_no_design() -> None:
@@ -199,7 +199,7 @@ def test_a_motor_that_may_be_alone_above_the_band_widens_what_is_stated() -> Non
     def judged(shown_gain_db: float | None) -> LoopVerdict:
         return judge(
             None, DENSE, nominal[None, :], nominal, shown_gain_db=shown_gain_db,
-            late_s=(0.0, 5e-6), size=(0.0, 0.01), beside=alone[None, :],
+            late_s=(0.0, 5e-6), size=(0.0, 0.01), alternatives=alone[None, :],
         )  # fmt: skip
 
     raised = judged(7.0)
@@ -228,7 +228,7 @@ def delayed(crossover_hz: float, late_s: float, factor: float) -> tuple[float, f
 
 
 def test_a_raised_gain_keeps_only_loops_that_no_line_told_but_are_sound() -> None:
-    """A loop late by up to 200 µs and 1.5 dB stronger: no line tells it, its gain is raised.
+    """A loop late by up to 200 µs and 1.5 dB stronger: no line shows it, its gain is raised.
 
     It oscillates above its true gain margin. 300 loops, of which most miss the goals.
     """

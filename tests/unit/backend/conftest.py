@@ -113,7 +113,7 @@ async def servo() -> Servo:
 
 @pytest.fixture
 async def bench(servo: Servo, tmp_path: Path) -> AsyncIterator[Bench]:
-    """A bench with the servo as axis ``x``, whose monitor is at rest."""
+    """A bench with the servo as axis ``x``, whose monitor is at standstill."""
     bench, _ = await bench_with(servo, tmp_path)
     yield bench
     servo.mute = False
@@ -134,6 +134,6 @@ async def http(bench: Bench) -> AsyncIterator[httpx.AsyncClient]:
 
 
 def changed(profile: Profile, **fields: object) -> Profile:
-    """The profile with other fields, checked anew."""
+    """The profile with other fields, checked again."""
     old = {name: getattr(profile, name) for name in Profile.model_fields}
     return classified(Profile.model_validate({**old, **fields}))

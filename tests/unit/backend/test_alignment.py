@@ -45,7 +45,7 @@ def recorded(
 
 
 def places(sent: FloatArray, runs: list[Run]) -> list[int]:
-    """Rows that are valid; the counter beside each must be the row's own number."""
+    """Rows that are valid; the counter next to each must be the row's own number."""
     table, valid = aligned(sent, runs, "X")
     rows = np.flatnonzero(valid)
     assert np.array_equal(table[rows, 0], rows), "each row has the sample that belongs to it"
@@ -58,7 +58,7 @@ def test_nothing_missing() -> None:
 
 def test_samples_that_never_came_leave_their_rows_empty() -> None:
     rows = places(noise(), recorded(noise(), lost=(range(100, 107),)))
-    # Samples 100..106 are rows 60..66; the row beside the gap is not trusted.
+    # Samples 100..106 are rows 60..66; the row next to the gap is not trusted.
     assert set(range(600)) - set(rows) == set(range(60, 68))
 
 

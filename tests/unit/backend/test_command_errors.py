@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 from backend import cli
 from backend.commands import session
-from backend.commands.serve import _tell_problems
+from backend.commands.serve import _print_problems
 from backend.commands.values import assignment, line, show_readings
 from backend.drive.drive import Drive
 from backend.drive.readings import Reading
@@ -75,7 +75,7 @@ async def test_a_state_folder_that_cannot_be_used_is_reported_in_the_terminal(
     bench = Bench(tmp_path / "file")
     await bench.restore()
     try:
-        _tell_problems(bench)
+        _print_problems(bench)
     finally:
         await bench.close()
     assert "  note: " in (said := capsys.readouterr().out)
@@ -93,7 +93,7 @@ async def test_a_database_out_of_reach_is_reported_at_once_and_keeps_no_drive_wa
         said = ""
         with OwnTime() as took:
             await bench.restore()
-            _tell_problems(bench)
+            _print_problems(bench)
             # A computer that keeps the database's thread waiting hears of it later.
             async with asyncio.timeout(HANG_S):
                 while "failed:" not in said:
@@ -113,7 +113,7 @@ async def test_what_goes_wrong_later_is_reported_too_but_not_every_drives_troubl
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bench = Bench(tmp_path)
-    _tell_problems(bench)
+    _print_problems(bench)
     bench.journal.add(prose("the audit waits: the disk is full"), level="error")
     bench.journal.add(prose("it may still be enabled"), level="error", drive="x")
     bench.journal.add(prose("opened mlink:///dev/ttyUSB0"))

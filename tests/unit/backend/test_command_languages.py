@@ -53,7 +53,7 @@ def test_unknown_language_names_the_choices() -> None:
 
 
 def _sentences(file: Path) -> list[str]:
-    """Literal sentences that a module prints: two words of letters beside one another."""
+    """Literal sentences that a module prints: two words of letters next to one another."""
     found = []
     for node in ast.walk(ast.parse(file.read_text("utf-8"))):
         if not isinstance(node, ast.Call) or getattr(node.func, "id", "") != "print":

@@ -1,4 +1,4 @@
-"""Reads and writes of a drive: what is checked, what is sent, what is believed afterwards."""
+"""Reads and writes of a drive: what is checked, what is sent, what is trusted afterwards."""
 
 from __future__ import annotations
 

@@ -92,15 +92,15 @@ async def two_axes(bench: Bench, x: ConnectedDrive) -> tuple[ConnectedDrive, Any
     return y, loop
 
 
-async def test_the_end_of_a_measurement_leaves_the_exchange_to_an_axis_that_borrowed_it(
+async def test_the_end_of_a_measurement_leaves_the_exchange_to_an_axis_that_uses_it(
     bench: Bench, x: ConnectedDrive
 ) -> None:
     """X's measurement started the exchange and ends; Y moves through it and must not be braked."""
     _y, loop = await two_axes(bench, x)
-    borrowed = Exchange(loop, bench, "x", URL, own=True)
+    shared = Exchange(loop, bench, "x", URL, own=True)
     mine = bench.jobs.start("sweep", "Sweep X", forever, drive="x", motion=True)
     moving = bench.jobs.start("move", "Move Y", forever, drive="y", motion=True)
-    await borrowed.end()
+    await shared.end()
     await turns()
     assert loop.stopped == 0
     assert bench.sessions[URL] == loop
@@ -125,9 +125,9 @@ async def test_a_measurement_borrows_what_runs_and_does_not_end_it(
     bench: Bench, x: ConnectedDrive
 ) -> None:
     _y, loop = await two_axes(bench, x)
-    borrowed = await exchange_for(bench, x, 0.001)
-    assert borrowed.session == loop
-    await borrowed.end()
+    shared = await exchange_for(bench, x, 0.001)
+    assert shared.session == loop
+    await shared.end()
     assert loop.stopped == 0
 
 
@@ -208,7 +208,7 @@ def stop_pending(connected: ConnectedDrive) -> bool:
 async def test_a_motion_whose_loop_does_not_take_its_halt_owes_a_stop(
     x: ConnectedDrive, servo: Servo
 ) -> None:
-    """Nobody knows what still moves: the drive is shown by itself as soon as it can be."""
+    """It is not known what still moves: the drive is shown by itself as soon as it can be."""
     loop, hold = Loop(x), Hold()
     loop.broken = True
     servo.enable()
@@ -322,7 +322,7 @@ def test_the_search_for_an_end_is_weak_both_ways(now: int, allowed: int) -> None
 
 
 async def test_a_motion_that_a_fault_ended_names_the_fault(x: ConnectedDrive, servo: Servo) -> None:
-    """The loop sees only that the drive left Operation enabled; 603Fh says why (004: 3230h)."""
+    """The loop sees only that the drive left Operation enabled; 603Fh states why (004: 3230h)."""
     servo.enable()
 
     async def motion() -> None:

@@ -1,4 +1,4 @@
-"""Overruling terminals: what is refused, what ends a session, and what is put back."""
+"""Overruling terminals: what is refused, what ends a session, and what is restored."""
 
 from __future__ import annotations
 
@@ -255,7 +255,7 @@ async def test_real_terminals_that_do_not_count_again_are_pending(
 async def test_what_comes_while_it_ends_overrules_nothing_any_more(
     axis: Axis, io_link: MemoryLink, sessions: ForcingSessions, how: str
 ) -> None:
-    """A request that waits for the one before it came through after all had been put back."""
+    """A request that waits for the one before it came through after all had been restored."""
     session = await sessions.start(axis, "outputs", confirmed=True, connection="me")
     await session.lock.acquire()  # as a write that is under way
     late = asyncio.create_task(session.set({"DO1": True}))
@@ -340,7 +340,7 @@ async def test_probe_two_leaves_probe_one_alone(axis: Axis, io_link: MemoryLink)
     assert reading.raw == 0x2113
     io_link.written.clear()
     await set_probe(axis.drive, 1, ProbeSettings(True, False, True, True))
-    # Off first: settings are taken over when the probe is switched on.
+    # Off first: settings are adopted when the probe is switched on.
     values = [int.from_bytes(data, "little") for _, data in io_link.written]
     assert values == [0x2100, 0x2131]
 

@@ -155,7 +155,7 @@ NOISE = np.random.default_rng(8).normal(size=(400, 125))
 
 @pytest.mark.parametrize("hz", [12.0, 30.0, 75.0])
 def test_what_decays_is_no_oscillation(hz: float) -> None:
-    """A swing of 3.9 % at first that falls to half within 63 ms, beside noise of 0.26 %.
+    """A swing of 3.9 % at first that falls to half within 63 ms, next to noise of 0.26 %.
 
     It comes to 2.0 % over all, more than 2.5 times the noise with 9 dB (1.8 %).
     """

@@ -44,7 +44,7 @@ class Axis:
         return self.held[key]
 
     @contextmanager
-    def borrowed(self, _values: dict[str, int]) -> Iterator[None]:
+    def temporary(self, _values: dict[str, int]) -> Iterator[None]:
         yield
 
     async def state(self) -> State:

@@ -15,7 +15,7 @@ from profiles.schema import Profile
         (Found(1, vendor_id=0x2FE, product_code=5), ["certain"]),
         (Found(1, vendor_id=0x2FE, product_code=6), ["likely"]),
         (Found(1, vendor_id=0x999, product_code=5), []),
-        (Found(1, vendor_id=0, product_code=0), ["possible"]),  # tells nothing of itself
+        (Found(1, vendor_id=0, product_code=0), ["possible"]),  # shows nothing of itself
         (Found(1), ["possible"]),
     ],
 )

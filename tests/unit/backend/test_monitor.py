@@ -1,4 +1,4 @@
-"""What an axis reports beside a cyclic exchange: process data, and the drive itself."""
+"""What an axis reports next to a cyclic exchange: process data, and the drive itself."""
 
 from __future__ import annotations
 

@@ -109,11 +109,11 @@ async def test_work_that_keeps_its_axis_still_has_no_grant(bench: Bench) -> None
 # --- when it ends -----------------------------------------------------------------------
 
 
-async def test_stop_ends_every_grant_but_lets_borrowed_values_go_back(
+async def test_stop_ends_every_grant_but_lets_temporary_values_be_restored(
     x: ConnectedDrive, bench: Bench
 ) -> None:
     drive = x.drive
-    with x.axis.granted("move") as grant, drive.pending_restores.borrowed({MODE: 1}):
+    with x.axis.granted("move") as grant, drive.pending_restores.temporary({MODE: 1}):
         await bench.motion.stop(["x"])
         assert bench.authority.grant_of("x") is None
         with pytest.raises(NotGranted, match="STOP was pressed"):
@@ -211,7 +211,7 @@ def an_m6l() -> tuple[Axis, FirmwareLink]:
 
 async def test_an_input_that_is_on_gets_no_function() -> None:
     """M6-L 2003:02 = 17 is "forward jog" of DI2: it turned with a status word "disabled", and the
-    drive lets the function not be taken away while it turns."""
+    drive lets the function not be removed while it turns."""
     axis, link = an_m6l()
     link.device.inject("di2", 1.0)
     start = link.angle_rad

@@ -39,7 +39,7 @@ def beside(monkeypatch: pytest.MonkeyPatch, whole: list[int]) -> tuple[Any, list
     monkeypatch.setattr(notch_in_loop, "periods_of", periods)
     axis = SimpleNamespace(drive=SimpleNamespace(name="X"))
     nothing = cast(Any, None)
-    trial = notch_in_loop._Beside(cast(Any, axis), nothing, nothing, nothing, nothing, 0)
+    trial = notch_in_loop._ClosedLoopTrial(cast(Any, axis), nothing, nothing, nothing, nothing, 0)
     return trial, whole
 
 

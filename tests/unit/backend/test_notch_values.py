@@ -148,7 +148,7 @@ def test_levels_become_what_was_measured() -> None:
     assert made.raw == {"2007:0D": 150, "2007:0E": 10, "2007:0F": 10}
     assert made.realised is not None
     assert (made.realised.width_hz, made.realised.depth_db) == (75.0, -20.0)
-    # Depths that were not tried are not promised.
+    # Depths that were not tried are not guaranteed.
     deeper = encode(R6L, "X", 0, Notch(150.0, 75.0, -40.0), None, meaning)
     assert deeper.raw["2007:0F"] == 10
     with pytest.raises(OutOfRange, match="measure their effect first"):

@@ -1,4 +1,4 @@
-"""What a motion left in a drive that was lost: named, kept, and put back when it answers again."""
+"""What a motion left in a drive that was lost: named, kept, and restored when it answers again."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ async def motion_in_a_motion(x: ConnectedDrive, servo: Servo, *, again: bool) ->
     return reported.value
 
 
-async def test_a_value_that_two_motions_borrowed_is_named_as_it_was_before_both(
+async def test_a_value_that_two_motions_changed_is_named_as_it_was_before_both(
     x: ConnectedDrive, servo: Servo
 ) -> None:
     reported = await motion_in_a_motion(x, servo, again=False)
@@ -226,7 +226,7 @@ async def test_an_axis_that_does_not_stand_free_is_left_alone(
 async def test_it_is_put_back_as_soon_as_the_axis_stands_free(
     bench: Bench, x: ConnectedDrive, servo: Servo
 ) -> None:
-    """A drive that answered while still enabled kept its borrowed value until it was lost."""
+    """A drive that answered while still enabled kept its temporary value until it was lost."""
     await lost_in_the_middle(x, servo)
     servo.enable()
     await back(bench, servo)

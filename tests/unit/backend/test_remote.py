@@ -1,4 +1,4 @@
-"""The command line beside a running server: which buses it asks it about, and what it records."""
+"""The command line next to a running server: which buses it asks it about, and what it records."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ def test_changes_are_kept_and_folded(tmp_path: Path) -> None:
     log.add("x", Change(at(3), "undo", {"b": 6}, {"b": 5}))
     log.add("y", Change(at(3), "gains", {"a": 8}, {"a": 9}))
     found = net(ChangeLog(tmp_path).read("x"))
-    # b was taken back, so nothing of it remains; "same" never changed.
+    # b was undone, so nothing of it remains; "same" never changed.
     assert [(row.key, row.before, row.after, row.time) for row in found] == [("a", 1, 3, at(2))]
 
 
@@ -161,7 +161,7 @@ def test_values_are_shown_as_the_manual_means_them(drive: Drive) -> None:
 def test_verdict_of_a_loop(
     facts: Facts, margins: dict[str, float | bool | None], tone: str, word: str
 ) -> None:
-    """Limits are those that docs/tuning.md tells."""
+    """Limits are those that docs/tuning.md shows."""
     loop = next(m for m in facts.measured if isinstance(m.view, SweepAnswer))
     changed = replace(loop, view=loop.view.model_copy(update={"margins": margins}))
     document = compose(replace(facts, measured=(changed,)), "en")
@@ -196,7 +196,7 @@ def test_a_measurement_from_before_the_change_proves_nothing(facts: Facts) -> No
     old = replace(loop, saved=at(4))
     assert "no loop was measured afterwards" in warned(replace(facts, measured=(old,)))
     assert "no loop was measured" not in warned(replace(facts, measured=(old,), last_change=None))
-    # What was written and taken back again leaves nothing to be verified, but the loop that was
+    # What was written and undone again leaves nothing to be verified, but the loop that was
     # measured meanwhile is of other settings.
     back = replace(facts, changes=(), measured=())
     assert "no loop was measured" not in warned(back)

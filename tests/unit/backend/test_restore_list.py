@@ -52,7 +52,7 @@ def test_the_same_drive_is_found_by_its_number_or_its_place(
 
 
 def test_two_drives_of_one_place_keep_apart_lists(tmp_path: Path) -> None:
-    """The drive was swapped: what was borrowed from the one is no matter of the other."""
+    """The drive was swapped: what was changed from the one is no matter of the other."""
     other = replace(HERE, serial=1235)
     lists = RestoreStore(tmp_path, "a server")
     lists.list_of(HERE, "x").write(VALUES, in_motion=False)

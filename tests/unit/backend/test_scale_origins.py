@@ -83,7 +83,7 @@ def test_turns_behind_a_gear_are_not_certain() -> None:
     ],
 )
 def test_a_speed_that_is_counted_otherwise_is_not_certain(raws: dict[str, int]) -> None:
-    """6090h beside a 608Fh of 65536 increments, or a velocity factor (CiA 402-2 clause 10)."""
+    """6090h next to a 608Fh of 65536 increments, or a velocity factor (CiA 402-2 clause 10)."""
     assert velocity(INC_S, **raws) == (None, Uncertainty.FACTOR)
     assert velocity(RPM, **raws) == (None, Uncertainty.FACTOR)
 

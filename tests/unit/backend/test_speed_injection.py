@@ -13,7 +13,7 @@ from backend.tools.measuring import excite
 from backend.tools.measuring.recording import Recording
 from backend.tools.measuring.waveform import Band
 from backend.tools.sweep import speed_injection
-from backend.tools.sweep.adaptive import _more_telling
+from backend.tools.sweep.adaptive import _more_informative
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.plan import Setup
 
@@ -103,7 +103,7 @@ def test_a_base_motion_that_takes_most_of_the_torque_becomes_slower() -> None:
 
 def test_lines_that_a_first_pair_tells_less_get_more() -> None:
     records = tuple((s, played(s, 1.5e-3)) for s in sequences(30.0))
-    weight = speed_injection.telling_weight(records, RATE)
+    weight = speed_injection.informative_weight(records, RATE)
     f = records[0][0].excitation.line_hz
     assert weight.shape == f.shape
     assert float(np.median(weight[f > 200])) > 1.5 * float(np.median(weight[f < 40]))
@@ -121,7 +121,7 @@ def test_the_second_pair_is_as_large_as_the_first_became_and_has_other_lines() -
     setup = Setup(RATE, facts, "speed", ROOM, excite.Rigid(1.5e-3), 1e-3, by_speed=True)
     settings = SweepSettings(Envelope(4.0, 1500.0, 100.0, 60.0))
     first = tuple((s, played(s, 1.5e-3)) for s in sequences(30.0))
-    further = _more_telling(first, (), settings, setup)
+    further = _more_informative(first, (), settings, setup)
     assert [s.excitation.realisation for s in further] == [1, 1]
     for s in further:
         assert np.max(np.abs(s.excitation.samples)) == pytest.approx(30.0, rel=0.1)

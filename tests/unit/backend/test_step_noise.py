@@ -1,4 +1,5 @@
-"""Verification steps whose figures are none of noise, and gains raised beside what the place does.
+"""Verification steps whose figures are none of noise, and gains raised compared with what the place
+does.
 
 A first-order answer reaches a band of ±p of its size after τ·ln(1/p).
 """

@@ -94,7 +94,7 @@ class Steps:
         await job.wait()
 
     async def run(self, motion: Motion, stop_at: int | None, turns: int) -> int:
-        """Run it from a drive at rest; returns how many accesses it took without STOP."""
+        """Run it from a drive at standstill; returns how many accesses it took without STOP."""
         servo, axis = self.servo, self.x.axis
         servo.set(STATUS, ENABLED if motion is move_while_enabled else DISABLED)
         servo.set(MODE, int(Mode.PV))

@@ -230,7 +230,7 @@ def test_a_design_that_does_not_hold_within_its_loop_is_made_anew_with_no_more_g
     monkeypatch.setattr(tune_again, "judged", judged)
     monkeypatch.setattr(tune_again, "candidates_for", candidates_for)
     trials: Any = SimpleNamespace(
-        axis=SimpleNamespace(drive=None), check=check_like(), promised=GOALS
+        axis=SimpleNamespace(drive=None), check=check_like(), guaranteed=GOALS
     )
     how = Designing(PLANT, "medium", "balanced", False, 2000.0)
     made = tune_again._designed(trials, first, how, PLANT)

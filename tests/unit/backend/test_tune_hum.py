@@ -60,14 +60,14 @@ async def kept_of(
         return {}
 
     @contextmanager
-    def borrowed(_earlier: dict[str, int]) -> Iterator[None]:
+    def temporary(_earlier: dict[str, int]) -> Iterator[None]:
         yield
 
     for name in ("plan", "write_settings", "put_back_in_time"):
         monkeypatch.setattr(tune_apply, name, nothing)
     monkeypatch.setattr(tune_apply, "verify", verify)
     axis: Any = SimpleNamespace(
-        drive=SimpleNamespace(name="X", pending_restores=SimpleNamespace(borrowed=borrowed))
+        drive=SimpleNamespace(name="X", pending_restores=SimpleNamespace(temporary=temporary))
     )
     check: Any = SimpleNamespace(inertia_kgm2=1e-4, motor_inertia_kgm2=None)
     tried: list[Text] = []

@@ -1,4 +1,4 @@
-"""What a design without notches is commanded to be for, and beside which loop notches are tried."""
+"""The reason that is given for a design without notches, and with which loop notches are tried."""
 
 from __future__ import annotations
 
@@ -47,18 +47,18 @@ def test_what_shows_and_what_hardly_rises_bounds_nothing_unseen(
 
 
 @pytest.mark.parametrize(
-    ("loop", "scheme", "gravity_nm", "beside"),
+    ("loop", "scheme", "gravity_nm", "holds"),
     [
         ("none", "free", 0.0, False),
         ("none", "free", 0.2, True),
-        # Friction ruled, so that its mechanics were measured beside a loop.
+        # Friction ruled, so that its mechanics were measured with a closed loop.
         ("speed", "free", 0.0, True),
-        # It trembles where it stands; the loop was closed for its travel alone.
+        # It trembles where it is; the loop was closed for its travel alone.
         ("speed", "limited", 0.0, False),
     ],
 )
 async def test_notches_are_tried_beside_a_loop_where_the_mechanics_were(
-    loop: str, scheme: str, gravity_nm: float, beside: bool, monkeypatch: pytest.MonkeyPatch
+    loop: str, scheme: str, gravity_nm: float, holds: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ways: list[bool] = []
 
@@ -78,7 +78,7 @@ async def test_notches_are_tried_beside_a_loop_where_the_mechanics_were(
     monkeypatch.setattr("backend.tools.notch.trials.least_s", lambda _drive: 11.6)
 
     assert await said_of(loop, scheme, gravity_nm) is None
-    assert ways == [beside]
+    assert ways == [holds]
 
 
 async def said_of(

@@ -26,7 +26,7 @@ async def outcome(
 ) -> tuple[Applied, dict[str, int], list[Text], Text | None]:  # fmt: skip
     """What stays, what the drive holds then, what was tried, and what the result says.
 
-    ``cancelled``: while the design is read, before it is taken back.
+    ``cancelled``: while the design is read, before it is undone.
     """
     held = dict(NEW) if held is None else held
     had = tune_present.Present(7.0, design(7.0), sound=False)

@@ -1,4 +1,4 @@
-"""When a verified design is taken back: by its margins, and by a torque that hums."""
+"""When a verified design is undone: by its margins, and by a torque that oscillates."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from backend.axis.axis import Envelope
 from backend.tools.autotune import verify as tune_verify
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.autotune.time_budget import TimeLeft
-from backend.tools.autotune.verdict import sharp_lines, telling_lines
+from backend.tools.autotune.verdict import reported_lines, sharp_lines
 from backend.tools.autotune.verify import (
     Check,
     Verified,
@@ -31,7 +31,7 @@ from backend.tools.step.evaluate import LEAD_S, StepResult
 from backend.tools.sweep.evaluation import SweepResult, SweepSettings
 from backend.work.jobs import Progress
 
-PROMISED = Goals(gain_margin_db=9.0, phase_margin_deg=48.0, ms=1.8)
+GUARANTEED = Goals(gain_margin_db=9.0, phase_margin_deg=48.0, ms=1.8)
 
 
 def step(noise_percent: float) -> StepResult:
@@ -54,9 +54,9 @@ def test_a_standing_axis_must_be_quiet(noise_percent: float, hums: bool) -> None
 
 
 def test_margins_as_promised_are_kept() -> None:
-    assert not worse_than(PROMISED, {"ms": 1.8, "phase_margin_deg": 48.0, "gain_margin_db": 9.0})
+    assert not worse_than(GUARANTEED, {"ms": 1.8, "phase_margin_deg": 48.0, "gain_margin_db": 9.0})
     # No crossing within the band is no lack of a margin.
-    assert not worse_than(PROMISED, {"ms": 1.2, "phase_margin_deg": None, "gain_margin_db": None})
+    assert not worse_than(GUARANTEED, {"ms": 1.2, "phase_margin_deg": None, "gain_margin_db": None})
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ def test_margins_as_promised_are_kept() -> None:
     ],
 )
 def test_each_margin_that_is_missed_is_named(found: dict[str, float], word: str) -> None:
-    (words,) = worse_than(PROMISED, dict(found))
+    (words,) = worse_than(GUARANTEED, dict(found))
     assert words.words().startswith(word)
 
 
@@ -99,7 +99,7 @@ def test_a_crossing_that_leads_is_as_far_from_the_critical_point_as_it_is() -> N
     found = sharp_margins(replace(swept, frf=replace(swept.frf, response=loop / (1 + loop))))
     assert isinstance(found["phase_margin_deg"], float)
     assert found["phase_margin_deg"] > 60.0
-    assert not any("phase" in each.code for each in worse_than(PROMISED, found))
+    assert not any("phase" in each.code for each in worse_than(GUARANTEED, found))
 
 
 @pytest.mark.parametrize("from_hz", [80.0, 45.0])
@@ -115,13 +115,13 @@ def test_lines_above_the_crossover_tell_the_loop_but_not_its_margins() -> None:
     frf = loop_swept(1.0).frf
     blurred = replace(frf, std_deg=np.where(frf.frequency_hz < 80.0, 10.0, 1.0))
     assert sharp_lines(blurred) is None
-    reported = telling_lines(blurred)
+    reported = reported_lines(blurred)
     assert reported is not None
     assert reported.frequency_hz[0] == pytest.approx(80.0)
     assert sharp_lines(frf) is not None
-    # Ten lines tell neither.
+    # Ten lines show neither.
     few = replace(frf, std_deg=np.where(np.arange(frf.frequency_hz.size) < 70, 10.0, 1.0))
-    assert telling_lines(few) is None
+    assert reported_lines(few) is None
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_a_bandwidth_that_is_not_as_predicted_is_reported(
     predicted_hz: float | None, measured_hz: float | None, reported: bool
 ) -> None:
     """The aim is 10 % (tuning.md, section 5)."""
-    verified = Verified(loop_swept(1.0), None, PROMISED, predicted_hz, measured_hz, True, None)
+    verified = Verified(loop_swept(1.0), None, GUARANTEED, predicted_hz, measured_hz, True, None)
     assert (otherwise(verified) is not None) is reported
 
 
@@ -147,7 +147,7 @@ def test_a_crossover_above_the_verified_lines_is_reported(
     """The lines end at 400 Hz; where no margins were read at all that is said instead."""
     margins = sharp_margins(loop_swept(1.0)) if read else {}
     swept = replace(loop_swept(1.0), margins=margins)
-    words = unseen(last_hz, Verified(swept, None, PROMISED, 60.0, 60.0, True, None))
+    words = unseen(last_hz, Verified(swept, None, GUARANTEED, 60.0, 60.0, True, None))
     assert (words is not None) is reported
     if words is not None:
         assert "650 Hz" in words.words()
@@ -188,21 +188,21 @@ async def verified_of(
     monkeypatch.setattr(tune_verify, "holding_torque", still)
     gains = Gains(0.1, 6.0, 50.0, 60.0)
     nominal = Margins(40.0, 65.0, 40.0, None, None, 1.3, 60.0, True)
-    candidate = Candidate((), gains, predicted_hz, None, nominal, PROMISED, 0.0, 5.0, 0.1)
+    candidate = Candidate((), gains, predicted_hz, None, nominal, GUARANTEED, 0.0, 5.0, 0.1)
     facts = AxisFacts(1.27, True, 3000.0, 1000.0, None, None, None, False)
     check = Check(
         Envelope(4.0, 1500.0, 100.0, 60.0), facts, 1e-4, None, None, None,
         pairs_before=pairs_before,
     )  # fmt: skip
     reported = (Progress(lambda: None), Progress(lambda: None), Progress(lambda: None))
-    found = await verify(None, None, check, candidate, PROMISED, reported, None, time_left)
+    found = await verify(None, None, check, candidate, GUARANTEED, reported, None, time_left)
     return found, pairs
 
 
 async def test_another_bandwidth_than_predicted_is_measured_with_more_realisations(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A single pair cannot tell the distortion of play from the response."""
+    """A single pair cannot distinguish the distortion of play from the response."""
     first, more = loop_swept(1.0), loop_swept(1.0, 66.0)
     found, pairs = await verified_of(monkeypatch, 70.0, [first, more])
     assert pairs == [1, 4]
@@ -212,7 +212,7 @@ async def test_another_bandwidth_than_predicted_is_measured_with_more_realisatio
     # Margins are read from the first, and all motion is counted.
     assert found.sweep.margins["crossover_hz"] == sharp_margins(first)["crossover_hz"]
     assert found.sweep.motion_s == first.motion_s + more.motion_s
-    # What is known of the response is what all of them tell.
+    # What is known of the response is what all of them show.
     assert found.seen is more.frf
 
 

@@ -49,7 +49,7 @@ async def test_resolution_is_unknown_while_the_gear_ratios_rule() -> None:
     ("switches", "number"), [({"speed": 0}, "P20.15"), ({"torque": 1}, "P20.14")]
 )
 async def test_other_units_are_refused(switches: dict[str, int], number: str) -> None:
-    """rpm taken for increments per second would run away (000:3695-3696)."""
+    """rpm mistaken for increments per second would run away (000:3695-3696)."""
     with pytest.raises(NotAllowed, match=number) as refusal:
         await read_units(m6l(10000, **switches))
     assert "set it back" in (refusal.value.remedy or "")
@@ -90,7 +90,7 @@ def test_unit_switches_make_the_units_be_read_again() -> None:
 
 
 async def test_a_ramp_that_a_drive_cannot_do_is_refused_in_the_unit_that_was_typed() -> None:
-    """DS_C ramps by a time of at most 2000 ms (003:641), taken for 3000 rpm: 1500 rpm/s."""
+    """DS_C ramps by a time of at most 2000 ms (003:641), for 3000 rpm: 1500 rpm/s."""
     profile = load_profile("ds_c")
     spec = profile.link("canopen")
     assert spec is not None

@@ -98,6 +98,18 @@ def test_banned_words_in_report_and_chinese_files(
     assert found == [("texts.py", 1), ("names.yaml", 2)]
 
 
+def test_unclear_words_in_comments_docstrings_and_pages(
+    prose: ModuleType, pages: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(prose, "CODE", (".",))
+    (pages / "module.py").write_text(
+        '"""Made anew."""\n\nx = f("made anew")  # read anew\n# `anew` and renewed\n', "utf-8"
+    )
+    (pages / "page.md").write_text("Read it anew.\n\n`anew`\n", "utf-8")
+    found = [(one.file.name, one.line) for one in prose.words_in_code()]
+    assert found == [("module.py", 1), ("module.py", 3), ("page.md", 1)]
+
+
 @pytest.mark.parametrize(("words", "count"), [(30, 0), (31, 1)])
 def test_long_sentences(prose: ModuleType, pages: Path, words: int, count: int) -> None:
     sentence = " ".join(["word"] * words)

@@ -80,4 +80,4 @@ def test_every_text_is_there_in_both_languages() -> None:
 
 
 def test_the_page_is_that_of_the_catalogue() -> None:
-    assert PAGE.read_text("utf-8") == text(), "write it anew: python -m drivers.doctor.page"
+    assert PAGE.read_text("utf-8") == text(), "write it again: python -m drivers.doctor.page"

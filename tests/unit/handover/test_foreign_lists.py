@@ -1,4 +1,4 @@
-"""Start-up lists as other tools and hands write them, beside those that are exported here."""
+"""Start-up lists as other tools and hands write them, next to those that are exported here."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_a_namespace_changes_nothing() -> None:
 
 
 def test_the_only_drive_of_an_eni_needs_no_number() -> None:
-    """Couplers have no mailbox; two drives have to be told apart."""
+    """Couplers have no mailbox; two drives have to be distinguished."""
     coupler, drive = "<Slave/>", f"<Slave><Mailbox>{mailbox(LIMIT)}</Mailbox></Slave>"
     assert writes(f"<EtherCATConfig><Config>{coupler}{drive}</Config></EtherCATConfig>") == TAKEN
     two = f"<EtherCATConfig><Config>{coupler}{drive}{drive}</Config></EtherCATConfig>"

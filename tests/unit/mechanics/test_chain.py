@@ -69,7 +69,7 @@ def test_analytic_response_of_two_inertias_is_the_textbook_formula() -> None:
 
 @pytest.mark.parametrize("mechanics", [spec(friction=FrictionSpec(viscous_nms=1e-3)), TWO_LOADS])
 def test_simulated_response_meets_the_analytic_one(mechanics: MechanicsSpec) -> None:
-    """Within 0.1 dB and 1° up to 2 kHz, with hold and current loop taken out exactly."""
+    """Within 0.1 dB and 1° up to 2 kHz, with hold and current loop removed exactly."""
     for wanted_hz in (7.0, 40.0, 130.0, 300.0, 777.0, 1250.0, 2000.0):
         axis = axis_with_torque(mechanics, 0.0)
         current = axis.p[k.P_GEN]
@@ -90,7 +90,7 @@ def test_simulated_response_meets_the_analytic_one(mechanics: MechanicsSpec) -> 
         speed = 2 * np.mean(x[:, 1] * carrier)
         torque = 2 * np.mean(x[:, 2] * carrier)
         # Speed and torque are samples of continuous states: their ratio is the plant but for
-        # the images that sampling folds back, which the exact sampled model tells.
+        # the images that sampling folds back, which the exact sampled model shows.
         ratio = speed / torque / _sampled_ratio(mechanics, f_hz)
         assert abs(20 * math.log10(abs(ratio))) < 0.1, f_hz
         assert abs(math.degrees(np.angle(ratio))) < 1.0, f_hz

@@ -33,7 +33,7 @@ def speeds(position: FloatArray, late: int = 0, mean: int = 1) -> FloatArray:
     return np.asarray((padded[mean : mean + len(position)] - before) / (mean * CYCLE_S))
 
 
-HONEST: dict[str, Callable[[FloatArray], FloatArray]] = {
+HARMLESS: dict[str, Callable[[FloatArray], FloatArray]] = {
     "exact": speeds,
     "2 cycles late": lambda p: speeds(p, late=2),
     "mean of 3 cycles": lambda p: speeds(p, mean=3),
@@ -49,10 +49,10 @@ WRONG: dict[str, tuple[Callable[[FloatArray], FloatArray], Disagreement]] = {
 
 @pytest.mark.parametrize("rpm", [20.0, 600.0])
 @pytest.mark.parametrize("hz", [0.5, 3.0, 12.0])
-@pytest.mark.parametrize("honest", HONEST)
+@pytest.mark.parametrize("honest", HARMLESS)
 def test_what_lags_averages_or_rounds_agrees(honest: str, hz: float, rpm: float) -> None:
     position = places(rpm, hz)
-    assert disagreement_of(position, HONEST[honest](position), CYCLE_S, SCALE) is None
+    assert disagreement_of(position, HARMLESS[honest](position), CYCLE_S, SCALE) is None
 
 
 @pytest.mark.parametrize("rpm", [20.0, 600.0])
@@ -82,5 +82,5 @@ def test_a_straight_line_across_lost_samples_is_no_contradiction() -> None:
     place, speed = (np.interp(rows, good, x[good]) for x in (position, velocity))
     assert disagreement_of(place, speed, CYCLE_S, SCALE) is not None
     assert disagreement_of(place, speed, CYCLE_S, SCALE, valid) is None
-    # A wrong scale shows beside the gaps.
+    # A wrong scale shows next to the gaps.
     assert disagreement_of(place, 0.5 * speed, CYCLE_S, SCALE, valid) is not None

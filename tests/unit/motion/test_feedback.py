@@ -70,7 +70,7 @@ MOTIONS = {
     "swing 100 Hz": swing(200.0, 100.0),
     "standstill": lambda _t: 0.25,
 }
-HONEST: dict[str, Callable[[Turns], Callable[[float], float]]] = {
+HARMLESS: dict[str, Callable[[Turns], Callable[[float], float]]] = {
     "exact": lambda turns: lambda t: speed(turns, t),
     "1 ms late": lambda turns: lambda t: speed(turns, t - 1e-3),
     "3 ms late": lambda turns: lambda t: speed(turns, t - 3e-3),
@@ -83,10 +83,10 @@ HONEST: dict[str, Callable[[Turns], Callable[[float], float]]] = {
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
-@pytest.mark.parametrize("honest", HONEST)
+@pytest.mark.parametrize("honest", HARMLESS)
 def test_what_lags_averages_or_rounds_agrees(motion: str, honest: str) -> None:
     turns = MOTIONS[motion]
-    halt, _ = watched(turns, HONEST[honest](turns), limit_rpm=2500.0)
+    halt, _ = watched(turns, HARMLESS[honest](turns), limit_rpm=2500.0)
     assert halt is None
 
 

@@ -1,7 +1,7 @@
 """Quick-stop option, travel limits and following window are refused while the axis moves.
 
 605Ah = 0 was taken during a jog, and STOP coasted 3.2 revolutions instead of 1.2; 607Dh and
-6065h = FFFFFFFFh were taken in motion too. Tried by every way that parameters are written, in a
+6065h = FFFFFFFFh were accepted in motion too. Tried by every way that parameters are written, in a
 jog of the server and in a motion of another tool; the shaft judges STOP afterwards.
 """
 

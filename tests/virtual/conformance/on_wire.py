@@ -205,11 +205,11 @@ class OnWire:
 
     @property
     def state(self) -> int:
-        """Bits that tell the state; the echo of a DS_C."""
+        """Bits that show the state; the echo of a DS_C."""
         return self.status & (0x87 if self.drive == "ds_c" else 0x6F)
 
     def command(self, *words: int) -> None:
-        """Control words one behind the other, 12 ms apart as the DS_C wants (003:279)."""
+        """Control words one behind the other, 12 ms apart as the DS_C requires (003:279)."""
         for word in words:
             self.set("6040:00", word)
             self.run(0.012)

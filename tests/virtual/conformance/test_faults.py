@@ -129,7 +129,7 @@ OVER_VOLTAGE = [
 
 @pytest.mark.parametrize(("name", "code"), OVER_VOLTAGE)
 def test_over_voltage_by_regeneration(name: str, code: str) -> None:
-    """A great inertia, braked hard, on a supply that takes nothing back and without a resistor."""
+    """A great inertia, braked hard, on a supply that feeds nothing back and without a resistor."""
     heavy = MotorSpec(inertia_kgm2=1e-2, rated_torque_nm=RATED, rated_speed_rpm=3000)
     volts = 48.0 if name in ("mms7", "ds_c") else 310.0
     supply = SupplySpec(
@@ -439,7 +439,7 @@ def test_a_limit_switch_stops_and_lets_back(name: str, warning: int | None) -> N
 def test_the_negative_limit_switch_of_the_m6l_has_a_warning_of_its_own() -> None:
     """AL.040, 603Fh FF28h: it holds, and the way forward ends it (000:3981).
 
-    P10.04 is at its default, whose meaning is not printed and which is taken as 1.
+    P10.04 is at its default, whose meaning is not printed and which is treated as 1.
     """
     d = drive(
         "m6l",
@@ -480,7 +480,7 @@ LIMITED = [
 
 @pytest.mark.parametrize(("name", "settings"), LIMITED)
 def test_software_limits_stop_a_move(name: str, settings: dict[str, int]) -> None:
-    """607Dh; a target beyond is cut off and bit 11 tells so."""
+    """607Dh; a target beyond is cut off and bit 11 shows so."""
     d = drive(name)
     d.set_all(settings)
     d.set_all({"607D:01": -d.per_rev, "607D:02": d.per_rev})

@@ -291,7 +291,7 @@ def test_brake_of_the_m6l_in_its_order() -> None:
     assert brake_output(d)
     d.set("60FF:00", d.speed_per_rev_s)
     d.run(0.15)
-    assert abs(d.speed_rev_s) < 0.3  # commands are not taken yet
+    assert abs(d.speed_rev_s) < 0.3  # commands are not accepted yet
     d.run(0.3)
     assert d.speed_rev_s == pytest.approx(1.0, rel=0.1)
     d.set("60FF:00", 0)
@@ -375,7 +375,7 @@ def test_touch_probe_latches_both_edges(name: str, settings: dict[str, int], ter
     assert d.get("60B9:00") & 0x7 == 0x7
     assert d.get("60BA:00") == pytest.approx(0.25 * d.per_rev, abs=0.003 * d.per_rev)
     assert d.get("60BB:00") == pytest.approx(0.75 * d.per_rev, abs=0.003 * d.per_rev)
-    # Single: a second edge changes nothing until the probe is started anew.
+    # Single: a second edge changes nothing until the probe is started again.
     d.device.inject("turn_to_rev", 1.5)
     d.run(0.001)
     d.device.inject(terminal, 1)

@@ -195,7 +195,7 @@ OFFSETS = [
 def test_home_offset(
     name: str, settings: dict[str, int], shown_rev: float, rests_rev: float
 ) -> None:
-    """Half a revolution of offset, index at 1: what 6064h shows and where the axis stands."""
+    """Half a revolution of offset, index at 1: what 6064h shows and where the axis is."""
     d = wired(name, CASES[34])
     d.set_all(settings)
     d.device.inject("turn_to_rev", 0.4)
@@ -239,7 +239,7 @@ def test_r6l_refuses_methods_beyond_35(method: int) -> None:
 
 @pytest.mark.parametrize("name", [n for n in FAMILIES if n != "ds_c"])
 def test_a_missing_switch_is_a_homing_error_at_the_limit(name: str) -> None:
-    """Method 19 without a home switch ends at the positive limit: bit 13, and the axis stands."""
+    """Method 19 without a home switch ends at the positive limit: bit 13, at standstill."""
     case = Case((0, 0, 0), (0, 0, 0), switch=(90, 91))
     d = wired(name, case)
     home(d, 19)

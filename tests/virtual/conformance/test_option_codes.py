@@ -175,7 +175,7 @@ HALTS = [
 
 @pytest.mark.parametrize(("name", "option", "seconds"), HALTS)
 def test_halt_holds_and_goes_on(name: str, option: int, seconds: float) -> None:
-    """605Dh: at rest under power in Operation enabled; on with the speed when bit 8 falls."""
+    """605Dh: at standstill under power in Operation enabled; on with the speed when bit 8 falls."""
     d = turning(name)
     d.set("605D:00", option)
     d.set("6040:00", 0x10F)

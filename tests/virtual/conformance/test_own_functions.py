@@ -51,7 +51,7 @@ def r6l_with_third_gains() -> OnWire:
 
 
 def test_third_gains_of_the_r6l_hold_an_axis_that_rests() -> None:
-    """P06.56 = 100 ms after the command has come to rest, and not while it moves."""
+    """P06.56 = 100 ms after the command has stopped, and not while it moves."""
     d = r6l_with_third_gains()
     p, s = d.device.axis.p, d.device.axis.s
     assert p[k.P_KP_POSITION_3] == pytest.approx(4 * p[k.P_KP_POSITION_1])
@@ -283,7 +283,7 @@ def test_identification_of_the_poles_lets_the_axis_be_enabled(method: int, rests
     d.device.power_cycle()
     d.run(0.01)
     d.enable(3)
-    assert d.get("603F:00") == 0xFF3B  # learnt anew after every power-on
+    assert d.get("603F:00") == 0xFF3B  # learnt again after every power-on
 
 
 def test_withdrawal_after_pre_positioning() -> None:

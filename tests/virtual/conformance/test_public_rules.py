@@ -21,7 +21,7 @@ DEVIATIONS: dict[str, set[str]] = {
     "mms7": {"object-identity"},
     "m6l": {"object-identity"},
     "ep3e": {"object-identity"},
-    # The profile of a drive that is not listed knows no values of the objects of an identity.
+    # The profile of a drive that is not listed has no values of the objects of an identity.
     "generic402": {"object-identity", "drive-device-type"},
     "ds_c": {"object-identity"},
     "r6l": set(),

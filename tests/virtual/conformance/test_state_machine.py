@@ -20,7 +20,7 @@ _STAYING = {"mms7": 6, "m6l": 6, "r6l": 6, "ep3e": 6, "generic402": 6}
 
 
 def drive(name: str) -> OnWire:
-    """A motor alone with enough friction to come to rest by itself soon."""
+    """A motor alone with enough friction to stop by itself soon."""
     mechanics = MechanicsSpec(
         motor=MotorSpec(inertia_kgm2=5e-5, rated_torque_nm=1.27, rated_speed_rpm=3000),
         friction=FrictionSpec(coulomb_nm=0.05),

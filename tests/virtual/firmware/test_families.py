@@ -103,7 +103,7 @@ M6L = family_profile(
 
 
 def test_gains_in_hz_ms_and_rad_per_s(family) -> None:
-    """Speed gain 40 Hz, integral time 50 ms, position gain 60 /s, load ratio 3.00."""
+    """Speed gain 40 Hz, integral time 50 ms, position gain 60 /s, inertia ratio 3.00."""
     p = family(M6L).servo.axis.p
     inertia = 5e-5 * 4
     assert p[k.P_KP_POSITION_1] == 60
@@ -483,5 +483,5 @@ def test_no_two_families_have_the_identity_of_one_another() -> None:
 
 
 def test_a_count_of_entries_that_no_manual_prints_is_the_number_of_entries() -> None:
-    """CiA 301 clause 7.4.1: subindex 0 tells the highest. EP3E prints no value of 607Dh:00."""
+    """CiA 301 clause 7.4.1: subindex 0 shows the highest. EP3E prints no value of 607Dh:00."""
     assert make_device("ep3e").read(0x607D, 0) == b"\2"

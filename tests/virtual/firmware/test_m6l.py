@@ -51,7 +51,7 @@ def test_homing_runs_at_the_rpm_of_6099h() -> None:
 
 
 def test_speed_demand_is_rpm_and_speed_is_increments() -> None:
-    """606Bh (000:3785) beside 606Ch (000:3786)."""
+    """606Bh (000:3785) next to 606Ch (000:3786)."""
     b = bench()
     b.enable(3)
     b.set("60FF:00", 5 * COUNTS)

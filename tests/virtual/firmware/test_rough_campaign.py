@@ -62,7 +62,7 @@ async def test_a_filtered_torque_is_recognised_on_a_drive() -> None:
 
 
 async def test_held_set_points_beside_60c2h_are_recognised_on_a_drive() -> None:
-    """13° to 48° wrong and trusted before, as the object's presence was taken for linear."""
+    """13° to 48° wrong and trusted before, as the object's presence was mistaken for linear."""
     spec = mechanics((1e-4, 20.0, 0.002)).model_copy(
         update={"rough_torque": RoughTorqueSpec(holds_torque=True, holds_speed=True)}
     )

@@ -57,7 +57,7 @@ def test_a_held_set_point_is_there_at_once() -> None:
 def test_a_filter_of_a_millisecond_reaches_63_percent_in_it(option: str) -> None:
     axis = axis_of(holds_torque=True, **{option: 1e-3})
     axis.set_cyclic(0.0, 0.0, 0.1, 20)
-    # 1 ms beside a current loop of 1 kHz (0.16 ms) and the step that computes it.
+    # 1 ms next to a current loop of 1 kHz (0.16 ms) and the step that computes it.
     shown = reported(axis, 60)
     reached = np.flatnonzero(shown >= 0.0632)[0] * 50e-6
     assert reached == pytest.approx(1.16e-3, abs=0.1e-3)

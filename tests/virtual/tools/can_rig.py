@@ -1,4 +1,4 @@
-"""One axis over CANopen frames in virtual time: the product's link and loop beside a virtual node.
+"""One axis over CANopen frames in virtual time: the product's link and loop next to a virtual node.
 
 Everything is as on a wire (SDO, PDO mapping, NMT, SYNC), but the node's time is the loop's: it
 passes with SYNC, however busy the computer is, and up to ``pace`` times as fast as the clock.

@@ -1,4 +1,4 @@
-"""A virtual drive without a wire: the product's own loop (`AxisLoop`) beside the firmware.
+"""A virtual drive without a wire: the product's own loop (`AxisLoop`) next to the firmware.
 
 For what needs many axes or many samples and nothing of the wire itself. While the exchange runs
 time passes as fast as the computer can, 20 ms at a go, and `time.monotonic` with it: who waits for
@@ -117,7 +117,7 @@ class _Clock:
     """`time.monotonic` of who waits for a drive whose time is ``drive_ns``.
 
     To that comes the processor's time while the exchange ``runs``, and else the computer's; not
-    what it takes to ``simulate`` the drive, which no computer beside a real one does.
+    what it takes to ``simulate`` the drive, which no computer next to a real one does.
     """
 
     def __init__(
@@ -321,7 +321,7 @@ class DirectLink:
                 if late := self.late():
                     self._deliver(rows, missed)
                     rows, missed = [], late
-                    # As the real loops tell it.
+                    # As the real loops show it.
                     assert self._loop is not None
                     self._loop.skip(late)
                     self.now_ns += late * self.cycle_ns

@@ -115,7 +115,7 @@ def test_ctrl_c_and_a_termination_leave_everything_as_it_was(
 
     def ending() -> Progress:
         def changed() -> None:
-            # How often a fast computer tells of its progress depends on how fast it is.
+            # How often a fast computer reports its progress depends on how fast it is.
             if shown.step.startswith("3 of 6: frequency response: measuring") and not sent:
                 sent.append(True)
                 signal.raise_signal(number)

@@ -63,7 +63,7 @@ def torques_nm(time_s: FloatArray, speed_rpm: FloatArray) -> FloatArray:
 
 
 async def machine(bench: DirectBench, cycles: int) -> None:
-    """The controller: it moves the axis and knows nothing of who reads."""
+    """The controller: it moves the axis and has no data of who reads."""
     facts = await read_facts(bench.axis)
     await speed_move(
         bench.axis, bench.session, np.tile(speeds(), cycles), ROOM, facts, lambda _x: None
@@ -107,7 +107,7 @@ async def test_the_cycle_of_a_machine_is_read_while_another_moves_it() -> None:
 async def test_nothing_is_written_and_an_idle_axis_is_named(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Polled, as beside a controller on another bus: no exchange of process data runs."""
+    """Polled, as next to a controller on another bus: no exchange of process data runs."""
     async with direct(rigid(), drive="mms7") as bench:
         await bench.session.stop()
         bench.axis.session = None

@@ -92,7 +92,7 @@ async def test_inertia_between_ends_that_are_found() -> None:
 
 @pytest.mark.parametrize("drive", ["mms7", "m6l", "r6l", "el7"])
 async def test_autotune_of_a_family_and_back(drive: str) -> None:
-    # M6-L does not tell its motor's inertia, which its load ratio counts in.
+    # M6-L does not report its motor's inertia, which its inertia ratio counts in.
     settings = AutotuneSettings(WIDE, motor_inertia_kgm2=None if drive == "mms7" else 5e-5)
     async with direct(ONE, 5e-4, drive=drive) as b:
         result = await autotune(b.axis, b.session, settings, silent())
@@ -103,11 +103,11 @@ async def test_autotune_of_a_family_and_back(drive: str) -> None:
         # What width and depth of the notches mean was measured where no manual prints it.
         assert (meaning_of(b.axis.drive) is None) is (drive == "mms7")
         assert _moving_s(result) < 60.0
-        found, promised = result.verified.sweep.margins, result.verified.promised
+        found, guaranteed = result.verified.sweep.margins, result.verified.guaranteed
         assert isinstance(found["phase_margin_deg"], float)
-        assert found["phase_margin_deg"] >= promised.phase_margin_deg - 1.0
+        assert found["phase_margin_deg"] >= guaranteed.phase_margin_deg - 1.0
         assert isinstance(found["ms"], float)
-        assert found["ms"] <= promised.ms * 1.03
+        assert found["ms"] <= guaranteed.ms * 1.03
         assert result.verified.measured_bandwidth_hz == pytest.approx(
             result.applied.bandwidth_hz, rel=0.1
         )
@@ -158,8 +158,8 @@ async def test_a_load_that_pulls_by_its_place_is_no_inertia(drive: str, place: P
     assert found.reasons == ()
     assert found.inertia_kgm2.value == pytest.approx(spec.total_inertia_kgm2, rel=0.02)
     assert found.coulomb_nm.value == pytest.approx(spec.friction.coulomb_nm, rel=0.1)
-    assert found.beside.place_nm > 0.02
-    assert answer.place_nm == found.beside.place_nm
+    assert found.load_terms.place_nm > 0.02
+    assert answer.place_nm == found.load_terms.place_nm
     assert answer.fan_nm is None
     reported = lines_of(INERTIA, answer)
     assert any("Position-dependent torque" in line for line in reported)

@@ -243,7 +243,7 @@ def test_a_closed_loop_runs_away_over_a_wrong_motor(spec: MechanicsSpec, runs_aw
 
 
 def test_exchanged_phases_hold_the_rotor_at_a_multiple_of_half_an_electrical_turn() -> None:
-    """A constant torque command of -T·cos(2pθ): it comes to rest where the cosine is zero."""
+    """A constant torque command of -T·cos(2pθ): it stops where the cosine is zero."""
     spec = motor(PhaseSpec(order="exchanged"))
     axis = VirtualAxis(spec)
     axis.run_torque(0.5 * RATED_NM, math.inf)

@@ -1,4 +1,4 @@
-"""What the exchange lends an axis for a measurement comes back: its mode (6060h).
+"""What the exchange changes on an axis for a measurement comes back: its mode (6060h).
 
 Without a wire, by the product's own loop; each way out of a measurement, and the line lost in it.
 """

@@ -16,7 +16,7 @@ from tests.virtual.tools.rig import mechanics, silent
 
 ONE = mechanics((1e-4, 60.0, 0.006))
 JOG = JogSettings(1, 120.0, 1200.0, 20.0, 100.0)
-#: Speed (rpm) below which the axis stands.
+#: Speed (rpm) below which the axis is at standstill.
 STANDS_RPM = 6.0
 
 

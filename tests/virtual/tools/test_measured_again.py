@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.tools.sweep import adaptive as sweep_telling
+from backend.tools.sweep import adaptive as sweep_adaptive
 from backend.tools.sweep import run as sweep_tool
 from backend.tools.sweep.evaluation import SweepSettings
 from drivers.cia402 import State
@@ -22,7 +22,7 @@ SWINGING = mechanics(
 
 
 async def test_the_second_excitation_is_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
-    played = sweep_telling.play_telling
+    played = sweep_adaptive.play_informative
     first: list[float] = []
     ended: list[int] = []
 
@@ -34,7 +34,7 @@ async def test_the_second_excitation_is_smaller(monkeypatch: pytest.MonkeyPatch)
         ended.append(len(records))
         return records
 
-    monkeypatch.setattr(sweep_tool, "play_telling", noted)
+    monkeypatch.setattr(sweep_tool, "play_informative", noted)
     monkeypatch.setattr(sweep_tool, "evaluate", evaluate)
     async with direct(SWINGING, drive="r6l") as b:
         units, home = await b.axis.units(), await b.axis.position_raw()

@@ -1,4 +1,4 @@
-"""An axis with play: said in words, and nothing is shown or designed that is not so."""
+"""An axis with backlash: said as text, and nothing is shown or designed that is not so."""
 
 from __future__ import annotations
 

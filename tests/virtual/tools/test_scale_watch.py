@@ -198,7 +198,7 @@ TOOLS: dict[str, Any] = {
 @pytest.mark.parametrize("little", SAYS_LITTLE)
 @pytest.mark.parametrize("tool", TOOLS)
 async def test_no_tool_moves_by_a_unit_that_nobody_knows(tool: str, little: str) -> None:
-    """3 rev are not 3 increments: nothing is written and the shaft stands."""
+    """3 rev are not 3 increments: nothing is written and the shaft is at standstill."""
     async with direct(SAYS_LITTLE[little], drive="generic402") as b:
         b.session.cyclic.play = _must_not_play
         stood = b.link.device.axis.angle_rad
@@ -289,7 +289,7 @@ async def test_a_small_move_of_a_blocked_axis_teaches_nothing() -> None:
 
 @pytest.mark.parametrize("opens_s", [0.0, 0.3])
 async def test_a_brake_that_opens_late_is_waited_for(opens_s: float) -> None:
-    """It grips with twice the rated torque for 300 ms of Operation enabled; no bit tells of it."""
+    """It grips with twice the rated torque for 300 ms of Operation enabled; no bit reports it."""
     motor = AXIS.motor.model_copy(update={"brake": True})
     spec = rough(brake_opens_s=opens_s).model_copy(update={"motor": motor})
     async with direct(spec, drive="generic402") as b:

@@ -48,7 +48,7 @@ async def test_a_supply_that_fails(drive: str, part: str, number: int, kind: str
 async def test_trouble_while_notches_are_learned(
     drive: str, vertical: bool, number: int, kind: str
 ) -> None:
-    """Free and beside the loop that holds a load, without a notch and with the first ones."""
+    """Free and with the loop that holds a load, without a notch and with the first ones."""
     spec = axis_of(vertical=vertical)
     known = await known_of(drive, spec, vertical=vertical)
     assert await struck(drive, spec, "notches", number, kind, known)

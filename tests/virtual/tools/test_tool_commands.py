@@ -177,7 +177,7 @@ def test_every_finding_of_a_friction_map_has_words() -> None:
 
 @pytest.mark.usefixtures("asked")
 def test_a_cycle_is_read_by_a_server_without_a_motion(tmp_path: Path) -> None:
-    """An axis at rest: nothing moved meanwhile, and that is what is said."""
+    """An axis at standstill: nothing moved meanwhile, and that is what is said."""
     file = tmp_path / "cycle.json"
     code, out, err = run("cycle", *AT, "--duration-s", "2", "--out", str(file))
     assert code == 0, err

@@ -26,7 +26,7 @@ MODE = "6060:00"
 
 
 def spy(reached: Callable[[Progress], bool]) -> tuple[Progress, asyncio.Event]:
-    """A progress that tells when the tool has come to a place."""
+    """A progress that reports when the tool has come to a place."""
     there = asyncio.Event()
     progress = Progress(lambda: there.set() if reached(progress) else None)
     return progress, there

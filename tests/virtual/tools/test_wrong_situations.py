@@ -2,7 +2,7 @@
 
 Without a wire (what only a wire can show is in `test_trouble`); dumps of the whole drive are
 compared, not the values that a tool is known to touch. Each drive begins with a notch on and its
-torque filter as it comes, so that measurements have something to put back.
+torque filter as it comes, so that measurements have something to restore.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ async def test_start_gains_that_oscillate(family: Family) -> None:
                 )
         with pytest.raises(DriveError):
             await step_response(b.axis, b.session, StepSettings(WIDE), silent())
-        # Autotune lends it gains to be measured with, and finds better ones.
+        # Autotune sets temporary gains for the measurement, and finds better ones.
         found = await autotune(b.axis, b.session, family.autotune(apply=False), silent())
         assert found.candidates
         units = await b.axis.units()
@@ -288,7 +288,7 @@ async def test_a_drive_that_faults_while_the_tuned_loop_is_verified(family: Fami
 async def test_a_link_that_is_lost_while_it_is_measured(
     family: Family, tool: str, step: str
 ) -> None:
-    """What could not be put back is named, value by value, and put back when the drive answers."""
+    """What could not be restored is named, value by value, and restored when the drive answers."""
     await found_of(family)
     async with direct(ONE, drive=family.drive, settings=dict(family.notch)) as b:
 

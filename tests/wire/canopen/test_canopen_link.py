@@ -266,7 +266,7 @@ async def test_node_guarding_notices_a_silent_node(bench: Bench) -> None:
     await link.open()
     try:
         await link.read(5, SMALL)
-        # One answer alone could be a heartbeat: the toggle bit tells.
+        # One answer alone could be a heartbeat: the toggle bit shows.
         await until(lambda: link._watch.record(5).guarded)
         assert link._watch.record(5).state == 127
         bench.node.mute = True
@@ -278,7 +278,7 @@ async def test_node_guarding_notices_a_silent_node(bench: Bench) -> None:
 async def test_a_device_type_that_comes_in_segments_is_no_other_device(
     bench: Bench, link: CanopenLink
 ) -> None:
-    """CiA 301 lets a server send any length in segments; the first answer then tells a length."""
+    """CiA 301 lets a server send any length in segments; the first answer then shows a length."""
     server = bench.node._server
     whole, asked = server.request, []
 

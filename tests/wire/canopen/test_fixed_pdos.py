@@ -1,4 +1,4 @@
-"""A drive whose EDS file says that its PDOs cannot be mapped anew: they are used as they are."""
+"""A drive whose EDS file says that its PDOs cannot be mapped again: they are used as they are."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ async def test_an_axis_moves_by_its_fixed_pdos(cob_access: str) -> None:
         blocks = await _run(link, [CONTROL, TARGET])
         used = {pdo.identifier for pdo in bench.node._objects.pdos if pdo.valid}
         assert {0x205, 0x1A5, 0x1C7} <= used
-        # What the PDO holds beside the signals keeps the drive's own value.
+        # What the PDO holds next to the signals keeps the drive's own value.
         assert bench.device.value(0x6060) == 1
         cyclic = _cyclic(link)
         await cyclic.drive_to(5, State.OPERATION_ENABLED, CSP)

@@ -356,7 +356,7 @@ class Hasty(Servo):
             seen = bytearray(self.answer)
             for place in (self.managers_at, self.managers_at + 1):
                 if 0 <= place - 2 * word < len(seen):
-                    seen[place - 2 * word] = 0x0F  # a category that nobody knows
+                    seen[place - 2 * word] = 0x0F  # a category that is unknown
             self.answer = bytes(seen)
         return written
 

@@ -47,7 +47,7 @@ def network() -> Iterator[Namespace]:
 
 @contextmanager
 def started(network: Namespace, state: Path) -> Iterator[tuple[int, list[str]]]:
-    """The station: its port, and what stands on its console when it answers."""
+    """The station: its port, and what is on its console when it answers."""
     process = subprocess.Popen(
         network.command([*WITH_SYS, sys.executable, "-m", "backend", "serve", "--bind", "0.0.0.0",
                          "--port", "0", "--config", str(state)]),

@@ -330,7 +330,7 @@ def test_a_repeated_mail_is_known_by_its_number() -> None:
 def test_the_drives_own_dictionary_proves_the_layout_of_a_whole_object(
     last: int, reads: int
 ) -> None:
-    """Its subindex 0 is a value of its own, so it cannot tell how many entries follow."""
+    """Its subindex 0 is a value of its own, so it cannot determine how many entries follow."""
     entries = {0: b"\x11", 1: b"\x01", 2: b"\x02\0", 3: b"\x03\0\0\0"}
 
     def react(request: bytes) -> list[bytes]:

@@ -153,7 +153,7 @@ def test_a_mapping_that_a_drive_refuses_ends_in_its_words() -> None:
 
 
 def test_nothing_is_mapped_twice_after_one_search() -> None:
-    """The FMMUs of the first mapping would go on beside those of the second."""
+    """The FMMUs of the first mapping would go on next to those of the second."""
     segment = Segment("none")
     segment._master = Soem()
     segment.find()

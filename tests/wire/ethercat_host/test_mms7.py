@@ -24,7 +24,7 @@ ACTUAL = Address(0x6064, 0, "INT32")
 def mms7(namespace: Namespace) -> Iterator[VirtualSegment]:
     """Its time follows the frames, so that a busy machine is no trouble.
 
-    Behind it an M6-L, without complete access. Neither tells vendor or product, so that SOEM
+    Behind it an M6-L, without complete access. Neither shows vendor or product, so that SOEM
     takes them for the same make.
     """
     arguments = ["--drive", "mms7", "--drive", "m6l", "--sdo-ms", "0.3", "--lockstep"]

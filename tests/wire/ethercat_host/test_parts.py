@@ -253,7 +253,7 @@ def test_permissions_without_the_interface() -> None:
 
 
 def test_short_turns_need_no_permission() -> None:
-    """The kernel tells them by sched_getattr(2); in a process of its own, not for these tests."""
+    """The kernel reports them by sched_getattr(2); in a process of its own, not for these tests."""
     code = """
 import ctypes, os, platform, struct
 from drivers.computer import scheduling

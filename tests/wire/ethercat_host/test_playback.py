@@ -554,7 +554,7 @@ def test_enabling_anew_is_not_taken_back_by_a_sample_from_before_the_disabling()
     bench = Bench().enabled()
     bench.axis.drive_to(State.SWITCH_ON_DISABLED, None)
     bench.step()
-    # The drive is disabled by now, as its mailbox tells; samples on their way are older.
+    # The drive is disabled by now, as its mailbox shows; samples on their way are older.
     bench.axis.drive_to(State.OPERATION_ENABLED, 8)
     bench.step()
     bench.status = DISABLED

@@ -1,4 +1,4 @@
-"""What a station tells of itself while frames are lost for longer than a moment."""
+"""What a station reports of itself while frames are lost for longer than a moment."""
 
 from __future__ import annotations
 

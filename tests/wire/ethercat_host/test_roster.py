@@ -1,4 +1,4 @@
-"""What a search left out or left wrong is mended without anybody asking, but under no motion."""
+"""What a search left out or left wrong is corrected without anybody asking, but under no motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A master made of bytes: frames are put together and taken apart by the standard's layout."""
+"""A master made of bytes: frames are put together and split by the standard's layout."""
 
 from __future__ import annotations
 

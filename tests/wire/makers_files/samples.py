@@ -1,6 +1,6 @@
 """Ten ESI files of our own, each with the structure that some real maker's file has.
 
-No maker's file is copied. What is odd about each stands in its comment.
+No maker's file is copied. What is odd about each is in its comment.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ SAMPLES: dict[str, bytes] = {
                                                                   sm=3, Fixed=1),
         coe='PdoAssign="1" PdoConfig="0" CompleteAccess="0"',
     ),
-    # A mandatory PDO with the control word, beside which a free one is filled.
+    # A mandatory PDO with the control word, next to which a free one is filled.
     "mandatory_and_free": esi(
         pdo(0x1600, 0x6040, 0x6060, sm=2, Fixed=1, Mandatory=1) + pdo(0x1601, 0x607A)
         + pdo(0x1A00, 0x6041, 0x6061, sm=3, Fixed=1, Mandatory=1) + pdo(0x1A01, 0x6064),

@@ -1,6 +1,6 @@
 """A slave that insists on every rule of an ESI file.
 
-It reads the file by itself (ETG.2000) and knows nothing of our importer: where both understand
+It reads the file by itself (ETG.2000) and has no data of our importer: where both understand
 the file differently, the slave refuses. Refusals have codes of its own, named in `RULES`.
 """
 

@@ -1,4 +1,4 @@
-"""The adapter itself: missing, in use, pulled and put back; turns on the bus; two threads."""
+"""The adapter: missing, in use, pulled and plugged in again; turns on the bus; two threads."""
 
 from __future__ import annotations
 

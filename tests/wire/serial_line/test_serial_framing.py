@@ -134,7 +134,7 @@ def test_request_arrives_in_any_two_portions(cut: int) -> None:
 
 
 def test_request_behind_the_start_of_a_longer_one_is_found_at_silence() -> None:
-    # 01 10 … 7B F6 promises 123 registers that never come.
+    # 01 10 … 7B F6 announces 123 registers that never come.
     parser = RequestParser()
     assert parser.feed(bytes.fromhex("01 10 00 00 00 7B F6") + READ_REQUEST) == []
     assert parser.end_of_frame() == [Request(1, 3, 10, 1)]

@@ -1,6 +1,6 @@
 import createClient from 'openapi-fetch'
 import { counted } from './outstanding'
-import { patient } from './patience'
+import { withTimeLimit } from './time-limit'
 import type { components, paths } from './schema'
 
 export type Problem = components['schemas']['Problem']
@@ -32,7 +32,10 @@ export function whenUnknown(act: () => void): void {
   onUnknown = act
 }
 
-export const api = createClient<paths>({ baseUrl: API_ROOT, fetch: (request) => patient(request) })
+export const api = createClient<paths>({
+  baseUrl: API_ROOT,
+  fetch: (request) => withTimeLimit(request),
+})
 api.use({
   onRequest({ request }) {
     if (connection !== null) request.headers.set('X-Servodeck-Connection', connection)

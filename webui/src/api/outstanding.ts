@@ -1,4 +1,6 @@
-/** Answers that are waited for, so that a page can tell when it has what it asked for on opening. */
+/**
+ * Answers that are waited for, so that a page can show when it has what it asked for on opening.
+ */
 const open = new Set<number>()
 let last = 0
 

@@ -561,7 +561,7 @@ export interface paths {
         put?: never;
         /**
          * Read Fault History
-         * @description The drive's own record, read now; a selector is written and put back where it takes one.
+         * @description The drive's own record, read now; a selector is written and restored where it takes one.
          */
         post: operations["read_fault_history"];
         delete?: never;
@@ -859,7 +859,7 @@ export interface paths {
          * Trigger Health
          * @description A controller asks for a run. Without a standing permission for it nothing moves.
          *
-         *     ``GET /jobs/{id}`` tells how far it is, ``GET /drives/{id}/health`` what has changed.
+         *     ``GET /jobs/{id}`` shows how far it is, ``GET /drives/{id}/health`` what has changed.
          */
         post: operations["trigger_health"];
         delete?: never;
@@ -1229,7 +1229,7 @@ export interface paths {
         put?: never;
         /**
          * Put Back
-         * @description Restore every pending value of the drive, while its axis stands.
+         * @description Restore every pending value of the drive, while its axis is at standstill.
          *
          *     Where one of them can put energy into the motor (a mode, the function of a terminal), the right
          *     to move is needed, too.
@@ -1434,8 +1434,8 @@ export interface paths {
          * @description Write a setting that can start a motion at once; only while the motor has no power.
          *
          *     Functions of terminals, control sources and the mapping of process data. The shaft is watched:
-         *     where it begins to turn, the setting is put back and the axis is stopped. The grant is for this
-         *     one write and ends with it; ``reason`` stands in log and audit.
+         *     where it begins to turn, the setting is restored and the axis is stopped. The grant is for this
+         *     one write and ends with it; ``reason`` is in log and audit.
          */
         put: operations["write_motion_setting"];
         post?: never;
@@ -1650,7 +1650,7 @@ export interface paths {
         put?: never;
         /**
          * Make Report
-         * @description Evaluate the measurements of an axis anew and write its report. Nothing moves.
+         * @description Evaluate the measurements of an axis again and write its report. Nothing moves.
          */
         post: operations["make_report"];
         delete?: never;
@@ -1798,7 +1798,7 @@ export interface paths {
         put?: never;
         /**
          * Transition
-         * @description Drive the power state machine. Enabling aims the setpoint at where the axis stands.
+         * @description Drive the power state machine. Enabling aims the setpoint at where the axis is.
          */
         post: operations["transition"];
         delete?: never;
@@ -1880,7 +1880,7 @@ export interface paths {
          * Undo Tuning
          * @description Put back what a change returned as `before`; returns what was there until now.
          *
-         *     With the change's `after` nothing is put back over what somebody else has written since.
+         *     With the change's `after` nothing is restored over what somebody else has written since.
          */
         post: operations["undo_tuning"];
         delete?: never;
@@ -2066,7 +2066,7 @@ export interface paths {
          * Ethercat Segment
          * @description An opened segment: its stations in the order of the cable, ports, clocks, punctuality.
          *
-         *     Answers as well while the segment cannot be asked; ``problem`` then says why.
+         *     Answers as well while the segment cannot be asked; ``problem`` then states the reason.
          */
         get: operations["ethercat_segment"];
         put?: never;
@@ -2338,7 +2338,7 @@ export interface paths {
         };
         /**
          * Library Entry
-         * @description One entry, also one that was put aside.
+         * @description One entry, also one that was archived.
          */
         get: operations["library_entry"];
         put?: never;
@@ -2352,7 +2352,7 @@ export interface paths {
         head?: never;
         /**
          * Change Library Entry
-         * @description Change notes or tags, or take back what was put aside.
+         * @description Change notes or tags, or take back what was archived.
          */
         patch: operations["change_library_entry"];
         trace?: never;
@@ -2530,7 +2530,7 @@ export interface paths {
         };
         /**
          * Read Measurement
-         * @description One measurement, evaluated anew from its raw data and compared with its first result.
+         * @description One measurement, evaluated again from its raw data and compared with its first result.
          */
         get: operations["read_measurement"];
         put?: never;
@@ -3265,7 +3265,7 @@ export interface paths {
         post?: never;
         /**
          * Delete Set
-         * @description Put a set aside; it can be taken back on the Files page.
+         * @description Archive a set; it can be restored on the Files page.
          */
         delete: operations["delete_set"];
         options?: never;
@@ -3306,7 +3306,7 @@ export interface paths {
         put?: never;
         /**
          * Set Up
-         * @description Make the first administrator, with the code that stands in the terminal.
+         * @description Make the first administrator, with the code that is in the terminal.
          */
         post: operations["set_up"];
         delete?: never;
@@ -5158,7 +5158,7 @@ export interface components {
             pending: number;
             /**
              * Pending Restores
-             * @description what a motion could not put back
+             * @description what a motion could not restore
              */
             pending_restores: components["schemas"]["PendingRestoreValue"][];
             /** Ports */
@@ -5208,7 +5208,7 @@ export interface components {
         };
         /**
          * EepromComparison
-         * @description The EEPROM of a slave beside a file.
+         * @description The EEPROM of a slave next to a file.
          */
         EepromComparison: {
             /** Alias */
@@ -5852,7 +5852,7 @@ export interface components {
         FrictionPoint: {
             /**
              * Revolutions
-             * @description that the mean is taken over
+             * @description that the mean is calculated over
              */
             revolutions: number;
             /** Speed Rpm */
@@ -6052,7 +6052,7 @@ export interface components {
          * GainBlock
          * @description Parameters that sit at one place of the control loops.
          *
-         *     ``set_number`` tells apart the gain sets between which a drive switches.
+         *     ``set_number`` distinguishes the gain sets between which a drive switches.
          */
         GainBlock: {
             /**
@@ -6231,7 +6231,7 @@ export interface components {
         GearPlanInfo: {
             /**
              * Acts
-             * @description when a change acts, in words
+             * @description when a change acts, as text
              */
             acts: string;
             /**
@@ -6306,7 +6306,7 @@ export interface components {
         GearWritten: {
             /**
              * Before
-             * @description raw values that take it back
+             * @description raw values that undo it
              */
             before: {
                 [key: string]: number;
@@ -6369,7 +6369,7 @@ export interface components {
         };
         /**
          * GoalsInfo
-         * @description The worst margins that were promised or found; None where they are not finite.
+         * @description The worst margins that were guaranteed or found; None where they are not finite.
          */
         GoalsInfo: {
             /** Gain Margin Db */
@@ -6797,7 +6797,7 @@ export interface components {
         };
         /**
          * HealthPermissionInfo
-         * @description The standing permission of an axis' health check. ``ended`` says why it permits nothing.
+         * @description The standing permission of an axis' health check. ``ended`` states why it permits nothing.
          */
         HealthPermissionInfo: {
             /**
@@ -7265,7 +7265,7 @@ export interface components {
             load_ratio: number | null;
             /**
              * Load Ratio Against
-             * @description what it compares with, in words; empty without a ratio
+             * @description what it compares with, as text; empty without a ratio
              * @default
              */
             load_ratio_against: string;
@@ -7314,7 +7314,7 @@ export interface components {
             unit: "SI" | "torque as a share of rated torque";
             /**
              * Verdict
-             * @description of reasons, in words; ok where there are none
+             * @description of reasons, as text; ok where there are none
              * @default ok
              */
             verdict: string;
@@ -7933,7 +7933,7 @@ export interface components {
         LibraryChange: {
             /**
              * Deleted
-             * @description false takes it back
+             * @description false undoes it
              */
             deleted?: false | null;
             /** Notes */
@@ -7989,7 +7989,7 @@ export interface components {
             entries: components["schemas"]["LibraryEntry"][];
             /**
              * Problems
-             * @description files that could not be taken into the library
+             * @description files that could not be added to the library
              */
             problems: string[];
             /**
@@ -8140,7 +8140,7 @@ export interface components {
         };
         /**
          * MeasurementContent
-         * @description Its settings, and its result evaluated anew from the raw data.
+         * @description Its settings, and its result evaluated again from the raw data.
          */
         MeasurementContent: {
             /**
@@ -8371,7 +8371,7 @@ export interface components {
             raw?: number | string | null;
             /**
              * Reason
-             * @description why it is set; stands in log and audit
+             * @description why it is set; is in log and audit
              * @default
              */
             reason: string;
@@ -8862,7 +8862,7 @@ export interface components {
         };
         /**
          * PendingRestoreValue
-         * @description A parameter that a motion changed and could not put back, as the link was lost.
+         * @description A parameter that a motion changed and could not restore, as the link was lost.
          */
         PendingRestoreValue: {
             /** Key */
@@ -8871,7 +8871,7 @@ export interface components {
             name: string;
             /**
              * Raw
-             * @description what it was before; writing it puts it back
+             * @description what it was before; writing it restores it
              */
             raw: number | string;
             /**
@@ -9496,7 +9496,7 @@ export interface components {
         };
         /**
          * ReadDictionaryRequest
-         * @description Make a profile from what a drive tells of its own objects.
+         * @description Make a profile from what a drive reports of its own objects.
          */
         ReadDictionaryRequest: {
             /** Profile */
@@ -9720,7 +9720,7 @@ export interface components {
             rises: boolean;
             /**
              * Unit
-             * @description unit of time that its name tells: s, ms, us or ns
+             * @description unit of time that its name reports: s, ms, us or ns
              */
             unit: string;
         };
@@ -10331,7 +10331,7 @@ export interface components {
             unit: string;
             /**
              * Why
-             * @description the same in words, or empty
+             * @description the same as text, or empty
              */
             why: string;
         };
@@ -10751,7 +10751,7 @@ export interface components {
             communicating: boolean;
             /**
              * Findings
-             * @description which cable the counters accuse, in words
+             * @description which cable the counters accuse, as text
              */
             findings: string[];
             /** Forwarded Errors */
@@ -10952,7 +10952,7 @@ export interface components {
         };
         /**
          * SetUp
-         * @description The first administrator; ``code`` stands in the terminal of the machine.
+         * @description The first administrator; ``code`` is in the terminal of the machine.
          */
         SetUp: {
             /** Code */
@@ -11371,7 +11371,7 @@ export interface components {
             };
             /**
              * Stopped
-             * @description drives whose axis stands by what it measures
+             * @description drives whose axis is at standstill by what it measures
              */
             stopped: string[];
         };
@@ -11473,7 +11473,7 @@ export interface components {
          * SweepAnswer
          * @description The response [lines] with its deviations, and what is read from it.
          *
-         *     ``coherence`` and the deviations stand beside each line; None where nothing is known of them.
+         *     ``coherence`` and the deviations are next to each line; None where nothing is known of them.
          *     ``margins`` hold from ``from_hz`` to ``to_hz``, each None where no crossing was measured.
          */
         SweepAnswer: {
@@ -11590,7 +11590,7 @@ export interface components {
             cycle_ms: number;
             /**
              * Excitation
-             * @description a stepped sine is one tone after another, beside a closed loop, in one pair of realisations; the others excite the whole band at once
+             * @description a stepped sine is one tone after another, with a closed loop, in one pair of realisations; the others excite the whole band at once
              * @default multisine
              * @enum {string}
              */
@@ -11622,7 +11622,7 @@ export interface components {
             loop: "auto" | "none" | "speed" | "position";
             /**
              * Odd Lines
-             * @description of mechanics by a multisine: odd lines alone, which tell noise, even and odd distortion apart
+             * @description of mechanics by a multisine: odd lines alone, which distinguish noise, even and odd distortion
              * @default false
              */
             odd_lines: boolean;

@@ -35,7 +35,7 @@ function Page() {
   const chosen = drive ?? drives?.[0]?.id ?? null
   const there = drives?.some((each) => each.id === chosen) ?? false
   useEffect(() => {
-    // The descriptions tell which pages an axis has; they do not change while it is connected.
+    // The descriptions show which pages an axis has; they do not change while it is connected.
     if (open && chosen && there && !contents.rows.has(chosen)) {
       void live.loadRows(chosen).catch(() => {})
     }

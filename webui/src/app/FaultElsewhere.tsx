@@ -5,7 +5,7 @@ import { contents, subscribe, useDrives } from '../live/store'
 import { Icon } from '../widgets/Icon'
 import { href } from './router'
 
-/** The way to a fault of an axis that is not the chosen one: on a phone nothing else tells of it. */
+/** The way to a fault of an axis that is not the chosen one: on a phone nothing else reports it. */
 export function FaultElsewhere({ chosen }: { chosen: string | null }) {
   const t = useT()
   const drives = useDrives()

@@ -55,7 +55,7 @@ export function Frame({ children }: { children: ReactNode }) {
   useEffect(() => setOpen(false), [key])
   const axis = useDrive(isAxisPage(page) ? drive : null)
   useEffect(() => {
-    // Tabs, bookmarks and screen readers tell pages apart by it.
+    // Tabs, bookmarks and screen readers distinguish pages by it.
     const names = [axis?.name, t(`page.${page}`), 'servodeck']
     document.title = names.filter(Boolean).join(' · ')
   }, [axis?.name, page, t(`page.${page}`)])
@@ -134,7 +134,7 @@ function Pages() {
   const hasIo = useHasIo(drive)
   const canTune = useCanTune(drive)
   // What the axis has not stays in its place: the entries below would move under a finger, each
-  // time another axis is chosen. The page says why there is nothing.
+  // time another axis is chosen. The page states why there is nothing.
   const has = (name: Page) =>
     name === 'io' ? hasIo : name === 'tune' || name === 'response' ? canTune : true
   return (
@@ -340,7 +340,7 @@ function Refused() {
     const timer = setTimeout(() => setSeen(refused.at), REFUSED_MS)
     return () => clearTimeout(timer)
   }, [refused])
-  // What STOP did not reach stands in its own report, with the other axes.
+  // What STOP did not reach is in its own report, with the other axes.
   const reported = useStore('stop', currentReport)?.answer != null
   if (!refused || refused.at <= seen || (refused.request === 'stop' && reported)) return null
   return (

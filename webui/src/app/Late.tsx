@@ -2,9 +2,9 @@ import { type ReactNode, useEffect, useLayoutEffect, useRef } from 'react'
 import { settled } from './settle'
 
 /**
- * What somebody must be informed at once, whatever page is open. It stands above the page, also of one
- * that is scrolled, and coming or going it moves nothing: the page is scrolled by its height, and
- * what it lies over is reached by scrolling up. `page` names what is open.
+ * What somebody must be informed at once, whatever page is open. It stands above the page, also of
+ * one that is scrolled, and coming or going it moves nothing: the page is scrolled by its height,
+ * and what it lies over is reached by scrolling up. `page` names what is open.
  */
 export function Late({ page, children }: { page: string; children: ReactNode }) {
   const reported = useRef<HTMLDivElement>(null)
@@ -46,7 +46,7 @@ export function Late({ page, children }: { page: string; children: ReactNode }) 
     }
     const observer = new ResizeObserver(resized)
     observer.observe(box)
-    // Before the next event: a press that is taken before the page is drawn again would otherwise
+    // Before the next event: a press that is used before the page is drawn again would otherwise
     // meet what has moved under it, which nobody has seen yet.
     const changed = new MutationObserver(resized)
     changed.observe(box, { childList: true, subtree: true, characterData: true, attributes: true })

@@ -34,9 +34,9 @@ export function Preferences() {
         {tour && <Menu.Item onClick={() => setPlace('offer')}>{t('tour.menu')}</Menu.Item>}
         {session?.login_required && session.person !== null && (
           <>
-            <Menu.Label>{t('door.in', { name: session.person ?? '' })}</Menu.Label>
+            <Menu.Label>{t('login.in', { name: session.person ?? '' })}</Menu.Label>
             <Menu.Item leftSection={<Icon name="left" />} onClick={() => void leave()}>
-              {t('door.logOut')}
+              {t('login.logOut')}
             </Menu.Item>
           </>
         )}

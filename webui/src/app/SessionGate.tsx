@@ -1,7 +1,7 @@
 import { type ReactNode, useEffect } from 'react'
 import { useT } from '../i18n'
 import * as live from '../live/live'
-import { GUEST, Join, LogIn, SetUp } from './Door'
+import { GUEST, Join, LogIn, SetUp } from './LogInForms'
 import { Preferences } from './Preferences'
 import { StopButton } from './StopButton'
 import { askSession, mayHaveStop, useSession } from './session'
@@ -25,7 +25,7 @@ export function SessionGate({ children }: { children: ReactNode }) {
   }, [known])
   if (session === null) {
     return (
-      <main className="door">
+      <main className="login">
         <p role="status">{t('lost.opening')}</p>
       </main>
     )
@@ -33,9 +33,9 @@ export function SessionGate({ children }: { children: ReactNode }) {
   if (known) return <>{children}</>
   const link = GUEST.exec(window.location.hash)?.[1]
   return (
-    <main className="door">
+    <main className="login">
       {mayHaveStop() && <StopButton />}
-      <div className="door-head">
+      <div className="login-head">
         <h1>servodeck</h1>
         <Preferences />
       </div>

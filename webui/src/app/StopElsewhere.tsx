@@ -4,11 +4,13 @@ import { useT } from '../i18n'
 import { contents, subscribe } from '../live/store'
 import { pressedAt } from './stop'
 
-/** How long after one's own STOP the server's log tells of that one. */
+/** How long after one's own STOP the server's log reports that one. */
 const OWN_MS = 4000
-const TOLD_MS = 20_000
+const SHOWN_MS = 20_000
 
-/** Somebody else pressed STOP: an axis that stands for no visible reason must not be started again. */
+/**
+ * Somebody else pressed STOP: an axis that stands for no visible reason must not be started again.
+ */
 export function StopElsewhere() {
   const t = useT()
   const [by, setBy] = useState<{ person: string } | null>(null)
@@ -24,7 +26,7 @@ export function StopElsewhere() {
   )
   useEffect(() => {
     if (!by) return
-    const timer = setTimeout(() => setBy(null), TOLD_MS)
+    const timer = setTimeout(() => setBy(null), SHOWN_MS)
     return () => clearTimeout(timer)
   }, [by])
   if (!by) return null

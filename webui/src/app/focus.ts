@@ -24,7 +24,7 @@ export function keepFocus(): void {
     inside = target
     if (!target.closest('[role="dialog"]')) outside = target
   })
-  // A press beside everything lets it go; a press on something gives it to that.
+  // A press outside everything lets it go; a press on something gives it to that.
   window.addEventListener('pointerdown', () => (inside = outside = null), { capture: true })
   new MutationObserver(giveBack).observe(document.body, {
     subtree: true,

@@ -31,7 +31,7 @@ export function meant<Thing>(
 const PRESSABLE =
   'button, a[href], label, summary, input, select, textarea, [role="button"], [role="option"]'
 
-/** What a browser presses anew with every repetition of a key that is held. */
+/** What a browser presses again with every repetition of a key that is held. */
 const ONCE = 'button, a[href], summary, [role="button"]'
 
 const pressable = (target: EventTarget | null) =>

@@ -5,7 +5,7 @@ export interface Settled {
 }
 
 /**
- * Where a page is to be scrolled to when what stands above it changes its height, so that nothing
+ * Where a page is to be scrolled to when what is above it changes its height, so that nothing
  * moves under a finger. `anchored`: what the browser has scrolled for it already. Where there is
  * no way to scroll up, room is left where the notice was; the next notice takes that first.
  */

@@ -2,7 +2,7 @@ import type { AxisState, Quality } from '../api/schema'
 import type { IconName } from '../widgets/Icon'
 import type { Page } from './router'
 
-/** How an axis state looks: a colour class and an icon; the words are always beside them. */
+/** How an axis state looks: a colour class and an icon; the words are always next to them. */
 export function stateLook(state: AxisState | null): { tone: string; icon: IconName } {
   if (!state?.fresh) return { tone: 'old', icon: 'question' }
   switch (state.state) {
@@ -47,6 +47,8 @@ export function linkLook(quality: Quality | null): {
   return { word: 'good', tone: 'live' }
 }
 
-/** Whether a page has the faults first on it itself; `reported`: there were some when it was opened. */
+/**
+ * Whether a page has the faults first on it itself; `reported`: there were some when it was opened.
+ */
 export const listsFaults = (page: Page, reported: boolean): boolean =>
   page === 'alarms' || (page === 'overview' && reported)

@@ -63,7 +63,7 @@ export async function stopEverything(): Promise<void> {
   }
 }
 
-/** The websocket tells at once that STOP went out, and its verdicts where the request is lost. */
+/** The websocket shows at once that STOP went out, and its verdicts where the request is lost. */
 export function listenForAnswers(): void {
   subscribe('stopTaken', () => {
     if (report === null || report.answer !== null) return

@@ -137,7 +137,7 @@ describe('the catalogue', () => {
       expect(/\p{Script=Han}/u.test(en), `${key}: ${en}`).toBe(false)
     }
   })
-  it('tells one thing from several', () => {
+  it('distinguishes one thing from several', () => {
     expect(translate('en', 'library.parameters', { count: 1 })).toBe('1 parameter')
     expect(translate('en', 'library.parameters', { count: 0 })).toBe('0 parameters')
     const counts = { sessions: 2, tokens: 1 }

@@ -70,7 +70,7 @@ describe('pointing', () => {
   })
   const at = (x: number, y: number | null = null) => ({ x, y })
 
-  it('tells a place once, and again when the picture has moved beneath the pointer', () => {
+  it('shows a place once, and again when the picture has moved beneath the pointer', () => {
     const { sent, pointing } = make()
     let x = 1.5
     pointing.enter('scope', () => at(x))
@@ -80,7 +80,7 @@ describe('pointing', () => {
     pointing.tick(true)
     expect(sent).toEqual([reported('scope', 1.5), reported('scope', 1.6)])
   })
-  it('tells of another frequency at the same time', () => {
+  it('reports another frequency at the same time', () => {
     const { sent, pointing } = make()
     let y = 50
     pointing.enter('scope', () => at(1.5, y))
@@ -100,7 +100,7 @@ describe('pointing', () => {
     pointing.tick(false)
     expect(sent).toEqual([reported('scope', 1), reported('scope', null)])
   })
-  it('takes back the old plot before it tells of the new one', () => {
+  it('takes back the old plot before it reports the new one', () => {
     const { sent, pointing } = make()
     const first = () => at(5)
     pointing.enter('response', first)

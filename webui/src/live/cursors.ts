@@ -38,7 +38,7 @@ export function heldInside(place: number, width: number): { left: number; beyond
 }
 
 /**
- * What this page tells the others about its own pointer. There is one pointer, so the last plot
+ * What this page shows the others about its own pointer. There is one pointer, so the last plot
  * that it entered counts; a picture that runs on beneath a resting pointer moves it as well.
  */
 export class Pointing {
@@ -52,12 +52,15 @@ export class Pointing {
     this.now = { plot, read }
   }
 
-  /** Leaving what another plot has taken over already changes nothing. */
+  /** Leaving what another plot has adopted already changes nothing. */
   leave(read: () => Pointed | null): void {
     if (this.now?.read === read) this.now = null
   }
 
-  /** Called at the rate at which the others are informed; `shared` is whether they are reported at all. */
+  /**
+   * Called at the rate at which the others are informed; `shared` is whether they are reported at
+   * all.
+   */
   tick(shared: boolean): void {
     const at = shared ? (this.now?.read() ?? null) : null
     const plot = at === null ? null : (this.now?.plot ?? null)

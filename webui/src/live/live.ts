@@ -25,7 +25,7 @@ export const send = (message: FromPage) => post({ kind: 'send', message })
 export const stand = (name: string, message: FromPage | null) =>
   post({ kind: 'stand', name, message })
 export function jogStart(message: JogStart): void {
-  store.askedAnew('jog_start')
+  store.askedAgain('jog_start')
   post({ kind: 'jogStart', message })
 }
 export const jogBeat = (drive: string) => post({ kind: 'jogBeat', drive })
@@ -49,7 +49,7 @@ export function askScope<Kind extends QuestionKind>(
 }
 
 /**
- * Fetch what the websocket only tells about when it changes. The list of drives is not among
+ * Fetch what the websocket only shows about when it changes. The list of drives is not among
  * it: every connection begins with one, and an answer fetched here could be older.
  */
 async function refresh(): Promise<void> {

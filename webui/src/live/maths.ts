@@ -3,7 +3,7 @@ import { Ring, Trace } from './ring'
 
 /**
  * A computed channel. It has the times of the first channel that its text names; the others are
- * taken on the straight line between their samples, so it waits for them.
+ * interpolated on the straight line between their samples, so it waits for them.
  */
 export class MathsChannel {
   readonly trace: Trace

@@ -80,7 +80,7 @@ describe('noise is no step', () => {
     const slow = noise(2000).map((value) => (low += (value - low) / 20))
     expect(measure(traceOf(times, slow), 0, 2)).toMatchObject(stepless)
   })
-  it('nor the flicker of the last digit of a speed at rest', () => {
+  it('nor the flicker of the last digit of a speed at standstill', () => {
     const flicker = noise(2000).map((value) => (value > 0 ? 1 : 0))
     expect(measure(traceOf(times, flicker), 0, 2)).toMatchObject(stepless)
   })

@@ -4,13 +4,13 @@ const CHUNK = 64
 
 /**
  * The last samples of one channel with their times. Bounded: the oldest makes room for the newest.
- * Memory is taken as it is needed, up to `capacity` rows.
+ * Memory is allocated as it is needed, up to `capacity` rows.
  */
 export class Ring {
   readonly capacity: number
   /** Rows from this time on are looked at: a full ring takes nothing in rather than let them go. */
   keep = Number.POSITIVE_INFINITY
-  /** How often it began anew: times before and after are of different clocks. */
+  /** How often it began again: times before and after are of different clocks. */
   begun = 0
   private times = new Float64Array(FIRST_ROWS)
   private values = new Float64Array(FIRST_ROWS)
@@ -35,7 +35,7 @@ export class Ring {
     return this.used === 0 ? null : this.time(this.used - 1)
   }
 
-  /** Add a sample. A clock that went back (another computer) begins anew. */
+  /** Add a sample. A clock that went back (another computer) begins again. */
   push(time: number, value: number): void {
     if (this.used > 0 && time < this.time(this.used - 1)) this.clear()
     if (this.used === this.times.length) {

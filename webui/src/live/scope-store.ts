@@ -99,7 +99,7 @@ export class ScopeStore {
     const old = this.subscriptions.get(drive)
     if (old && old.keys.join() === keys.join() && period === this.period) return
     this.held = false
-    // A number of its own, so that blocks of the earlier choice are not taken for these.
+    // A number of its own, so that blocks of the earlier choice are not mistaken for these.
     const number = ++this.count
     if (old) this.ports.stop(old.number)
     this.subscriptions.set(drive, {
@@ -127,8 +127,8 @@ export class ScopeStore {
     return found.ring
   }
 
-  private compute(wanted: ScopeConfig['maths'], anew: boolean): void {
-    const old = anew ? [] : this.maths
+  private compute(wanted: ScopeConfig['maths'], newly: boolean): void {
+    const old = newly ? [] : this.maths
     this.maths = []
     for (const { id, expression } of wanted) {
       const kept = old.find((each) => each.id === id && each.expression === expression)
@@ -191,7 +191,7 @@ export class ScopeStore {
     if (before !== undefined && block.sequence > before + 1) {
       this.losses.blocks += block.sequence - before - 1
     }
-    // A sequence that begins anew is of another stream, with perhaps other channels.
+    // A sequence that begins again is of another stream, with perhaps other channels.
     if (before !== undefined && block.sequence <= before) subscription.source = []
     subscription.sequences.set(block.stream, block.sequence)
     this.losses.dropped += block.dropped

@@ -126,7 +126,7 @@ describe('ring', () => {
     expect(ring.firstAfter(2000)).toBe(25)
     expect(ring.firstAt(9999)).toBe(1024)
   })
-  it('begins anew when the clock goes back', () => {
+  it('begins again when the clock goes back', () => {
     const ring = new Ring(1024)
     ring.push(100, 1)
     ring.push(3, 2)
@@ -324,7 +324,7 @@ describe('scope store', () => {
     scope.block(frame({ t0: 0, dt: 1, rows: [[1], [2]] }))
     scope.configure(config(source('c1', 'a'), source('c2', 'b')))
     expect(sent).toEqual(['start 1 a', 'stop 1', 'start 2 a,b'])
-    // A late block of the first subscription has one column; it must not be taken for a.
+    // A late block of the first subscription has one column; it must not be mistaken for a.
     scope.block(frame({ t0: 50, rows: [[9]], sequence: 2 }))
     scope.block(frame({ subscription: 2, t0: 60, rows: [[3, 4]] }))
     const found = scope.answer('view', view)
@@ -336,7 +336,7 @@ describe('scope store', () => {
     scope.configure(config())
     expect(sent.at(-1)).toBe('stop 2')
   })
-  it('tells channels of the cycle from polled ones, and counts losses of each by itself', () => {
+  it('distinguishes channels of the cycle from polled ones, and counts losses of each by itself', () => {
     const { store: scope } = store()
     scope.configure(config(source('c1', 'a'), source('c2', 'b')))
     const none = Number.NaN
@@ -495,7 +495,7 @@ describe('scope store', () => {
     expect(found.overlays).toHaveLength(2)
     expect(found.overlays[0]).toEqual({ trace: 0, times: [-0.5, 0.5], values: [0, 1] })
   })
-  it('computes channels as samples come, and anew in another unit', () => {
+  it('computes channels as samples come, and again in another unit', () => {
     const { store: scope } = store()
     const sources = [source('c1', 'a')]
     const maths = [

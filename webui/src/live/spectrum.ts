@@ -129,7 +129,7 @@ function amplitudes(values: Float64Array, window: Float64Array, length: number):
   for (let i = 0; i < values.length; i++) {
     const weight = window[i] as number
     gain += weight
-    // Without its mean, or that would hide the slow lines beside it.
+    // Without its mean, or that would hide the slow lines next to it.
     re[i] = ((values[i] as number) - mean) * weight
   }
   fft(re, im)

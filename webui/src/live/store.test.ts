@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest'
 import type { AxisState, JobInfo, ParameterValue } from '../api/schema'
 import {
-  askedAnew,
+  askedAgain,
   contents,
   endForgotten,
   FORGOTTEN,
@@ -91,11 +91,11 @@ describe('a refusal', () => {
   it('is over when the same is asked for again, and only then', () => {
     const problem = { type: 'urn:servodeck:forbidden', title: 'Forbidden', status: 403, detail: '' }
     contents.refused = { request: 'jog_start', problem, at: 0 }
-    askedAnew('watch')
+    askedAgain('watch')
     expect(contents.refused).not.toBeNull()
     let reported = 0
     const end = subscribe('refused', () => reported++)
-    askedAnew('jog_start')
+    askedAgain('jog_start')
     end()
     expect([contents.refused, reported]).toEqual([null, 1])
   })

@@ -134,7 +134,7 @@ export function setState(state: AxisState): void {
 }
 
 /** What was refused is asked for again: the refusal must not stand above what it now does. */
-export function askedAnew(request: string): void {
+export function askedAgain(request: string): void {
   if (contents.refused?.request !== request) return
   contents.refused = null
   publish('refused')

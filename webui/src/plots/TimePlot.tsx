@@ -54,7 +54,10 @@ const NO_UNIT = '–'
 const LEFT = 3
 const RIGHT = 1
 const SHORTEST_S = 1e-5
-/** Narrower than this the y axes make room for the traces: the unit takes the highest number's place. */
+/**
+ * Narrower than this the y axes make room for the traces: the unit takes the highest number's
+ * place.
+ */
 const NARROW_PX = 500
 /** Mark of a trace that leaves a fixed scale. */
 const BEYOND_PX = 7
@@ -138,7 +141,7 @@ export function TimePlot({
       remove()
       plot.destroy()
     }
-    // Built anew only when what is drawn changes in kind.
+    // Built again only when what is drawn changes in kind.
   }, [shape])
   return <div ref={box} className="time-plot" role="img" aria-label={label} />
 }

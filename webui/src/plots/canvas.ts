@@ -8,7 +8,9 @@ export interface Sheet {
   style: CSSStyleDeclaration
 }
 
-/** A canvas emptied and as large as its element, in CSS pixels; null where it cannot be drawn on. */
+/**
+ * A canvas emptied and as large as its element, in CSS pixels; null where it cannot be drawn on.
+ */
 export function sheetOf(canvas: HTMLCanvasElement): Sheet | null {
   const { clientWidth: width, clientHeight: height } = canvas
   canvas.width = width * devicePixelRatio
@@ -30,7 +32,7 @@ export function upwards(ctx: CanvasRenderingContext2D, text: string, x: number, 
   ctx.restore()
 }
 
-/** Draws anew when any of `change` does, and when the element gets another size. */
+/** Draws again when any of `change` does, and when the element gets another size. */
 export function useDrawing(
   canvas: RefObject<HTMLCanvasElement | null>,
   draw: (canvas: HTMLCanvasElement) => void,

@@ -145,7 +145,7 @@ function wheelAndCursors(
   )
 }
 
-/** Two fingers beside each other zoom and move time, one above the other every y scale. */
+/** Two fingers next to each other zoom and move time, one above the other every y scale. */
 function pinch(plot: uPlot, picture: () => Picture | null, events: Events, hand: Hand): Stop {
   let began: { fingers: Fingers; time: Span; spans: Map<string, Span> } | null = null
   const start = (event: TouchEvent) => {

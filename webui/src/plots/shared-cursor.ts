@@ -20,7 +20,7 @@ const shown = new Set<() => void>()
 let timer: ReturnType<typeof setInterval> | null = null
 
 /** While plots are in sight, and a guest is here. */
-function keepTelling(): void {
+function keepPublishing(): void {
   const wanted = shown.size > 0 && isShared(people.here)
   if (wanted) timer ??= setInterval(() => pointing.tick(isShared(people.here)), SEND_MS)
   else if (timer !== null) {
@@ -39,7 +39,7 @@ export interface Field {
 }
 
 /**
- * Shows where the others point on a plot and tells them of this page's pointer, in the data's own
+ * Shows where the others point on a plot and shows them of this page's pointer, in the data's own
  * coordinates. `draw` is to be called when the data or their places change.
  */
 function shareCursors(
@@ -55,17 +55,17 @@ function shareCursors(
   const forget = [
     subscribe('cursors', draw),
     subscribe('people', draw),
-    subscribe('people', keepTelling),
+    subscribe('people', keepPublishing),
     follow(over, name, field),
   ]
   shown.add(draw)
-  keepTelling()
+  keepPublishing()
   draw()
   const stop = () => {
     for (const each of forget) each()
     layer.remove()
     shown.delete(draw)
-    keepTelling()
+    keepPublishing()
   }
   return { draw, stop }
 }

@@ -19,7 +19,7 @@ describe('a moment on a curve of one quantity over another', () => {
     expect(nearestPoint(CURVE, SIZE, 0, 0)).toBe(3)
     expect(nearestPoint({ ...CURVE, times: [] }, SIZE, 0, 0)).toBeNull()
   })
-  it('is the last where several lie at one place, as while the axis stands', () => {
+  it('is the last where several lie at one place, as while the axis is at standstill', () => {
     const standing = { ...CURVE, x: [10, 10, 10, 10], y: [0, 0, 0, 0] }
     expect(nearestPoint(standing, SIZE, 0, 0)).toBe(3)
   })

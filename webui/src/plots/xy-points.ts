@@ -22,7 +22,8 @@ const placeOf = ({ x, y, xs, ys }: XyCurve, { width, height }: Size, i: number) 
 
 /**
  * The point of the curve that lies nearest to a place on the drawing; null without any point. Of
- * points at one place (the axis stands) it is the last, which is what others have in sight as well.
+ * points at one place (the axis is at standstill) it is the last, which is what others have in
+ * sight as well.
  */
 export function nearestPoint(curve: XyCurve, size: Size, left: number, top: number): number | null {
   let found: number | null = null

@@ -30,7 +30,7 @@ describe('y scales', () => {
       min: 20,
       max: 70,
     })
-    // Fingers that meet show a great deal, and no more than numbers can tell.
+    // Fingers that meet show a great deal, and no more than numbers can show.
     const met = pinched({ min: 0, max: 100 }, began, { apart: 0, part: 0.5 })
     expect(met.max - met.min).toBe(4000)
   })

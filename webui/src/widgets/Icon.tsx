@@ -39,7 +39,7 @@ const PATHS = {
 
 export type IconName = keyof typeof PATHS
 
-/** A line drawing; its meaning is always also written beside it or in the control's name. */
+/** A line drawing; its meaning is always also written next to it or in the control's name. */
 export function Icon({ name, size = 18 }: { name: IconName; size?: number }) {
   return (
     <svg

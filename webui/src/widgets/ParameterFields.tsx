@@ -34,7 +34,7 @@ async function readKeys(drive: string, keys: string[]): Promise<void> {
   )
 }
 
-/** Raw values as they are before a write, to take it back. */
+/** Raw values as they are before a write, to undo it. */
 function rawsOf(drive: string, keys: string[]): Record<string, number> {
   const readings = contents.readings.get(drive)
   const found: Record<string, number> = {}
@@ -46,7 +46,7 @@ function rawsOf(drive: string, keys: string[]): Record<string, number> {
 }
 
 /**
- * A few parameters as a form, in words where the manual has words. Typed values are marked and
+ * A few parameters as a form, as text where the manual has words. Typed values are marked and
  * written together; each is read back.
  */
 export function ParameterFields({

@@ -7,7 +7,7 @@ import { JobNote } from './JobNote'
 import { ProblemNote } from './ProblemNote'
 import { useAction } from './useAction'
 
-/** What a motion changed and could not put back, with one press to do so once the drive answers. */
+/** What a motion changed and could not restore, with one press to do so once the drive answers. */
 export function PendingRestoresNote({ drive }: { drive: string }) {
   const t = useT()
   const summary = useDrive(drive)

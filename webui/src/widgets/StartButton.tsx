@@ -2,11 +2,11 @@ import { Button } from '@mantine/core'
 import { type ReactNode, useEffect, useState } from 'react'
 import { useT } from '../i18n'
 
-const TOLD_MS = 12000
+const SHOWN_MS = 12000
 
 /**
- * Starts what moves an axis. What is in the way, in words, or null: the button is then dim, and a
- * press says why nothing began. A drive that misses one answer would otherwise swallow a press
+ * Starts what moves an axis. What is in the way, as text, or null: the button is then dim, and a
+ * press states why nothing began. A drive that misses one answer would otherwise swallow a press
  * unseen.
  */
 export function StartButton({
@@ -25,7 +25,7 @@ export function StartButton({
   useEffect(() => {
     if (reported === null) return
     if (busy) setTold(null)
-    const timer = setTimeout(() => setTold(null), TOLD_MS)
+    const timer = setTimeout(() => setTold(null), SHOWN_MS)
     return () => clearTimeout(timer)
   }, [reported, busy])
   return (

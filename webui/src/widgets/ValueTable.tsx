@@ -4,7 +4,7 @@ import { useT } from '../i18n'
 import { shown } from './format'
 import type { Raw } from './types'
 
-/** What every comparison tells of a parameter, whichever sides it has. */
+/** What every comparison reports of a parameter, whichever sides it has. */
 interface Compared {
   key: string
   name: string

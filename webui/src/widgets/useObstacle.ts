@@ -2,7 +2,7 @@ import type { AxisState } from '../api/schema'
 import { type Say, type T, useSay, useT } from '../i18n'
 import { useAxisState, useJob, useLink } from '../live/store'
 
-/** What keeps every motion of an axis from being started now, in words; null: nothing. */
+/** What keeps every motion of an axis from being started now, as text; null: nothing. */
 export function useObstacle(drive: string): string | null {
   const t = useT()
   const say = useSay()

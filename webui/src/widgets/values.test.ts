@@ -150,7 +150,7 @@ describe('filters', () => {
     }
     expect(matches(rows[0]!, 'speed torque')).toBe(false)
   })
-  it('tell edited, unsaved, changed, favourite and set-at-stop apart', () => {
+  it('show edited, unsaved, changed, favourite and set-at-stop apart', () => {
     expect(keys('edited')).toEqual(['2005:03'])
     expect(keys('unsaved')).toEqual(['2001:01'])
     expect(keys('changed')).toEqual(['2005:03'])

@@ -71,7 +71,7 @@ class FaultInfo:
 
     @property
     def name(self) -> str:
-        """What tells this fault from others."""
+        """What distinguishes this fault from others."""
         return self.fault or f"{self.code:#06x}"
 
 
@@ -135,7 +135,7 @@ class BrakeTimes:
     speed_rad_s: float = math.inf
 
 
-#: How the axis is brought to rest when the servo goes off or trips: (while moving, afterwards).
+#: How the axis is stopped when the servo goes off or trips: (while moving, afterwards).
 OffStop = tuple[Literal["coast", "dynamic", "ramp"], Literal["free", "dynamic", "hold"]]
 
 
@@ -145,7 +145,7 @@ class Stops:
 
     ``ramps`` gives other options their own deceleration parameter. ``slope_in_torque`` takes the
     torque back by 6087h in torque modes. With ``waits`` a state is left only when the axis
-    stands, coasting too. ``off`` tells by a parameter how the servo goes off, ``first`` and
+    stands, coasting too. ``off`` shows by a parameter how the servo goes off, ``first`` and
     ``second`` how faults of the first and second kind stop (R6L).
     """
 
@@ -174,7 +174,7 @@ class Traits:
     ``communication_fault`` is 0 for a drive that does not watch its bus. ``protections`` names
     the entries of the fault table that the protections report; a protection without one is off.
     ``disabled_bits`` are the state bits of "switch on disabled" (EP3E shows 0270h, 001:296).
-    ``index_at_once``: an axis that stands on the index takes it without moving (000:2677).
+    ``index_at_once``: an axis that is on the index takes it without moving (000:2677).
     ``homing_alarms`` are the warning and the fault of a homing that failed or ran out of time.
     ``home_offset``: the zero position lies the offset beyond home (CiA 402-2), or the position
     at home is the offset, or a parameter chooses (M6-L, 000:2213).
@@ -209,7 +209,7 @@ class Traits:
     torque_speed_limit_key: str | None = None
     zero_speed_key: str | None = None
     torque_limits: tuple[str, str] | None = None
-    """The drive's own limits (positive, negative) beside those of CiA 402, in % by their scale."""
+    """The drive's own limits (positive, negative) next to those of CiA 402, in % by their scale."""
     second_gains: GainKeys | None = None
     switching: SwitchKeys | None = None
     compensation: CompensationKeys | None = None

@@ -92,7 +92,7 @@ class LoopReader:
         gains = self._profile.gains
         hertz, integral_ms, position = 40.0, 20.0, 40.0
         if gains is not None and gains.convention == "unit":
-            # No meaning is printed: what stands there by default is taken as the moderate gains
+            # No meaning is printed: what is there by default is treated as the moderate gains
             # above, and everything else in proportion.
             hertz *= self._share(keys.speed)
             integral_ms /= self._share(keys.integral)
@@ -145,7 +145,7 @@ class LoopReader:
         )
 
     def _third(self, inertia: float) -> ThirdGains | None:
-        """Gains at rest, while gain switching is on (R6L, P06.06 to P06.08 and P06.56)."""
+        """Gains at standstill, while gain switching is on (R6L, P06.06 to P06.08 and P06.56)."""
         keys, switching = self._traits.third_gains, self._traits.switching
         if keys is None or switching is None or switching.third_delay is None:
             return None

@@ -1,6 +1,6 @@
-"""CiA 402 drives whose conventions the profile tells: gains, notches, units, faults.
+"""CiA 402 drives whose conventions the profile reports: gains, notches, units, faults.
 
-What a profile cannot say stands in the family's module (`drivers.virtual.firmware.families`); what
+What a profile cannot say is in the family's module (`drivers.virtual.firmware.families`); what
 no manual prints (thresholds of the power stage) is this virtual drive's own and said so below.
 """
 
@@ -251,11 +251,11 @@ class Cia402:
         return None
 
     def monitors(self, sources: Sources) -> dict[str, Callable[[], float]]:  # noqa: ARG002
-        """None that a profile could tell."""
+        """None that a profile could show."""
         return {}
 
     def readings(self, axis: VirtualAxis) -> dict[str, Callable[[], Number]]:
-        """Objects that a profile tells by role but that CiA 402 has no number for."""
+        """Objects that a profile reports by role but that CiA 402 has no number for."""
         item = axis.s.item
         sources: dict[str, tuple[int, float]] = {
             "dc_voltage": (k.S_VOLTAGE, 1.0),

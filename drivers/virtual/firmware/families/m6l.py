@@ -63,7 +63,7 @@ _CONDITIONS = {
 #: Homing -1 to -4 by P23.20 and P23.21 (000:2701-2756), 33 and 34 turn round at a limit switch
 #: (000:2679, 000:2693), time limit P12.09 (000:3635). P12.11 says what the home offset does
 #: (000:2213-2222). Stops 000:3006-3030; what faults do P10.01, P10.04 and P10.06 say
-#: (000:3471-3476). Default 2 of P10.04 is not among the printed meanings: taken as 1.
+#: (000:3471-3476). Default 2 of P10.04 is not among the printed meanings: treated as 1.
 TRAITS = Traits(
     commands={
         "2011:1B": {1: "restore", 2: "save"},

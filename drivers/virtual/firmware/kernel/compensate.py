@@ -1,4 +1,4 @@
-"""What is taken from the command, and added to the torque, for the load's sake."""
+"""What is subtracted from the command, and added to the torque, for the load's sake."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drivers.virtual.firmware.kernel import layout as k
 def shape_command(p, s):  # type: ignore[no-untyped-def]
     """What a notch (s² + ω²)/(s² + 2ζωs + ω²) takes from the demanded position, and its rate.
 
-    The part taken is 2ζω/(s² + 2ζωs + ω²) of the demanded speed, so that a constant position
+    The part subtracted is 2ζω/(s² + 2ζωs + ω²) of the demanded speed, so that a constant position
     passes unchanged and the swing of a load at ω is not excited.
     """
     if p[k.P_SHAPE_ON] == 0.0:

@@ -100,7 +100,7 @@ def _moving_torque(p, s, loop):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _commanded_torque(p, s, loop):  # type: ignore[no-untyped-def]
-    """Torque of the torque and impedance modes, taken back where the speed passes its limit."""
+    """Torque of the torque and impedance modes, undone where the speed passes its limit."""
     s[k.S_INTEGRAL] = 0.0
     s[k.S_SPEED_REFERENCE] = s[k.S_OMEGA]
     torque = s[k.S_T_DEMAND] if loop == k.LOOP_TORQUE else _impedance(p, s)

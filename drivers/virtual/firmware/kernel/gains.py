@@ -69,7 +69,7 @@ def select_gains(p, s, loop):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def third_share(p, s, loop):  # type: ignore[no-untyped-def]
-    """Share of the third gains, 0 to 1: they hold an axis whose command has come to rest."""
+    """Share of the third gains, 0 to 1: they hold an axis whose command has stopped."""
     resting = loop == k.LOOP_POSITION and s[k.S_V_DEMAND] == 0.0
     s[k.S_REST_T] = s[k.S_REST_T] + k.STEP_S if resting else 0.0
     on = p[k.P_THIRD_GAINS] > 0.0 and resting and s[k.S_REST_T] >= p[k.P_THIRD_DELAY]

@@ -125,7 +125,7 @@ def _generate_cyclic(p, s):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def generate(p, s):  # type: ignore[no-untyped-def]
-    """Advance the demand by one step, and tell when a commanded stop has come to rest."""
+    """Advance the demand by one step, and show when a commanded stop has stopped."""
     kind = int(p[k.P_GEN])
     if kind == k.GEN_POSITION:
         _generate_position(p, s)

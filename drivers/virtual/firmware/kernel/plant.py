@@ -2,7 +2,7 @@
 
 Friction is time-stepping on the velocity level (J. J. Moreau, "Unilateral contact and dry
 friction in finite freedom dynamics", 1988): the friction torque of a step is the one that ends it
-at rest, limited to the Coulomb torque, so nothing chatters.
+at standstill, limited to the Coulomb torque, so nothing chatters.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ def step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-
         for i in range(size):
             scratch[i] += bm[i, 2] * push
         scratch[last] = 0.0
-        # What the push over the step did not take back is taken back as an inelastic impact.
+        # What the push over the step did not take back is removed as an inelastic impact.
         beyond = _beyond(p, scratch, size)
         if size > 3:
             scratch[size - 2] += beyond

@@ -1,4 +1,4 @@
-"""Protections (004:4703-4917) and the windows that the status word tells of."""
+"""Protections (004:4703-4917) and the windows that the status word reports."""
 
 from __future__ import annotations
 

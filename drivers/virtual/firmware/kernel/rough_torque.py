@@ -20,7 +20,7 @@ def rough_command(p, s):  # type: ignore[no-untyped-def]
     if s[k.S_ROUGH_CLOCK] >= period:
         s[k.S_ROUGH_CLOCK] -= period
         s[k.S_ROUGH_HELD] = s[k.S_TORQUE_COMMAND]
-    # Half a period more, as the speed's difference is taken over one.
+    # Half a period more, as the speed's difference is calculated over one.
     late = int(0.5 * (period - 1.0) + 0.5)
     step = int(s[k.S_STEP])
     s[k.S_ROUGH_RING + step % k.ROUGH_STEPS] = s[k.S_ROUGH_HELD]
@@ -75,7 +75,7 @@ def rough_machine(p, s, x, b):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def rough_report(p, s, x, omega_before):  # type: ignore[no-untyped-def]
-    """6077h as the drive tells it, and the acceleration of this step."""
+    """6077h as the drive reports it, and the acceleration of this step."""
     s[k.S_ROUGH_ALPHA] = (x[1] - omega_before) / k.STEP_S
     if p[k.P_ROUGH_ON] == 0.0:
         s[k.S_TORQUE_REPORTED] = s[k.S_TORQUE]
@@ -88,7 +88,7 @@ def rough_report(p, s, x, omega_before):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def interpolation_error(p, angle):  # type: ignore[no-untyped-def]
-    """What the encoder reads beside the angle, in rad."""
+    """What the encoder reads next to the angle, in rad."""
     if p[k.P_ROUGH_ON] == 0.0:
         return 0.0
     return p[k.P_ROUGH_INTERPOLATION] * math.sin(p[k.P_ROUGH_INTERPOLATION_PER_REV] * angle)

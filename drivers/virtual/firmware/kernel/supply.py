@@ -1,4 +1,4 @@
-"""The power side of a step: DC bus, braking resistor, heat and load ratio."""
+"""The power side of a step: DC bus, braking resistor, heat and average load."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from drivers.virtual.firmware.kernel import layout as k
 
 @njit(nogil=True)
 def supply(p, s, x):  # type: ignore[no-untyped-def]
-    """DC bus, braking resistor, heat and load ratio."""
+    """DC bus, braking resistor, heat and average load."""
     current = s[k.S_TORQUE] / p[k.P_KT]
     s[k.S_CURRENT] = current
     copper = 3.0 * p[k.P_RESISTANCE] * current * current

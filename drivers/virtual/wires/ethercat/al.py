@@ -53,7 +53,7 @@ class AlStateMachine:
 
     @property
     def due_ns(self) -> int | None:
-        """When a pending step wants to be looked at again."""
+        """When a pending step must be checked again."""
         return None if self._target is None else self._due_ns
 
     @property

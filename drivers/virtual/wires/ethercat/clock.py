@@ -12,8 +12,9 @@ class WireClock(Protocol):
     def arrival(self, process_data: bool, cycle_ns: int, age_ns: int = 0) -> int:
         """Time of the frame being handled now; never before the last one.
 
-        ``process_data`` tells frames with logical datagrams from all others, ``cycle_ns`` is the
-        cycle of the segment (0 while there is none), ``age_ns`` how long ago the kernel saw it.
+        ``process_data`` distinguishes frames with logical datagrams from all others, ``cycle_ns``
+        is the cycle of the segment (0 while there is none), ``age_ns`` how long ago the kernel saw
+        it.
         """
 
     def now(self, until_ns: int | None = None) -> int:
@@ -97,7 +98,7 @@ class LockstepClock:
         return self._now
 
     def ahead_s(self, wire_ns: int) -> float | None:
-        """Nobody knows."""
+        """Unknown."""
         del wire_ns
         return None
 
@@ -152,7 +153,7 @@ class SteadyClock:
         return self._now
 
     def ahead_s(self, wire_ns: int) -> float | None:
-        """Nobody knows while process data flow, and without them there is nothing to wait for."""
+        """Unknown while process data flow, and without them there is nothing to wait for."""
         del wire_ns
         return None
 

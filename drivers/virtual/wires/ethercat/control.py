@@ -72,7 +72,7 @@ class Control:
         }
 
     def ready(self) -> None:
-        """Tell that frames are answered from now on."""
+        """Report that frames are answered from now on."""
         self._send({"ready": True, "interface": self._interface, **self._state()})
 
     def feed(self, data: bytes) -> None:

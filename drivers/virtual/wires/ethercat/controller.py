@@ -1,6 +1,6 @@
 """The slave controller: register memory, sync managers, FMMUs and the rules of access to them.
 
-It knows no time of its own and no drive; what a write sets off is commanded to `ControllerEvents`.
+It has no time of its own and no drive; what a write sets off is commanded to `ControllerEvents`.
 """
 
 from __future__ import annotations

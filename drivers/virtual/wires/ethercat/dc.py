@@ -84,7 +84,7 @@ class DistributedClock:
             self._slewed_ns -= difference / 8.0
 
     def activate(self, now_ns: int) -> None:
-        """A write to 981h starts or stops the pulses; start and cycle times are taken over now."""
+        """A write to 981h starts or stops the pulses; start and cycle times are adopted now."""
         self.sync0_first_ns = self.sync1_delay_ns = None
         if self._memory[reg.DC_ACTIVATION] & (_ACTIVE | _SYNC0) != (_ACTIVE | _SYNC0):
             return

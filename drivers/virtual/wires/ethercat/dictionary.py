@@ -34,7 +34,7 @@ _BITS: dict[DataType, int] = {"UINT8": 8, "UINT16": 16, "UINT32": 32}
 
 @dataclass(slots=True)
 class SyncReport:
-    """What 1C32h/1C33h tell of the synchronisation; the process data keep it up to date."""
+    """What 1C32h/1C33h report of the synchronisation; the process data keep it up to date."""
 
     mode: int = 0
     """0 free run, 1 with the sync manager event, 2 with SYNC0, 3 with SYNC1 (ETG.1020 table 59)."""
@@ -249,7 +249,7 @@ class CoeDictionary:
             raise SdoAbort(ABORT_DEVICE_STATE)
         if len(data) > size:
             raise SdoAbort(ABORT_TOO_LONG)
-        # A count printed as UINT16 (004:1437) is also taken in the standard's 8 bits.
+        # A count printed as UINT16 (004:1437) is also accepted in the standard's 8 bits.
         if len(data) < size and subindex:
             raise SdoAbort(ABORT_TOO_SHORT)
         value = int.from_bytes(data, "little")

@@ -28,7 +28,7 @@ class FileTrouble:
     busy: int = 0
     """How often each packet is answered by "busy" before it is taken."""
     boot_only: bool = False
-    """Files are taken in BOOT only."""
+    """Files are accepted in BOOT only."""
 
 
 class FirmwareStore:

@@ -2,7 +2,7 @@
 
 A request waits ``delay_ns`` before it is answered, one at a time: meanwhile the next one stays in
 sync manager 0, which is then full. A lost answer is repeated when the master toggles the repeat
-request; a request that comes twice with the same counter is taken once.
+request; a request that comes twice with the same counter is accepted once.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Mailbox:
         self._foe = foe
         self.delay_ns = 0
         self.muted = False
-        """Trouble: requests are taken and never answered."""
+        """Trouble: requests are accepted and never answered."""
         self.die_after_segments: int | None = None
         """Trouble: no answer after this many segments of a segmented transfer."""
         self.open = False
@@ -86,7 +86,7 @@ class Mailbox:
         self._queue.clear()
 
     def at(self, now_ns: int) -> None:
-        """Time of the access that comes next; sync managers know no time."""
+        """Time of the access that comes next; sync managers have no time."""
         self._now_ns = now_ns
 
     def run(self, now_ns: int) -> None:

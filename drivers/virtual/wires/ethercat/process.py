@@ -2,7 +2,7 @@
 
 With a SYNC pulse the physics run on the slave's own grid and are computed lazily, when a frame
 comes; a frame that comes too late leaves the outputs of the cycle before in force, as in a drive.
-With SYNC1 beside a faster SYNC0, outputs and inputs are exchanged at SYNC1, and SYNC0 is the
+With SYNC1 next to a faster SYNC0, outputs and inputs are exchanged at SYNC1, and SYNC0 is the
 drive's own cycle (ETG.1020 clause 22, sync type 3).
 """
 

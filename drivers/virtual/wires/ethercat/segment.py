@@ -69,7 +69,7 @@ class Segment:
     def process_frame(self, frame: bytes, age_ns: int = 0, held: bool = False) -> bytes | None:
         """One frame from the master; None when nothing comes back.
 
-        ``age_ns`` is how long ago it arrived, where the network stack tells. A frame that the
+        ``age_ns`` is how long ago it arrived, where the network stack reports. A frame that the
         caller has held back for `hold_ns` comes again as ``held``.
         """
         self.reply_delay_ns = self.hold_ns = 0

@@ -180,7 +180,7 @@ class SegmentServer:
 
 
 def _age_ns(ancillary: list[tuple[int, int, bytes]]) -> int:
-    """How long ago the kernel saw the frame; 0 if it does not tell or its clock was set."""
+    """How long ago the kernel saw the frame; 0 if it does not report or its clock was set."""
     for level, kind, data in ancillary:
         if level == socket.SOL_SOCKET and kind == _SO_TIMESTAMPNS and len(data) >= 16:
             seconds, nanoseconds = struct.unpack_from("qq", data)

@@ -48,7 +48,7 @@ BOOT_LAYOUT = (
 
 @dataclass(frozen=True, slots=True)
 class SlaveIdentity:
-    """What tells two drives of one family apart."""
+    """What distinguishes two drives of one family."""
 
     serial: int = 0
     alias: int = 0
@@ -146,7 +146,7 @@ class Slave:
                 self._show()
                 self.process.skip_to(now_ns)
             else:
-                self._keep_house(min(event, now_ns))
+                self._housekeeping(min(event, now_ns))
         self._now_ns = now_ns
         self.mailbox.at(now_ns)
         self.process.at(now_ns)
@@ -158,7 +158,7 @@ class Slave:
             self.al.retry(now_ns)
             self._show()
 
-    def _keep_house(self, now_ns: int) -> None:
+    def _housekeeping(self, now_ns: int) -> None:
         """Keep the drive alive where no SYNC0 does, once a millisecond at most."""
         self._housekeeping_ns = now_ns + _HOUSEKEEPING_NS
         if self.process.next_tick_ns is None:
@@ -188,7 +188,7 @@ class Slave:
     def _show(self) -> None:
         self.controller.show_state(self.al.status, self.al.code)
 
-    # -- what the controller tells --------------------------------------------------------------
+    # -- what the controller reports --------------------------------------------------------------
 
     def state_requested(self, control: int, now_ns: int) -> None:
         """The master has written AL control."""

@@ -3,41 +3,41 @@ import type { Texts } from '../types'
 /** Log-in, control, remote support, accounts. */
 export const people = {
   'page.people': ['People', '人员'],
-  'door.logIn': ['Log in', '登录'],
-  'door.logOut': ['Log out', '退出登录'],
-  'door.in': ['Logged in as {name}', '已登录：{name}'],
-  'door.name': ['Name', '姓名'],
-  'door.password': ['Password', '密码'],
-  'door.newPassword': ['New password', '新密码'],
-  'door.again': ['New password again', '再次输入新密码'],
-  'door.differs': ['The two are not the same.', '两次输入不一致。'],
-  'door.passwordRule': [
+  'login.logIn': ['Log in', '登录'],
+  'login.logOut': ['Log out', '退出登录'],
+  'login.in': ['Logged in as {name}', '已登录：{name}'],
+  'login.name': ['Name', '姓名'],
+  'login.password': ['Password', '密码'],
+  'login.newPassword': ['New password', '新密码'],
+  'login.again': ['New password again', '再次输入新密码'],
+  'login.differs': ['The two are not the same.', '两次输入不一致。'],
+  'login.passwordRule': [
     '10 characters or more; several words are good',
     '至少 10 个字符，建议用多个词',
   ],
-  'door.setUp': ['First administrator of this station', '本站的首位管理员'],
-  'door.setUpText': [
+  'login.setUp': ['First administrator of this station', '本站的首位管理员'],
+  'login.setUpText': [
     'Nobody can log in yet. The person at the machine creates the first account.',
     '目前无人可以登录。请由机器旁的人员创建首个账户。',
   ],
-  'door.setUpDo': ['Create the account', '创建账户'],
-  'door.certificate': ['Certificate for this phone or computer', '供此手机或计算机使用的证书'],
-  'door.certificateHelp': [
+  'login.setUpDo': ['Create the account', '创建账户'],
+  'login.certificate': ['Certificate for this phone or computer', '供此手机或计算机使用的证书'],
+  'login.certificateHelp': [
     'Install it as a trusted authority; the browser then shows no warning here. Compare its SHA-256 fingerprint with the one on the console of the station first. It is valid only for this station and private networks.',
     '将其安装为受信任的证书颁发机构后，浏览器在此不再警告。安装前请将其 SHA-256 指纹与本站控制台上的指纹核对。它只能为本站和专用网络作证明。',
   ],
-  'door.code': ['Code', '代码'],
-  'door.codeText': [
+  'login.code': ['Code', '代码'],
+  'login.codeText': [
     'It is shown in the terminal in which servodeck was started.',
     '显示在启动 servodeck 的终端中。',
   ],
-  'door.join': ['You are invited', '您已受邀'],
-  'door.joinText': [
+  'login.join': ['You are invited', '您已受邀'],
+  'login.joinText': [
     'You will see this station. The people there see your page and your pointer, and everything you do is logged.',
     '您将看到本站。现场人员会看到您的页面和指针，您的所有操作都会被记录。',
   ],
-  'door.joinCode': ['The person on site gives it to you.', '由现场人员告知。'],
-  'door.joinDo': ['Join', '进入'],
+  'login.joinCode': ['The person on site gives it to you.', '由现场人员告知。'],
+  'login.joinDo': ['Join', '进入'],
 
   'control.askFor': ['Ask for control', '请求控制权'],
   'control.override': ['Take control now (stops what moves)', '立即接管（停止运动）'],

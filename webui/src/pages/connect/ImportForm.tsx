@@ -50,7 +50,7 @@ export function ImportForm({
     look.run(async () => {
       setFile(chosen)
       setDevices([])
-      // What was said of another file must not be taken for this one's.
+      // What was said of another file must not be mistaken for this one's.
       setId(null)
       setMade(null)
       start.clear()

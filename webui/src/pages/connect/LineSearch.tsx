@@ -8,7 +8,7 @@ import { JobNote } from '../../widgets/JobNote'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 
-/** A serial line whose baud rate nobody knows; virtual wires have none. */
+/** A serial line whose baud rate is unknown; virtual wires have none. */
 export function isSerial(url: string): boolean {
   return /^(modbus|mlink):\/\/(?!virtual\d+(\?|$))[^?]+/.test(url)
 }

@@ -126,7 +126,7 @@ function Found({ found }: { found: FoundDrive }) {
   const [profile, setProfile] = useState(found.matches[0]?.profile ?? '')
   const [name, setName] = useState('')
   const [accept, setAccept] = useState(false)
-  const [doubted, setDoubted] = useState(false)
+  const [notListed, setNotListed] = useState(false)
   const reload = () => ask(api.GET('/api/v1/profiles')).then(setProfiles, () => {})
   useEffect(() => {
     void reload()
@@ -147,7 +147,7 @@ function Found({ found }: { found: FoundDrive }) {
     )
     // Agreed to for one try, and only after the difference has been reported.
     setAccept(false)
-    setDoubted(!added)
+    setNotListed(!added)
   }
   /** A profile was made for this drive: offer it, with how well it fits. */
   const take = async (made: ImportedDescription) => {
@@ -230,7 +230,7 @@ function Found({ found }: { found: FoundDrive }) {
               {t('connect.secondPort', { name: drive.name })}
             </Button>
           ))}
-      {!used && doubted && (
+      {!used && notListed && (
         <Checkbox
           label={t('connect.acceptDifference')}
           checked={accept}

@@ -1,7 +1,7 @@
 import type { Quality } from '../../api/schema'
 
-/** The pictures of the segment tell these, and a counter above tells the repeats. */
-const TOLD_ELSEWHERE = /^(cyclic_(?!bus_load)|late_below_|mailbox_repeats$)/
+/** The pictures of the segment show these, and a counter above shows the repeats. */
+const SHOWN_ELSEWHERE = /^(cyclic_(?!bus_load)|late_below_|mailbox_repeats$)/
 const UNITS: Record<string, string> = { us: 'µs', ms: 'ms', percent: '%', hz: 'Hz' }
 const FIXED: Record<string, string> = { baudrate: 'Bd' }
 
@@ -15,7 +15,7 @@ export interface Figure {
 
 export function figures(details: Quality['details']): Figure[] {
   return Object.entries(details)
-    .filter(([name]) => !TOLD_ELSEWHERE.test(name))
+    .filter(([name]) => !SHOWN_ELSEWHERE.test(name))
     .map(([name, value]) => {
       const suffix = /_([a-z]+)$/.exec(name)?.[1] ?? ''
       const unit = UNITS[suffix]

@@ -4,7 +4,7 @@ import { useT } from '../../i18n'
 import { ConfirmDelete } from '../../widgets/ConfirmDelete'
 import { useAction } from '../../widgets/useAction'
 
-/** Sets are put aside and can be taken back; a file of the station is gone for good. */
+/** Sets are archived and can be restored; a file of the station is gone for good. */
 export function DeleteEntry({
   entry,
   onClose,

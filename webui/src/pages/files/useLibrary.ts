@@ -7,7 +7,7 @@ import { type Filters, queryOf } from './filters'
 
 const PAGE = 50
 
-/** What fits the filters, newest first; asked anew a moment after a filter changed. */
+/** What fits the filters, newest first; asked again a moment after a filter changed. */
 export function useLibrary(filters: Filters) {
   const { open } = useLink()
   const [entries, setEntries] = useState<LibraryEntry[] | null>(null)

@@ -22,7 +22,7 @@ const PLACES: { block: Block; x: number; y: number; width?: number }[] = [
   { block: 'feedback_filter', x: 630, y: 200 },
 ]
 /** Those that act on several loops stand below, without wires. */
-const BESIDE: Block[] = ['level', 'inertia', 'switching', 'adaptive', 'compensation', 'limits']
+const SIDE_BLOCKS: Block[] = ['level', 'inertia', 'switching', 'adaptive', 'compensation', 'limits']
 
 const SUM_POSITION = 168
 const SUM_SPEED = 356
@@ -39,7 +39,7 @@ export function LoopPicture({
   onBlock: (block: Block) => void
 }) {
   const t = useT()
-  const beside = BESIDE.filter((block) => present.has(block))
+  const sideBlocks = SIDE_BLOCKS.filter((block) => present.has(block))
   const has = (block: Block) => present.has(block)
   const wires = [
     `M140 ${LINE}H${SUM_POSITION - 9}`,
@@ -86,11 +86,11 @@ export function LoopPicture({
             {t('block.motor')}
           </text>
         </g>
-        {beside.map((block, i) => (
+        {sideBlocks.map((block, i) => (
           <Box
             key={block}
             block={block}
-            x={78 + (i * (1120 - 156)) / Math.max(1, BESIDE.length - 1)}
+            x={78 + (i * (1120 - 156)) / Math.max(1, SIDE_BLOCKS.length - 1)}
             y={298}
             width={WIDTH}
             present

@@ -15,7 +15,7 @@ import { useAction } from '../../widgets/useAction'
 const ALIVE_MS = 1000
 
 /**
- * Overruling terminals: only for a while, only by the page that began it, and put back when it
+ * Overruling terminals: only for a while, only by the page that began it, and restored when it
  * ends, however it ends.
  */
 export function ForcingPanel({

@@ -60,7 +60,7 @@ export function TerminalTable({
         : api.PUT('/api/v1/drives/{drive_id}/parameters/{key}', { params, body }),
     )
     setReadings(drive, [value])
-    // Until the terminals are read anew, no second one can be given the same function unseen.
+    // Until the terminals are read again, no second one can be given the same function unseen.
     await onChanged()
   }
   /** One bit of a shared parameter: the others as the drive has them now, not as last seen. */

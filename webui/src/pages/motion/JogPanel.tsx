@@ -13,7 +13,7 @@ import { type JogSettings, useJog } from './useJog'
 import { useMotionNumbers } from './useMotionNumbers'
 
 /** How long it is informed of the reason why a press began nothing. */
-const TOLD_MS = 12000
+const SHOWN_MS = 12000
 
 /** Hold to run: by mouse, finger or arrow key; whatever ends the hold stops the axis. */
 export function JogPanel({
@@ -48,10 +48,13 @@ export function JogPanel({
   const [reported, setTold] = useState<string | null>(null)
   useEffect(() => {
     if (reported === null) return
-    const timer = setTimeout(() => setTold(null), TOLD_MS)
+    const timer = setTimeout(() => setTold(null), SHOWN_MS)
     return () => clearTimeout(timer)
   }, [reported])
-  /** A press that begins nothing says why: a lost answer of the drive is soon over and unseen. */
+  /**
+   * A press that begins nothing states the reason: a lost answer of the drive is soon over and
+   * unseen.
+   */
   const begin = (towards: -1 | 1): boolean => {
     if (hold.held !== null) return press(towards) // which ends it
     const begun = obstacle === null && press(towards)

@@ -2,7 +2,7 @@ import { useT } from '../../i18n'
 import { NumberField } from '../../widgets/NumberField'
 import type { Typed } from './useMotionNumbers'
 
-/** Units of an axis by quantity, as its state tells them. */
+/** Units of an axis by quantity, as its state shows them. */
 type Units = Record<string, string>
 
 interface Field extends Typed {
@@ -11,7 +11,7 @@ interface Field extends Typed {
   disabled?: boolean
 }
 
-/** How far the axis may go from where it stands. */
+/** How far the axis may go from where it is. */
 export function TravelLimit({ units, ...field }: Field) {
   const t = useT()
   return (

@@ -1,4 +1,4 @@
-/** What ends a hold, in words that go to the server's log. */
+/** What ends a hold, as text that go to the server's log. */
 export type ReleaseReason =
   | 'released'
   | 'pointer cancelled'

@@ -22,7 +22,7 @@ describe('the unit that motions are typed in', () => {
     expect(travelUnit('mm', null, state).name).toBe('rev')
     expect(travelUnit('°', screw, state).name).toBe('rev')
   })
-  it('shows what the server tells in revolutions and rpm', () => {
+  it('shows what the server reports in revolutions and rpm', () => {
     const unit = travelUnit('mm', screw, state)
     expect(unit.units).toMatchObject({
       position: 'mm',

@@ -6,7 +6,7 @@ export type TravelName = NonNullable<MoveRequest['unit']>
  * The unit in which motions of an axis are typed and shown: revolutions, or travel of its load.
  *
  * Commands carry its name and the numbers as typed; the server converts them. Here only what the
- * server tells in revolutions is converted, to be shown.
+ * server reports in revolutions is converted, to be shown.
  */
 export interface TravelUnit {
   name: TravelName
@@ -14,7 +14,9 @@ export interface TravelUnit {
   units: Record<string, string>
   travel: (revolutions: number) => number
   speed: (rpm: number) => number
-  /** The gentlest acceleration that the drive can do, in this unit; null where nothing bounds it. */
+  /**
+   * The gentlest acceleration that the drive can do, in this unit; null where nothing bounds it.
+   */
   gentlest: number | null
 }
 
@@ -83,7 +85,7 @@ export function roundedUp(value: number, digits: number): number {
   return Number((near + step).toPrecision(digits))
 }
 
-/** Place of a remembered number: numbers of one unit are never taken for another. */
+/** Place of a remembered number: numbers of one unit are never mistaken for another. */
 export function placeIn(unit: TravelUnit, name: string): string {
   return unit.name === 'rev' ? name : `${name}.${unit.name}`
 }

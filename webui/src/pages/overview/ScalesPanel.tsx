@@ -26,7 +26,7 @@ export function ScalesPanel({ drive }: { drive: string }) {
       ),
     [drive],
   )
-  // Read anew when the units that the axis shows change: somebody set the gear.
+  // Read again when the units that the axis shows change: somebody set the gear.
   useEffect(() => void load(), [drive, names?.position, names?.velocity])
   const change = (work: () => Promise<ScalesInfo>) => act.run(async () => setInfo(await work()))
   return (

@@ -17,7 +17,7 @@ import { setEdit, useEdits, writeEdits } from './edits'
 import { editable } from './Grid'
 import { editText, pendingKey, range, readingText } from './GridRow'
 import { MotionClass } from './MotionClass'
-import { OtherDoor } from './OtherDoor'
+import { OtherPlace } from './OtherPlace'
 
 /** Everything about one parameter, and its editor: enum, bits, raw and physical. */
 export function Detail({
@@ -93,7 +93,7 @@ export function Detail({
         </p>
       )}
       {editable(row) && <Editor drive={drive} row={row} />}
-      {row.motion === 'energises' && <OtherDoor drive={drive} row={row} />}
+      {row.motion === 'energises' && <OtherPlace drive={drive} row={row} />}
       <div className="row">
         {row.access !== 'wo' && row.reachable && (
           <Button loading={act.busy} onClick={() => void read()}>

@@ -132,7 +132,7 @@ function ValueCell({ row, edit, asRaw, reading, onBegin }: Props & { reading: Pa
       type="button"
       tabIndex={-1}
       className="value-button"
-      // With what stands on it: voice control presses a button by its visible words.
+      // With what is on it: voice control presses a button by its visible words.
       aria-label={`${t('parameters.edit', { name: row.name })}: ${edit ? `${text} ${edit.text}` : text}`}
       onClick={(event) => {
         if (event.detail === 1) onBegin(row.key, null)

@@ -14,7 +14,7 @@ import { ParameterTable } from './ParameterTable'
 /** Drives whose values were read afresh since this page was opened. */
 const readOnce = new Set<string>()
 
-/** A fresh read on connecting, so that nothing stale is ever taken for the drive's value. */
+/** A fresh read on connecting, so that nothing stale is ever mistaken for the drive's value. */
 async function readAfresh(drive: string): Promise<void> {
   if (readOnce.has(drive)) return
   readOnce.add(drive)

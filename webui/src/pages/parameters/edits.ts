@@ -112,7 +112,7 @@ function settle(drive: string, results: WriteResult[]): void {
     if (result.ok) {
       edits.delete(result.key)
       problems.delete(result.key)
-      differs.delete(result.key) // compared with the old value; a new comparison will tell
+      differs.delete(result.key) // compared with the old value; a new comparison will show
     } else if (result.problem) problems.set(result.key, result.problem)
   }
   change(drive, { edits, problems, differs })

@@ -2,7 +2,7 @@ import { Button, NativeSelect, TextInput } from '@mantine/core'
 import { type SyntheticEvent, useCallback, useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { AccountInfo, Role } from '../../api/schema'
-import { NewPassword } from '../../app/Door'
+import { NewPassword } from '../../app/LogInForms'
 import { useT } from '../../i18n'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
@@ -119,7 +119,7 @@ function AddAccount({ onMade }: { onMade: () => void }) {
   return (
     <form onSubmit={submit} className="fields">
       <TextInput
-        label={t('door.name')}
+        label={t('login.name')}
         value={name}
         maxLength={60}
         autoComplete="off"

@@ -25,7 +25,7 @@ export function BundlesPanel() {
   }, [])
   useEffect(() => {
     if (!open) return
-    const again = () => void refresh().catch(() => {}) // the frame tells that the link is gone
+    const again = () => void refresh().catch(() => {}) // the frame shows that the link is gone
     again()
     const timer = setInterval(again, PERIOD_MS)
     return () => clearInterval(timer)

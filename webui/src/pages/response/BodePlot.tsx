@@ -142,7 +142,7 @@ function BodePart({
       plotted.current = null
       plot.destroy()
     }
-    // Built anew only when what is drawn changes in kind.
+    // Built again only when what is drawn changes in kind.
   }, [shape])
   useEffect(() => {
     plotted.current?.setData(data(drawn, part))

@@ -1,6 +1,6 @@
 import { type CSSProperties } from 'react'
 
-/** Names of curves beside their lines, for plots without a legend of their own. */
+/** Names of curves next to their lines, for plots without a legend of their own. */
 export function Legend({ of }: { of: { label: string; color: string; dashed?: boolean }[] }) {
   return (
     <ul className="legend">

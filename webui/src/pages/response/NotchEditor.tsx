@@ -165,7 +165,7 @@ export function NotchEditor({ drive, notches }: { drive: string; notches: Notche
 
 const same = (a: NotchShape | null, b: NotchShape | null) => JSON.stringify(a) === JSON.stringify(b)
 
-/** What is known of one notch beside its values. */
+/** What is known of one notch next to its values. */
 function SlotNote({ of }: { of: NotchSlotInfo }) {
   const say = useSay()
   const note = say.message(of.note_message, of.note)

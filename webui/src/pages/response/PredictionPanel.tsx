@@ -17,7 +17,10 @@ import { usePrediction } from './usePrediction'
 const VIEWS = ['closed', 'open', 'sensitivity', 'step'] as const
 type View = (typeof VIEWS)[number]
 
-/** The speed loop as it would be with the notches and gains tried here, beside the loop as it is. */
+/**
+ * The speed loop as it would be with the notches and gains tried here, compared with the loop as it
+ * is.
+ */
 export function PredictionPanel({
   drive,
   file,

@@ -53,7 +53,7 @@ export function StepPlot({
       plotted.current = null
       plot.destroy()
     }
-    // Built anew only when what is drawn changes in kind.
+    // Built again only when what is drawn changes in kind.
   }, [shape])
   useEffect(() => {
     plotted.current?.setData(data(traces))

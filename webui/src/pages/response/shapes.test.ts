@@ -27,7 +27,7 @@ const sweep = (resonances: Resonance[], more: Partial<Sweep> = {}) =>
   }) as unknown as Sweep
 
 describe('the shape of a response', () => {
-  it('tells how much inertia hangs behind the soft part', () => {
+  it('shows how much inertia hangs behind the soft part', () => {
     // Two masses and a spring: f_r² / f_a² = 1 + J_load / J_motor.
     expect(judge(sweep([valley(100), peak(200)]), null).ratio).toBeCloseTo(3, 9)
   })

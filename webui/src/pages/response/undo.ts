@@ -2,7 +2,7 @@ import { useSyncExternalStore } from 'react'
 import type { Problem } from '../../api/schema'
 import { publish } from '../../live/store'
 
-/** What a write answers: raw values that take it back, and those that it left. */
+/** What a write answers: raw values that undo it, and those that it left. */
 export interface Written {
   before: Record<string, number>
   after?: Record<string, number> | null
@@ -52,7 +52,7 @@ export function remember(drive: string, what: Change['what'], done: Written): vo
   store(drive, [...read(drive), change].slice(-KEPT))
 }
 
-/** Whether a change was not taken back because a value of it was changed again since. */
+/** Whether a change was not undone because a value of it was changed again since. */
 export const changedSince = (problem: Problem | null, before: Record<string, number>): boolean =>
   problem?.type === 'urn:servodeck:not-allowed' &&
   problem.parameter != null &&
@@ -73,7 +73,7 @@ export function noteUndone(): void {
 /** Take the newest change off the list, once it has been undone. */
 export const forget = (drive: string) => store(drive, read(drive).slice(0, -1))
 
-/** Changes to an axis that can be taken back, newest last. */
+/** Changes to an axis that can be undone, newest last. */
 export const useChanges = (drive: string): Change[] =>
   useSyncExternalStore(
     (listener) => {

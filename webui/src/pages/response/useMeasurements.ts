@@ -43,7 +43,7 @@ export function useMeasurements(kind: 'sweep-' | '' = 'sweep-') {
   return { list, problem, refresh, asked }
 }
 
-/** One stored measurement, evaluated anew by the server; null while it is not there. */
+/** One stored measurement, evaluated again by the server; null while it is not there. */
 export function useMeasurement(file: string | null) {
   const [found, setFound] = useState<{ file: string; content: MeasurementContent } | null>(null)
   const [problem, setProblem] = useState<Problem | null>(null)

@@ -21,7 +21,7 @@ const FIGURES: { name: string; of: (m: Measurement) => number | null; step?: boo
 
 const scaled = (value: number | null, by: number) => (value === null ? null : value * by)
 
-/** Figures per trace from the raw samples, and how honest each trace's times are. */
+/** Figures per trace from the raw samples, and how exact each trace's times are. */
 export function Measurements({
   frame,
   shown,

@@ -48,7 +48,7 @@ import { XyPanel } from './XyPanel'
 
 const TABLE_MS = 250
 const FRAME_MS = 40
-/** A picture that stands is asked for again only for what stands beside it. */
+/** A picture that stands is asked for again only for what is next to it. */
 const FROZEN_MS = 500
 const TABS = ['measure', 'spectrum', 'spectrogram', 'xy', 'maths', 'keep'] as const
 type Tab = (typeof TABS)[number]

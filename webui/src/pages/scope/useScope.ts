@@ -16,7 +16,7 @@ export function useSetup(): [ScopeSetup, ChangeSetup, boolean] {
   const [fresh, setFresh] = useState(() => storedSetup() === null)
   const latest = useRef(setup)
   const change = useCallback<ChangeSetup>((next) => {
-    // Several changes may come before the page is rendered anew: none takes another one back.
+    // Several changes may come before the page is rendered again: none takes another one back.
     latest.current = typeof next === 'function' ? next(latest.current) : next
     storeSetup(latest.current)
     setFresh(false)

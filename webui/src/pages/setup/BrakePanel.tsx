@@ -11,7 +11,7 @@ import { useRows } from '../../widgets/profile-text/rows'
 import { useFetched } from '../../widgets/useFunctions'
 import { brakeCourse } from './brake'
 
-/** Settings of the holding brake beside the course that follows from them. */
+/** Settings of the holding brake next to the course that follows from them. */
 export function BrakePanel({ drive, brake }: { drive: string; brake: BrakeTiming | null }) {
   const t = useT()
   if (!brake) {

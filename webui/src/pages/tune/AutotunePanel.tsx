@@ -34,7 +34,7 @@ export function AutotunePanel({
   drive: string
   state: AxisState | null
   limits: Limits | null
-  /** What is in the way of a measurement, in words. */
+  /** What is in the way of a measurement, as text. */
   obstacle: string | null
   cycleMs: number
   /** Gains that the drive holds now, raw. */

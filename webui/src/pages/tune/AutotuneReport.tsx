@@ -130,7 +130,7 @@ function Verification({ drive, result }: { drive: string; result: Autotune }) {
         }
       : null
   const predicted = usePrediction(drive, file, applied?.notches ?? [], gains)
-  const anew = useMemo(() => {
+  const corrected = useMemo(() => {
     const { frequency_hz, closed_db, closed_deg } = again ?? {}
     if (!frequency_hz || !closed_db || !closed_deg) return null
     const label = t('autotune.predictedAgain')
@@ -141,7 +141,7 @@ function Verification({ drive, result }: { drive: string; result: Autotune }) {
     if (!verified) return []
     const measured = measuredCurve(verified.sweep, t('response.measured'), colors[0] ?? '')
     const [low, high] = verified.sweep.valid_band_hz
-    if (!predicted.found) return anew ? [measured, anew] : [measured]
+    if (!predicted.found) return corrected ? [measured, corrected] : [measured]
     const { frequency_hz, closed_db, closed_deg } = predicted.found
     const inside = <V,>(values: V[]) =>
       values.filter((_, i) => {
@@ -149,15 +149,15 @@ function Verification({ drive, result }: { drive: string; result: Autotune }) {
         return f >= low && f <= high
       })
     const before = {
-      label: t(anew ? 'autotune.predictedBefore' : 'autotune.predicted'),
+      label: t(corrected ? 'autotune.predictedBefore' : 'autotune.predicted'),
       color: colors[1] ?? '',
       dashed: true,
       frequency: inside(frequency_hz),
       magnitude: inside(closed_db),
       phase: inside(closed_deg),
     }
-    return anew ? [measured, anew, before] : [measured, before]
-  }, [verified, predicted.found, dark, anew, t('autotune.predicted')])
+    return corrected ? [measured, corrected, before] : [measured, before]
+  }, [verified, predicted.found, dark, corrected, t('autotune.predicted')])
   if (!verified) return null
   return (
     <>
@@ -168,7 +168,7 @@ function Verification({ drive, result }: { drive: string; result: Autotune }) {
           measured: hertz(verified.measured_bandwidth_hz),
         })}
       </p>
-      {again && anew && (
+      {again && corrected && (
         <p className="num">
           {t('autotune.bandwidthsBefore', {
             predicted: hertz(again.predicted.bandwidth_hz),

@@ -18,7 +18,7 @@ import { complete, fieldsOf, initialValues, ToolForm, useTool, type Values } fro
 
 type Text = (name: string, values?: Record<string, string>) => string
 
-/** What a person states about one test; taken back after it. */
+/** What a person states about one test; undone after it. */
 const STATED = ['brake_supply_cut', 'nothing_hangs', 'load_supported'] as const
 /** Below this share of its limit slip is what an encoder and a settling hub show. */
 const CREPT = 0.05
@@ -33,7 +33,7 @@ export function BrakePanel({
 }: {
   drive: string
   limits: Limits | null
-  /** What is in the way of a measurement, in words. */
+  /** What is in the way of a measurement, as text. */
   obstacle: string | null
   cycleMs: number
 }) {

@@ -27,7 +27,7 @@ export function FirstPowerPanel({
   cycleMs,
 }: {
   drive: string
-  /** What is in the way of a measurement, in words. */
+  /** What is in the way of a measurement, as text. */
   obstacle: string | null
   cycleMs: number
 }) {

@@ -5,7 +5,7 @@ import type { Section, useSections } from './sections'
 
 /**
  * One step of the path under its title, which opens and folds it; what was typed stays. What was
- * never open is not drawn: values of the axis come many times a second, and draw all forms anew.
+ * never open is not drawn: values of the axis come many times a second, and draw all forms again.
  */
 export function Fold({
   of,

@@ -27,7 +27,7 @@ export function FrictionPanel({
 }: {
   drive: string
   limits: Limits | null
-  /** What is in the way of a measurement, in words. */
+  /** What is in the way of a measurement, as text. */
   obstacle: string | null
   cycleMs: number
 }) {

@@ -28,7 +28,7 @@ export function HealthPanel({
 }: {
   drive: string
   limits: Limits | null
-  /** What is in the way of a measurement, in words. */
+  /** What is in the way of a measurement, as text. */
   obstacle: string | null
   cycleMs: number
 }) {
@@ -97,7 +97,8 @@ function Repeat({
   const t = useT()
   const baseline = health.baseline
   if (!baseline) return null
-  // The baseline's own limits count, whatever the form of the limits has now: only then it compares.
+  // The baseline's own limits count, whatever the form of the limits has now: only then it
+  // compares.
   const settings = { ...baseline.settings, rounds: CHECK_ROUNDS } as unknown as HealthSettings
   return (
     <>

@@ -27,7 +27,7 @@ export function InertiaPanel({
   drive: string
   state: AxisState | null
   limits: Limits | null
-  /** What is in the way of a measurement, in words. */
+  /** What is in the way of a measurement, as text. */
   obstacle: string | null
   cycleMs: number
 }) {
@@ -132,7 +132,7 @@ const ROWS = [
 ] as const
 
 /** What few machines have: shown where it was found. */
-const BESIDE = [
+const LOAD_ROWS = [
   { name: 'place_nm', text: 'inertia.place', help: 'inertia.placeHelp', unit: 'N·m' },
   { name: 'fan_nm', text: 'inertia.fan', help: 'inertia.fanHelp', unit: 'N·m' },
 ] as const
@@ -151,8 +151,8 @@ export function InertiaResult({ result }: { result: Inertia }) {
     result.load_ratio_against,
   )
   const si = result.unit === 'SI'
-  const beside = BESIDE.filter(({ name }) => result[name] != null)
-  const rows = [...ROWS, ...beside]
+  const loadRows = LOAD_ROWS.filter(({ name }) => result[name] != null)
+  const rows = [...ROWS, ...loadRows]
   return (
     <>
       <p className={`note ${result.identifiable ? 'good' : 'warn'}`}>
@@ -188,7 +188,7 @@ export function InertiaResult({ result }: { result: Inertia }) {
         {!si && `${t('inertia.perRated')} `}
         {t('inertia.fit', { r2: fixed(result.r2, 4) })}
         {against && ` ${t('inertia.against', { what: against })}`}
-        {beside.map(({ help }) => ` ${t(help)}`)}
+        {loadRows.map(({ help }) => ` ${t(help)}`)}
       </p>
     </>
   )

@@ -8,7 +8,7 @@ import { CyclicExchange } from '../connect/CyclicExchange'
 import { LimitFields, type useLimits } from '../response/limits'
 import type { Check } from './steps'
 
-/** What is needed before anything moves, in words, with the way to it. */
+/** What is needed before anything moves, as text, with the way to it. */
 export function PreChecks({
   drive,
   checks,

@@ -20,7 +20,7 @@ import { complete, fieldsOf, initialValues, ToolForm, useTool, type Values } fro
 type Text = (name: string, values?: Record<string, string>) => string
 
 const FUNCTIONS = ['sto', 'ss1', 'limit_positive', 'limit_negative', 'speed_limit'] as const
-/** What a person states about one check; asked anew for the next. */
+/** What a person states about one check; asked again for the next. */
 const STATED = ['nothing_hangs', 'load_supported'] as const
 
 /** A safety function that a person triggers by hand, recorded and signed; it certifies nothing. */
@@ -32,7 +32,7 @@ export function SafetyPanel({
 }: {
   drive: string
   limits: Limits | null
-  /** What is in the way of a measurement, in words. */
+  /** What is in the way of a measurement, as text. */
   obstacle: string | null
   cycleMs: number
 }) {

@@ -7,9 +7,9 @@ const after = { '2005:03': 900, '2005:04': 20, '2008:01': 1 }
 describe('a design that was applied', () => {
   it.each([
     ['acts as long as the gains are its own', { '2005:03': 900, '2005:04': 20 }, 'acts'],
-    ['is taken back when all are as before', { '2005:03': 400, '2005:04': 20 }, 'takenBack'],
+    ['is undone when all are as before', { '2005:03': 400, '2005:04': 20 }, 'takenBack'],
     ['is another one after a change by hand', { '2005:03': 700, '2005:04': 20 }, 'changed'],
-    ['is believed where no gain tells', { '2010:01': 3 }, 'acts'],
+    ['is trusted where no gain shows it', { '2010:01': 3 }, 'acts'],
   ] as const)('%s', (_name, now, force) => {
     expect(forceOf(before, after, now)).toBe(force)
   })

@@ -34,7 +34,7 @@ describe('pre-checks', () => {
 })
 
 describe('texts', () => {
-  it('tell the step of a job', () => {
+  it('show the step of a job', () => {
     const third = { code: 'autotune.frequency-response', params: { step: 3, steps: 6 } }
     const within = { code: '+', params: { joint: ': ', part0: third, part1: { code: 'sweep.x' } } }
     expect(stepOf(third)).toEqual({ now: 3, of: 6 })
@@ -47,7 +47,7 @@ describe('texts', () => {
     expect(engineering(0.0312)).toBe('0.0312')
     expect(engineering(0)).toBe('0')
   })
-  it('give the interval beside the value, and nothing for what is not known', () => {
+  it('give the interval next to the value, and nothing for what is not known', () => {
     expect(amount(0.03, 'N·m')).toBe('0.03 N·m')
     expect(amount(2, '')).toBe('2')
     expect(amount(null, 'N·m')).toBe('—')

@@ -5,7 +5,7 @@ import './profile-text.css'
 
 /**
  * A text of a drive's profile in the page's language. The original is its tooltip, and stands
- * beside it on demand; what has no translation stays English with a small mark.
+ * next to it on demand; what has no translation stays English with a small mark.
  */
 export function ProfileText({
   drive,
@@ -44,7 +44,7 @@ export function ProfileText({
   )
 }
 
-/** The English text beside a translation that is already shown, where somebody wants it there. */
+/** The English text next to a translation that is already shown, where somebody wants it there. */
 export function Original({ text, shown }: { text: string | undefined; shown: string }) {
   const both = useOriginal()
   if (!both || !text || text === shown) return null
@@ -55,7 +55,7 @@ export function Original({ text, shown }: { text: string | undefined; shown: str
   )
 }
 
-/** Shows the English originals beside the translated texts, or hides them. */
+/** Shows the English originals next to the translated texts, or hides them. */
 export function OriginalSwitch() {
   const t = useT()
   const language = useLanguage()

@@ -7,7 +7,7 @@ export interface ShownRow extends ParameterRow {
 
 /** English text of a profile to its translation. */
 type Known = ReadonlyMap<string, string>
-/** Rows and texts are replaced as a whole, and every reader wants the same translated rows. */
+/** Rows and texts are replaced as a whole, and every reader needs the same translated rows. */
 const made = new WeakMap<ParameterRow[], { texts: Known; rows: ShownRow[] }>()
 
 export function translatedRows(rows: ParameterRow[], texts: Known): ShownRow[] {

@@ -60,7 +60,7 @@ export function useSay(drive: string): (text: string) => string {
   return (text) => texts?.get(text) ?? text
 }
 
-/** Whether the English original stands beside each translated text. */
+/** Whether the English original is next to each translated text. */
 export function useOriginal(): boolean {
   return useSyncExternalStore(subscribe, () => original)
 }

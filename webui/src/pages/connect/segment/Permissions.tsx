@@ -23,7 +23,7 @@ export function InterfacePermissions({ url }: { url: string }) {
   return report && <Permissions report={report} />
 }
 
-/** Missing permissions in words, with the commands that grant them. */
+/** Missing permissions as text, with the commands that grant them. */
 export function Permissions({ report }: { report: EthercatPermissions }) {
   const t = useT()
   return (

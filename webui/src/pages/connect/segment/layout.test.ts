@@ -90,7 +90,7 @@ describe('the histogram', () => {
     expect(shownBins(bins)).toHaveLength(4)
     expect(shownBins([{ count: 0 }, { count: 0 }])).toHaveLength(1)
   })
-  it('shows single ones beside a million', () => {
+  it('shows single ones next to a million', () => {
     expect(barHeight(1_000_000, 1_000_000)).toBe(1)
     expect(barHeight(1, 1_000_000)).toBeGreaterThan(0.04)
     expect(barHeight(0, 1_000_000)).toBe(0)

@@ -57,7 +57,7 @@ export function shownBins<Bin extends { count: number }>(bins: Bin[]): Bin[] {
   return bins.slice(0, Math.max(last + 1, 1))
 }
 
-/** Height of a bar, 0 to 1: single late cycles must be seen beside a million punctual ones. */
+/** Height of a bar, 0 to 1: single late cycles must be seen next to a million punctual ones. */
 export function barHeight(count: number, most: number): number {
   return count <= 0 ? 0 : Math.log10(count + 1) / Math.log10(most + 1)
 }

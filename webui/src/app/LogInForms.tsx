@@ -64,7 +64,7 @@ function NameField({ value, onChange }: Field) {
   const t = useT()
   return (
     <TextInput
-      label={t('door.name')}
+      label={t('login.name')}
       value={value}
       autoComplete="username"
       maxLength={60}
@@ -100,8 +100,8 @@ export function NewPassword({ value, onChange }: Field) {
   const t = useT()
   return (
     <PasswordInput
-      label={t('door.newPassword')}
-      description={t('door.passwordRule')}
+      label={t('login.newPassword')}
+      description={t('login.passwordRule')}
       value={value}
       autoComplete="new-password"
       minLength={10}
@@ -116,7 +116,7 @@ function CodeField({ help, value, onChange }: Field & { help: string }) {
   const t = useT()
   return (
     <TextInput
-      label={t('door.code')}
+      label={t('login.code')}
       description={help}
       value={value}
       autoComplete="off"
@@ -136,8 +136,8 @@ function Authority() {
   if (window.location.protocol !== 'https:') return null
   return (
     <details>
-      <summary>{t('door.certificate')}</summary>
-      <p className="dim">{t('door.certificateHelp')}</p>
+      <summary>{t('login.certificate')}</summary>
+      <p className="dim">{t('login.certificateHelp')}</p>
       <a href="./api/v1/certificate" download>
         {CERTIFICATE_FILE}
       </a>
@@ -151,12 +151,12 @@ export function LogIn() {
   const [password, setPassword] = useState('')
   return (
     <Entrance
-      title={t('door.logIn')}
-      send={t('door.logIn')}
+      title={t('login.logIn')}
+      send={t('login.logIn')}
       enter={() => ask(api.POST('/api/v1/session', { body: { name, password } }))}
     >
       <NameField value={name} onChange={setName} />
-      <PasswordField label={t('door.password')} value={password} onChange={setPassword} />
+      <PasswordField label={t('login.password')} value={password} onChange={setPassword} />
     </Entrance>
   )
 }
@@ -171,9 +171,9 @@ export function SetUp() {
   const differs = again !== '' && again !== password
   return (
     <Entrance
-      title={t('door.setUp')}
-      text={t('door.setUpText')}
-      send={t('door.setUpDo')}
+      title={t('login.setUp')}
+      text={t('login.setUpText')}
+      send={t('login.setUpDo')}
       blocked={differs}
       enter={async () => {
         const session = await ask(api.POST('/api/v1/setup', { body: { code, name, password } }))
@@ -182,15 +182,15 @@ export function SetUp() {
         return session
       }}
     >
-      <CodeField help={t('door.codeText')} value={code} onChange={setCode} />
+      <CodeField help={t('login.codeText')} value={code} onChange={setCode} />
       <NameField value={name} onChange={setName} />
       <NewPassword value={password} onChange={setPassword} />
       <PasswordField
-        label={t('door.again')}
+        label={t('login.again')}
         again
         value={again}
         onChange={setAgain}
-        error={differs ? t('door.differs') : undefined}
+        error={differs ? t('login.differs') : undefined}
       />
     </Entrance>
   )
@@ -201,12 +201,12 @@ export function Join({ link }: { link: string }) {
   const [code, setCode] = useState('')
   return (
     <Entrance
-      title={t('door.join')}
-      text={t('door.joinText')}
-      send={t('door.joinDo')}
+      title={t('login.join')}
+      text={t('login.joinText')}
+      send={t('login.joinDo')}
       enter={() => ask(api.POST('/api/v1/guests', { body: { link, code } }))}
     >
-      <CodeField help={t('door.joinCode')} value={code} onChange={setCode} />
+      <CodeField help={t('login.joinCode')} value={code} onChange={setCode} />
     </Entrance>
   )
 }

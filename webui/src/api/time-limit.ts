@@ -6,7 +6,7 @@ const FILE_MS = 900_000
  * A request that ends: a network that swallows everything would keep a button turning for a
  * quarter of an hour, until the browser gives up.
  */
-export function patient(request: Request, send: typeof fetch = fetch): Promise<Response> {
+export function withTimeLimit(request: Request, send: typeof fetch = fetch): Promise<Response> {
   const file = request.headers.get('Content-Type') === 'application/octet-stream'
   return send(request, { signal: AbortSignal.timeout(file ? FILE_MS : ANSWER_MS) })
 }

@@ -45,7 +45,7 @@ async def test_gains_that_are_sound_and_faster_than_every_design_stay() -> None:
     assert KEPT in result.notes
     assert result.applied is not None
     assert abs(result.applied.gains.speed_nms / best.gains.speed_nms - 1) < 0.02
-    # The loop was measured as it is, and shows what the design that was written promised.
+    # The loop was measured as it is, and shows what the design that was written guaranteed.
     assert result.verified is not None
     assert result.verified.kept
     measured, predicted = result.verified.measured_bandwidth_hz, best.bandwidth_hz

@@ -2,7 +2,7 @@
 
 A coarse encoder (2500 lines on DS_C) makes a reported speed noisy, while the positions beneath it
 are off by a fraction of an increment at most. Noise in the speed makes a regression's inertia too
-small (errors in the variables), so the quieter of the two is taken.
+small (errors in the variables), so the quieter of the two is used.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import numpy.typing as npt
 
 from backend.analysis.signals.spectrum import power_density
 from backend.tools.measuring.recording import Recording
-from backend.tools.thresholds import sweep_quiet_velocity as threshold
+from backend.tools.thresholds import sweep_velocity_noise as threshold
 
 _TURN = 2 * np.pi
 
 
-def quiet_velocity(recording: Recording, cutoff_hz: float) -> npt.NDArray[np.float64]:
+def velocity_without_noise(recording: Recording, cutoff_hz: float) -> npt.NDArray[np.float64]:
     """Velocity [n] in rad/s for moves whose content lies below ``cutoff_hz``."""
     reported, rate = recording.velocity_rad_s, recording.sample_rate_hz
     count = np.arange(reported.size)

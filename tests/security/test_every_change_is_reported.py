@@ -1,6 +1,6 @@
 """Every route and message that changes something leaves its line in the audit: who, what, values.
 
-Routes tell it in one of two ways (see `backend.api.audit.audited`): where it happens, which is
+Routes show it in one of two ways (see `backend.api.audit.audited`): where it happens, which is
 asked of each of them here with a real request, or by the wrapper around all routes, which is
 asked with every route that there is.
 """
@@ -38,7 +38,7 @@ SUCCESS = ("200", "201", "202")
 
 @dataclass
 class Heard:
-    """What the wrapper tells, in place of the audit."""
+    """What the wrapper shows, in place of the audit."""
 
     facts: list[Fact] = field(default_factory=list)
     problem: str = ""
@@ -108,7 +108,7 @@ def jobs(server: GuardedServer) -> set[str]:
     }
 
 
-# --- routes that tell it themselves ---------------------------------------------------
+# --- routes that show it themselves ---------------------------------------------------
 
 
 class Scene:
@@ -213,7 +213,7 @@ REQUESTS = [
     Ask("POST", f"{X}/fault-reset", BY_OLAF | {
         "kind": "motion", "action": "done", "detail.6040:00": SENT}, ON_X,
         first=lambda scene: scene.server.servo.trip()),
-    # one listener tells all jobs, so that this one and the move below stand for the others
+    # one listener shows all jobs, so that this one and the move below stand for the others
     Ask("POST", f"{X}/procedures/{{name}}", BY_OLAF | {
         "kind": "procedure", "action": "started", "detail.title": "Write settings: X"},
         ON_X | {"name": "write_settings"}, options={"json": {}}),

@@ -1,5 +1,5 @@
 import { afterEach, describe, expect, it, vi } from 'vitest'
-import { patient } from './patience'
+import { withTimeLimit } from './time-limit'
 
 /** A network that swallows everything: only giving up ends a request. */
 const silent = ((_request: Request, options?: RequestInit) =>
@@ -16,10 +16,10 @@ describe('a request', () => {
       limits.push(limit)
       return AbortSignal.abort(new DOMException('', 'TimeoutError'))
     })
-    await expect(patient(new Request('http://x/a'), silent)).rejects.toThrow()
+    await expect(withTimeLimit(new Request('http://x/a'), silent)).rejects.toThrow()
     const headers = { 'Content-Type': 'application/octet-stream' }
     const upload = new Request('http://x/b', { method: 'POST', body: 'abc', headers })
-    await expect(patient(upload, silent)).rejects.toThrow()
+    await expect(withTimeLimit(upload, silent)).rejects.toThrow()
     expect(limits).toEqual([60_000, 900_000])
   })
 })

@@ -6,7 +6,7 @@ import { useSay, useT } from '../../i18n'
 import { MotionSetting } from './MotionSetting'
 
 /** Where an object is set that can move the axis, and so has no field in the table. */
-export function OtherDoor({ drive, row }: { drive: string; row: ParameterRow }) {
+export function OtherPlace({ drive, row }: { drive: string; row: ParameterRow }) {
   const t = useT()
   const say = useSay()
   const page = row.motion_page
@@ -14,7 +14,7 @@ export function OtherDoor({ drive, row }: { drive: string; row: ParameterRow }) 
     <div className="note warn">
       <p>{t('motion.energises')}</p>
       {page === 'motion' || page === 'io' ? (
-        <a className="page-door" href={`#/axis/${encodeURIComponent(drive)}/${page}`}>
+        <a className="page-link" href={`#/axis/${encodeURIComponent(drive)}/${page}`}>
           {t(page === 'io' ? 'motion.goIo' : 'motion.goMotion')}
         </a>
       ) : page === 'parameters' ? (

@@ -15,7 +15,7 @@ _DRIVE = "/api/v1/drives/{drive_id}"
 
 
 @dataclass(frozen=True, slots=True)
-class Door:
+class Alternative:
     """``page`` is the page's name, empty where only a script can do it with ``route``; ``how`` says
     what to do there."""
 
@@ -24,23 +24,23 @@ class Door:
     how: Text
 
 
-_POWER = Door(
+_POWER = Alternative(
     "motion",
     f"POST {_DRIVE}/transition",
     text("motion.door-power"),
 )
-_MOVE = Door(
+_MOVE = Alternative(
     "motion",
     f"POST {_DRIVE}/jobs/move",
     text("motion.door-move"),
 )
-_FORCE = Door("io", f"POST {_DRIVE}/io/forcing/{{name}}", text("motion.door-force"))
-_ASSIGN = Door(
+_FORCE = Alternative("io", f"POST {_DRIVE}/io/forcing/{{name}}", text("motion.door-force"))
+_ASSIGN = Alternative(
     "io",
     f"PUT {_DRIVE}/motion-settings/{{key}}",
     text("motion.door-assign"),
 )
-_SET = Door(
+_SET = Alternative(
     "",
     f"PUT {_DRIVE}/motion-settings/{{key}}",
     text("motion.door-set"),
@@ -49,7 +49,7 @@ _SET = Door(
 _POWER_ROLES = frozenset({"control_word", "mode"})
 
 
-def door_of(profile: Profile, parameter: Parameter) -> Door:
+def alternative_of(profile: Profile, parameter: Parameter) -> Alternative:
     """Where this object, which can put energy into the motor, is written in order."""
     key = parameter.key
     for signal in profile.signals:
@@ -64,7 +64,7 @@ def door_of(profile: Profile, parameter: Parameter) -> Door:
             return _FORCE
     for procedure in profile.procedures:
         if any(step.do == "write" and step.key == key for step in procedure.steps):
-            return Door(
+            return Alternative(
                 "parameters",
                 f"POST {_DRIVE}/procedures/{procedure.name}",
                 text("motion.door-procedure", title=procedure.title),
@@ -74,7 +74,7 @@ def door_of(profile: Profile, parameter: Parameter) -> Door:
 
 def refused(drive: str, profile: Profile, parameter: Parameter) -> NotGranted:
     """The refusal to write this object without a grant, with where it can be done."""
-    door = door_of(profile, parameter)
+    door = alternative_of(profile, parameter)
     error = NotGranted(
         "motion.put-energy-motor-not",
         drive=drive,
