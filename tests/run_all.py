@@ -242,7 +242,7 @@ def run_quick(runner: Runner) -> None:
 
 
 def run_suites(runner: Runner) -> list[str]:
-    """Run the timed suite, then the others in three lanes; returns the names of those that failed twice."""
+    """Run the timed suite, then the others in three lanes; returns who failed twice."""
     with (
         tempfile.TemporaryFile("w+", encoding="utf-8") as idle,
         tempfile.TemporaryFile("w+", encoding="utf-8") as seen,
