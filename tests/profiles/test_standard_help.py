@@ -25,6 +25,12 @@ def test_no_writable_object_of_the_table_is_without_help(family: str) -> None:
     assert without == []
 
 
+@pytest.mark.parametrize("family", ["mms7", "ds_c", "ep3e", "m6l", "r6l", "el7", "generic402"])
+def test_every_writable_parameter_has_help(family: str) -> None:
+    parameters = load_profile(family).parameters
+    assert [p.key for p in parameters if p.access != "ro" and not p.help] == []
+
+
 def test_the_help_of_a_profile_comes_first() -> None:
     ours = load_profile("m6l").by_key["605A:00"].help
     assert ours
