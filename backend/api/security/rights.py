@@ -83,6 +83,7 @@ _API: dict[str, Need] = {
     "GET /profiles": _LOOK,
     "GET /profiles/matches": _LOOK,
     "GET /profiles/{profile}/eds": _LOOK,
+    "GET /profiles/{profile}/esi": _LOOK,
     "GET /profiles/{profile}/texts": _LOOK,
     "GET /profiles/{profile}/parameters/{key}/motion": _LOOK,
     "PUT /profiles/{profile}/parameters/{key}/motion": _STATION,
