@@ -3,7 +3,6 @@ api-station_another-drive-answers-station = { $drive }: another drive answers at
     .remedy = check the cables, then scan
 api-station_description-of-drive = { $place }: { $cause }
     .remedy = import the maker's file, or use the generic profile
-api-station_doctor-knows-not = { $value }: the doctor supports EtherCAT and CANopen only
 api-station_eeprom-warning = NOTICE: with wrong EEPROM contents the drive does not start. The EtherCAT slave controller reads the drive's identity and memory layout from the EEPROM. Save the present contents first, and do not switch anything off until the change is done. It takes effect after a power cycle
 api-station_empty = { $file } is empty
     .remedy = choose an ESI, EDS or DCF file
@@ -53,4 +52,6 @@ api-station_station-not-answer = station { $value } of { $url } does not answer
     .remedy = check its supply and cable, then scan the segment again
 api-station_training-fault-needs-demo = { $drive }: training faults are for virtual drives
     .remedy = start `servodeck demo` and choose one of its axes
+api-station_try-setting = Try { $setting } = { $after } at station { $station } of { $url }
+api-station_trying-setting = the drive is taken to Operational without being enabled
 api-station_wait-for-end = wait until it has ended

@@ -3,7 +3,6 @@ api-station_another-drive-answers-station = { $drive }：站 { $station } 上应
     .remedy = 请检查电缆后重新扫描
 api-station_description-of-drive = { $place }：{ $cause }
     .remedy = 请导入厂家文件，或使用通用配置文件
-api-station_doctor-knows-not = { $value }：诊断功能只支持 EtherCAT 和 CANopen
 api-station_eeprom-warning = 注意：EEPROM 内容错误时驱动器无法启动。EtherCAT 从站控制器从 EEPROM 读取驱动器的标识和存储布局。请先保存当前内容，更改完成前不要切断任何电源。驱动器断电并重新上电后生效
 api-station_empty = { $file } 为空
     .remedy = 请选择 ESI、EDS 或 DCF 文件
@@ -53,4 +52,6 @@ api-station_station-not-answer = { $url } 的站 { $value } 无应答
     .remedy = 请检查其供电和电缆，然后重新扫描网段
 api-station_training-fault-needs-demo = { $drive }：培训用故障仅用于虚拟驱动器
     .remedy = 请启动 `servodeck demo` 并选择其中的轴
+api-station_try-setting = 在 { $url } 的站 { $station } 上尝试 { $setting } = { $after }
+api-station_trying-setting = 正在不使能的情况下使驱动器进入 Operational
 api-station_wait-for-end = 请等待结束
