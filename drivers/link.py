@@ -74,13 +74,16 @@ class LinkQuality:
     details: dict[str, float | int | str] = field(default_factory=dict)
 
 
+EventKind = Literal["emergency", "boot", "lost", "back", "state", "overload", "fault"]
+
+
 @dataclass(frozen=True, slots=True)
 class LinkEvent:
-    """Something the bus said by itself."""
+    """What a bus reports by itself. ``code`` is the error code of an emergency."""
 
-    kind: Literal["emergency", "boot", "lost", "back", "state", "overload", "fault"]
+    kind: EventKind
     station: int | None
-    text: str
+    text: Text
     code: int | None = None
 
 
@@ -322,8 +325,8 @@ class Cyclic(Protocol):
         """Whether process data are exchanged."""
 
     @property
-    def trouble(self) -> str:
-        """Why it does not run although it is wanted, while it is set up again; else empty."""
+    def trouble(self) -> Text | None:
+        """Why it does not run although it is wanted, while it is set up again; else None."""
 
     @property
     def dc(self) -> bool | None:

@@ -20,7 +20,7 @@ from backend.api.app import make_app
 from backend.api.live import messages as live_messages
 from backend.api.live import people_messages as live_people_messages
 from backend.api.station import models as models_bench
-from backend.api.station import models_description
+from backend.api.station import models_description, models_doctor
 from backend.station.bench import Bench
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -48,6 +48,7 @@ def description() -> str:
             models_bench.FoundDrive,
             models_description.ImportedDescription,
             models_description.LineSearchResult,
+            models_doctor.TrialResult,
         )
     ]
     _, extra = models_json_schema(messages, ref_template="#/components/schemas/{model}")

@@ -60,7 +60,7 @@ def bus(bench: Bench, url: str, link: Link) -> models_bench.Bus:
     if session is not None and session.state is not None:
         info = models_bench.CyclicInfo(
             running=session.running,
-            problem=session.trouble,
+            problem="" if session.trouble is None else session.trouble.words(language()),
             cycle_us=session.state.cycle_s * 1e6,
             dc=session.state.dc,
             channels=list(session.state.channels),

@@ -21,6 +21,7 @@ from drivers.link import (
     ScopeBlock,
     Unsubscribe,
 )
+from drivers.texts.message import Text
 
 #: Signals mapped as far as they fit, the important ones first.
 INPUT_ROLES = (
@@ -110,8 +111,8 @@ class CyclicSession:
         return self.state is not None and self.cyclic.running
 
     @property
-    def trouble(self) -> str:
-        """Why a wanted exchange does not run, while it is set up again by itself; else empty."""
+    def trouble(self) -> Text | None:
+        """Why a wanted exchange does not run, while it is set up again by itself; else None."""
         return self.cyclic.trouble
 
     def power(self) -> OwnsPowerState | None:

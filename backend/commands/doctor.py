@@ -12,17 +12,16 @@ import typer
 from backend.commands.options import Json, Profile, Server, Url, server_for
 from backend.commands.printing import print_text, words_of
 from backend.commands.session import opened, run, show_progress
+from backend.station.doctor import Examined, examined
+from backend.station.doctor import tried as tried_once
 from backend.station.matching import match_profiles
 from drivers.doctor.diagnosis import Cause
 from drivers.doctor.trials import trials
-from drivers.errors import DriveError, NotAllowed
-from drivers.link import Address, CyclicSignal, Link
+from drivers.errors import NotAllowed
+from drivers.link import Link
+from drivers.texts.message import language
 from profiles import load_profile
 from profiles.schema import Profile as ProfileOf
-
-_INPUTS = ((0x6041, "UINT16"), (0x6064, "INT32"))
-_OUTPUTS = ((0x6040, "UINT16"),)
-_CYCLE_S = {"ethercat": 0.001, "canopen": 0.01}
 
 
 def doctor(
@@ -50,7 +49,7 @@ def doctor(
         else:
             async with opened(url) as link:
                 if link.doctor is None:
-                    raise NotAllowed("command.doctor-knows-not", value=url)
+                    raise NotAllowed("station.doctor-knows-not", value=url)
                 results = await _here(link, station, profile, try_settings=try_settings)
         _show(results, as_json=as_json)
         return all(each["reached"] for each in results)
@@ -80,9 +79,15 @@ async def _here(
         chosen = load_profile(profile) if profile else best
         if chosen is not None:
             link.attach(number, chosen)
-        cause, result = await _examined(link, number)
-        if try_settings and cause and chosen is not None:
-            result["trials"] = await tried(link, number, chosen, cause)
+        seen = await examined(link, number)
+        result: dict[str, Any] = {
+            "station": number,
+            "reached": seen.reached,
+            "refusal": _words(seen),
+            "causes": [shown(cause) for cause in seen.causes],
+        }
+        if try_settings and seen.causes and chosen is not None:
+            result["trials"] = await tried(link, number, chosen, seen.causes)
         results.append(result)
     return results
 
@@ -97,59 +102,23 @@ async def tried(
     """
     found = []
     for trial in trials(causes, profile):
-        link.attach(station, trial.profile)
-        try:
-            _, result = await _examined(link, station, trial.cycle_factor)
-        finally:
-            link.attach(station, profile)
+        result = await tried_once(link, station, profile, trial)
         found.append(
             {
                 "setting": trial.setting,
                 "before": trial.before,
                 "after": trial.after,
-                "reached": result["reached"],
-                "refusal": result["refusal"],
+                "reached": result.reached,
+                "refusal": _words(result),
             }
         )
-        if result["reached"]:
+        if result.reached:
             break
     return found
 
 
-async def examined(link: Link, station: int) -> dict[str, Any]:
-    """Take one station to Operational and back; the causes where it does not get there.
-
-    Raises:
-        NotAllowed: the bus has no doctor, or no cyclic exchange.
-    """
-    return (await _examined(link, station))[1]
-
-
-async def _examined(
-    link: Link, station: int, cycle_factor: int = 1
-) -> tuple[tuple[Cause, ...], dict[str, Any]]:
-    cyclic = link.cyclic
-    if cyclic is None or link.doctor is None:
-        raise NotAllowed("command.doctor-knows-not", value=link.url)
-    refusal: DriveError | None = None
-    inputs = [CyclicSignal(station, Address(i, 0, k), f"{i:04X}") for i, k in _INPUTS]  # type: ignore[arg-type]
-    outputs = [CyclicSignal(station, Address(i, 0, k), f"{i:04X}") for i, k in _OUTPUTS]  # type: ignore[arg-type]
-    try:
-        await cyclic.configure(inputs, outputs, _CYCLE_S[link.kind] * cycle_factor)
-        await cyclic.start()
-    except DriveError as error:
-        refusal = error
-    try:
-        result = await link.doctor.examination(station, refusal)
-    finally:
-        if refusal is None:
-            await cyclic.stop()
-    return result.causes, {
-        "station": station,
-        "reached": result.reached,
-        "refusal": None if refusal is None else refusal.message,
-        "causes": [shown(cause) for cause in result.causes],
-    }
+def _words(result: Examined) -> str | None:
+    return None if result.refusal is None else result.refusal.text.words(language())
 
 
 def shown(cause: Cause) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from backend.parameters.lists import export_list, import_list
 from backend.parameters.set_file import SUFFIX, parse
 from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
+from drivers.texts.message import language
 from profiles import load_profile
 
 app = typer.Typer(help="Read and write parameters on a bus, or by a running server.")
@@ -204,7 +205,7 @@ def import_(
             bytes_of(file), load_profile(profile), file.name, datetime.now(UTC)
         )
         for problem in found.problems:
-            print(problem, file=sys.stderr)
+            print(problem.words(language()), file=sys.stderr)
         write_atomically(out, data)
         print_text(
             "printed.parameters-of-list",

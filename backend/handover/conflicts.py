@@ -73,7 +73,7 @@ class Finding:
 
     kind: Defect
     key: str
-    place: str
+    place: Text
     text: Text
 
 
@@ -209,7 +209,7 @@ def _conflict(
 def diagnose(profile: Profile, listed: ControllerList) -> tuple[Finding, ...]:
     """Defects of a list by the family's profile."""
     found: list[Finding] = []
-    seen: dict[str, str] = {}
+    seen: dict[str, Text] = {}
     highest, before = -2, ""
     for write in listed.writes:
         parameter = profile.by_key.get(write.key)

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
+from drivers.texts.message import Text, Unsuitable, text
+
 _T = TypeVar("_T")
 
 
@@ -17,7 +19,7 @@ class Listed:
     subindex: int
     data: bytes
     transition: str
-    place: str
+    place: Text
 
     @property
     def key(self) -> str:
@@ -34,8 +36,13 @@ class ControllerList:
     ordered: bool = True
 
 
-class BadRow(ValueError):
+class BadRow(Unsuitable):
     """A row that cannot be read; the message has its place."""
+
+
+def line_of(line: int) -> Text:
+    """The place of a row in a file of lines, counted from 1."""
+    return text("handover.place-line", line=line)
 
 
 class SeveralSlaves(ValueError):
@@ -59,9 +66,9 @@ def chosen(each: Sequence[_T], slave: int | None) -> _T:
     raise SeveralSlaves(len(each))
 
 
-def number(text: str | None, place: str, *, base: int = 0) -> int:
+def number(written: str | None, place: Text, *, base: int = 0) -> int:
     """A number; with base 0 also #x, 16# and 0x."""
-    word = (text or "").strip()
+    word = (written or "").strip()
     for prefix in ("#x", "16#", "0x"):
         if word.lower().startswith(prefix):
             word, base = word[len(prefix) :], 16
@@ -69,28 +76,33 @@ def number(text: str | None, place: str, *, base: int = 0) -> int:
         # A decimal with leading zeros is none of Python's, but of everybody else's.
         return int(word, base or 10)
     except ValueError as error:
-        raise BadRow(f"{place}: {word[:40]!r} is no number") from error
+        raise BadRow(text("handover.row-no-number", place=place, word=word[:40])) from error
 
 
-def listed(index: int, subindex: int, data: bytes, transition: str, place: str) -> Listed:
+def listed(index: int, subindex: int, data: bytes, transition: str, place: Text) -> Listed:
     """A write to an object that can exist, with data."""
     if not 0 <= index <= 0xFFFF or not 0 <= subindex <= 0xFF:
-        raise BadRow(f"{place}: {index:X}h:{subindex} is no object")
+        key = f"{index:X}h:{subindex}"[:40]
+        raise BadRow(text("handover.row-no-object", place=place, key=key))
     if not data:
-        raise BadRow(f"{place}: {index:04X}h:{subindex} has no data")
+        raise BadRow(text("handover.row-no-data", place=place, index=index, subindex=subindex))
     return Listed(index, subindex, data, transition, place)
 
 
-def row_of_bytes(text: str | None, place: str) -> bytes:
+def row_of_bytes(written: str | None, place: Text) -> bytes:
     """Bytes in hex."""
     try:
-        return bytes.fromhex((text or "").strip())
+        return bytes.fromhex((written or "").strip())
     except ValueError as error:
-        raise BadRow(f"{place}: {(text or '')[:40]!r} is no row of bytes") from error
+        word = (written or "")[:40]
+        raise BadRow(text("handover.row-no-bytes", place=place, word=word)) from error
 
 
-def sized(value: int, size: int, place: str) -> bytes:
+def sized(value: int, size: int, place: Text) -> bytes:
     """A whole number, signed or not, in so many bytes."""
     if not -(1 << (8 * size - 1)) <= value < 1 << (8 * size):
-        raise BadRow(f"{place}: {value} does not fit {size} bytes")
+        # As words: a number of a damaged file may be longer than any real one.
+        raise BadRow(
+            text("handover.row-too-large", place=place, number=str(value)[:40], bytes=size)
+        )
     return (value % (1 << (8 * size))).to_bytes(size, "little")

@@ -23,6 +23,7 @@ from backend.handover.listed import (
     Listed,
     SeveralSlaves,
     chosen,
+    line_of,
     listed,
     number,
     row_of_bytes,
@@ -30,7 +31,7 @@ from backend.handover.listed import (
 from backend.parameters.set_file import BadSet
 from drivers.codec import encode, size_of
 from drivers.errors import DriveError
-from drivers.texts.message import text
+from drivers.texts.message import Text, prose, text
 from profiles.importer import (
     ImportFailed,
     ImportReport,
@@ -83,6 +84,8 @@ def read_list(
             elements=several.slaves,
             what="slaves",
         ) from several
+    except BadRow as error:
+        raise BadSet("handover.damaged", name=name, shorten=error.why) from error
     except _DAMAGED as e:
         raise BadSet("handover.damaged", name=name, shorten=shorten(str(e), 200)) from e
     if not found.writes:
@@ -147,7 +150,7 @@ def _init_commands(root: Element, profile: Profile, slave: int | None) -> Iterat
     if root.tag == "EtherCATConfig":
         within = _slave_of_eni(root, slave)
     for position, command in enumerate(within.iterfind(_COMMANDS), 1):
-        place = f"InitCmd {position}"
+        place = prose(f"InitCmd {position}")
         if command.get("Disabled", "0").lower() in ("1", "true"):
             continue
         ccs = command.findtext("Ccs")
@@ -169,13 +172,20 @@ def _init_commands(root: Element, profile: Profile, slave: int | None) -> Iterat
 
 
 def _parts(
-    profile: Profile, index: int, first: int, data: bytes, transition: str, place: str
+    profile: Profile, index: int, first: int, data: bytes, transition: str, place: Text
 ) -> Iterator[Listed]:
     """Subindexes of a complete access (ETG.1000.6 clause 5.6.2): from 0 or 1 on, subindex 0 filled
     up to 16 bits, the others as long as their types and without a gap."""
     sizes = _sizes(profile, index)
     if first not in (0, 1) or not sizes:
-        raise BadRow(f"{place}: {profile.title} knows no complete access to {index:04X}h:{first}")
+        raise BadRow(
+            text(
+                "handover.row-no-complete-access",
+                place=place,
+                title=profile.title,
+                key=f"{index:04X}h:{first}"[:40],
+            )
+        )
     at = 2 if first == 0 else 0
     if first == 0 and len(data) == at and any(index in each for each, _ in _PDO_LISTS):
         yield listed(index, 0, data[:1], transition, place)  # an empty list of PDOs or objects
@@ -183,13 +193,15 @@ def _parts(
         if at >= len(data):
             break
         if size is None:
-            raise BadRow(f"{place}: where {index:04X}h:{subindex} lies in the data is not known")
+            raise BadRow(
+                text("handover.row-place-unknown", place=place, index=index, subindex=subindex)
+            )
         part = data[at : at + size]
         at += size
         if len(part) == size:
             yield listed(index, subindex, part, transition, place)
     if at != len(data):
-        raise BadRow(f"{place}: {len(data)} bytes do not fit the entries of {index:04X}h")
+        raise BadRow(text("handover.row-bytes-left", place=place, bytes=len(data), index=index))
 
 
 def _sizes(profile: Profile, index: int) -> list[int | None]:
@@ -212,7 +224,7 @@ def _lcec(root: Element, profile: Profile, name: str, slave: int | None) -> Iter
         file = (elsewhere.get("filename") or "").strip()[:80]
         raise BadSet("handover.list-in-another-file", name=name, file=file)
     for position, config in enumerate(within.findall("sdoConfig"), 1):
-        place = f"sdoConfig {position}"
+        place = prose(f"sdoConfig {position}")
         index = number(config.get("idx"), place, base=16)
         data = b"".join(
             row_of_bytes(each.get("data"), place) for each in config.findall("sdoDataRaw")
@@ -229,16 +241,19 @@ def _dcf(data: bytes, profile: Profile, name: str) -> ControllerList:
     report = ImportReport()
     writes = []
     for value in read_dcf_values(data, name, report):
-        place = f"line {value.line}"
+        place = line_of(value.line)
         parameter = profile.by_key.get(f"{value.index:04X}:{value.subindex:02X}")
         kind: DataType = parameter.type if parameter else value.type or "UINT32"
         if kind not in INTEGER_RANGE and kind != "REAL32":
             continue
-        raw, _ = default_value(value.text, kind, place, report)
+        raw, _ = default_value(value.text, kind, place.words(), report)
         if raw is None:
-            raise BadRow(f"{place}: {value.text[:40]!r} is no {kind}")
+            raise BadRow(
+                text("handover.row-no-value", place=place, word=value.text[:40], type=kind)
+            )
         try:
             writes.append(listed(value.index, value.subindex, encode(kind, raw), "", place))
         except DriveError as error:
-            raise BadRow(f"{place}: {error.message}") from error
+            why = text("handover.row-refused", place=place, cause=error.text)
+            raise BadRow(why) from error
     return ControllerList("dcf", tuple(writes), ordered=False)

@@ -13,7 +13,17 @@ from typing import Any
 
 import yaml
 
-from backend.handover.listed import BadRow, Listed, chosen, listed, number, row_of_bytes, sized
+from backend.handover.listed import (
+    BadRow,
+    Listed,
+    chosen,
+    line_of,
+    listed,
+    number,
+    row_of_bytes,
+    sized,
+)
+from drivers.texts.message import Text, joined, prose, text
 from profiles.schema import Profile
 
 _SIZE = {"bool": 1, "int8": 1, "uint8": 1, "sm8": 1, "int16": 2, "uint16": 2, "sm16": 2,
@@ -29,14 +39,14 @@ _ENTRY = struct.Struct("<HBI")
 _MOST_YAML_LEVELS = 20
 
 
-def is_script(text: str) -> bool:
+def is_script(content: str) -> bool:
     """Whether a line of it writes by ``ethercat download``."""
-    return any(_DOWNLOAD.match(line) for line in _lines(text))
+    return any(_DOWNLOAD.match(line) for line in _lines(content))
 
 
-def table_of(text: str) -> tuple[str, str] | None:
+def table_of(content: str) -> tuple[str, str] | None:
     """Format and separator of a table by its first line; spreadsheets change the separator."""
-    first = text.partition("\n")[0].strip()
+    first = content.partition("\n")[0].strip()
     for separator in ";,\t":
         words = [word.strip().strip('"').lower() for word in first.split(separator)]
         for form, heading in _HEADINGS.items():
@@ -45,22 +55,22 @@ def table_of(text: str) -> tuple[str, str] | None:
     return None
 
 
-def codesys(text: str, separator: str) -> Iterator[Listed]:
+def codesys(content: str, separator: str) -> Iterator[Listed]:
     """The columns of the tab Startup parameters."""
-    for line, row in enumerate(csv.DictReader(io.StringIO(text), delimiter=separator), 2):
-        place = f"line {line}"
+    for line, row in enumerate(csv.DictReader(io.StringIO(content), delimiter=separator), 2):
+        place = line_of(line)
         index, _, subindex = (row.get("Index:Subindex") or "").partition(":")
         bits = number(row.get("Bit length"), place)
         if bits % 8 or not 8 <= bits <= 64:
-            raise BadRow(f"{place}: a bit length of {bits} is no whole number of bytes")
+            raise BadRow(text("handover.row-bit-length", place=place, bits=str(bits)[:40]))
         value = sized(number(row.get("Value"), place), bits // 8, place)
         yield listed(number(index, place), number(subindex, place), value, "PS", place)
 
 
-def csv_table(text: str, separator: str) -> Iterator[Listed]:
+def csv_table(content: str, separator: str) -> Iterator[Listed]:
     """The table that is exported here."""
-    for line, row in enumerate(csv.DictReader(io.StringIO(text), delimiter=separator), 2):
-        place = f"line {line}"
+    for line, row in enumerate(csv.DictReader(io.StringIO(content), delimiter=separator), 2):
+        place = line_of(line)
         yield listed(
             number(row.get("index"), place), number(row.get("subindex"), place),
             row_of_bytes(row.get("data"), place), row.get("transition") or "", place,
@@ -75,32 +85,32 @@ class Download:
     write: Listed
 
 
-def igh(text: str) -> Iterator[Download]:
+def igh(script: str) -> Iterator[Download]:
     """Every ``ethercat download`` of a script, in its order."""
-    for line, content in enumerate(_lines(text), 1):
+    for line, content in enumerate(_lines(script), 1):
         match = _DOWNLOAD.match(content)
         if match is None:
             continue
-        place = f"line {line}"
+        place = line_of(line)
         options, plain = _words(f"{match['options'] or ''} {match['rest']}", place)
         kind = options.get("type", "")
         if len(plain) != 3 or kind not in _SIZE or kind in ("float", "double"):
-            raise BadRow(f"{place}: a download of type, index, subindex and whole number is read")
+            raise BadRow(text("handover.row-download-form", place=place))
         index, subindex, value = (_as_in_c(word, place) for word in plain)
         write = listed(index, subindex, sized(value, _SIZE[kind], place), "PS", place)
         yield Download((options.get("alias", ""), options.get("position", "")), write)
 
 
-def _as_in_c(word: str, place: str) -> int:
+def _as_in_c(word: str, place: Text) -> int:
     """A number as `ethercat` reads it: one that begins with 0 is octal."""
     octal = re.fullmatch(r"[+-]?0[0-7]+", word.strip())
     return int(word, 8) if octal else number(word, place)
 
 
-def _lines(text: str) -> list[str]:
+def _lines(content: str) -> list[str]:
     """Lines of a shell script; one that ends with a backslash goes on in the next."""
     lines: list[str] = []
-    for line in text.splitlines():
+    for line in content.splitlines():
         if lines and lines[-1].endswith("\\"):
             lines[-1] = lines[-1][:-1] + line
             lines.append("")  # keeps the numbers of the lines behind it
@@ -110,12 +120,13 @@ def _lines(text: str) -> list[str]:
     return lines
 
 
-def _words(line: str, place: str) -> tuple[dict[str, str], list[str]]:
+def _words(line: str, place: Text) -> tuple[dict[str, str], list[str]]:
     """Options by their long names, and the words that are no option."""
     try:
         words = iter(shlex.split(line, comments=True))
     except ValueError as error:
-        raise BadRow(f"{place}: {error}") from error
+        why = text("handover.row-refused", place=place, cause=prose(str(error)))
+        raise BadRow(why) from error
     options: dict[str, str] = {}
     plain: list[str] = []
     for word in words:
@@ -131,31 +142,31 @@ def _words(line: str, place: str) -> tuple[dict[str, str], list[str]]:
     return options, plain
 
 
-def ros2(text: str, profile: Profile, slave: int | None) -> Iterator[Listed]:
+def ros2(written: str, profile: Profile, slave: int | None) -> Iterator[Listed]:
     """A slave file of ethercat_driver_ros2, or a bus.yml of ros2_canopen."""
     # Aliases make a small file as large as a bomb, and deep nesting takes a parser minutes. No
     # slave file has either.
     depth = 0
-    for event in yaml.parse(text, yaml.CSafeLoader):
+    for event in yaml.parse(written, yaml.CSafeLoader):
         if isinstance(event, yaml.AliasEvent):
-            raise BadRow("YAML aliases are not read")
+            raise BadRow(text("handover.yaml-aliases"))
         depth += isinstance(event, yaml.CollectionStartEvent)
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > _MOST_YAML_LEVELS:
-            raise BadRow(f"YAML of more than {_MOST_YAML_LEVELS} levels is not read")
-    content = yaml.load(text, yaml.CSafeLoader)
+            raise BadRow(text("handover.yaml-levels", levels=_MOST_YAML_LEVELS))
+    content = yaml.load(written, yaml.CSafeLoader)
     rows = content.get("sdo") if isinstance(content, dict) else None
     if rows is None and isinstance(content, dict):
         nodes = _bus_nodes(content)
         rows = chosen(nodes, slave) if nodes else None
     for place_number, row in enumerate(rows if isinstance(rows, list) else [], 1):
-        place = f"sdo {place_number}"
+        place = prose(f"sdo {place_number}")
         if not isinstance(row, dict):
-            raise BadRow(f"{place}: is no row of index, sub_index and value")
+            raise BadRow(text("handover.row-sdo-form", place=place))
         index, subindex, value = (_whole(row, f, place) for f in ("index", "sub_index", "value"))
         kind = str(row.get("type") or _profile_type(profile, index, subindex))
         if kind not in _SIZE:
-            raise BadRow(f"{place}: type {kind[:40]!r} is not known")
+            raise BadRow(text("handover.row-unknown-type", place=place, type=kind[:40]))
         data = sized(value, _SIZE[kind], place)
         yield listed(index, subindex, data, "PS", place)
 
@@ -183,13 +194,14 @@ def _profile_type(profile: Profile, index: int, subindex: int) -> str:
     return {"REAL32": "uint32"}.get(parameter.type, parameter.type.lower())
 
 
-def _whole(row: dict[Any, Any], field: str, place: str) -> int:
+def _whole(row: dict[Any, Any], field: str, place: Text) -> int:
     """A whole number; bus.yml files have them as text in quotes as well."""
     value = row.get(field)
+    of_field = joined((place, field), ": ")
     if isinstance(value, str):
-        return number(value, f"{place}: {field}")
+        return number(value, of_field)
     if isinstance(value, bool) or not isinstance(value, int):
-        raise BadRow(f"{place}: {field} {str(value)[:40]!r} is no whole number")
+        raise BadRow(text("handover.row-no-whole-number", place=of_field, word=str(value)[:40]))
     return value
 
 
@@ -213,5 +225,5 @@ def concise_dcf(data: bytes) -> tuple[Listed, ...] | None:
         at += size
         if len(value) != size or not size or index < 0x1000:
             return None
-        found.append(Listed(index, subindex, value, "", f"entry {entry}"))
+        found.append(Listed(index, subindex, value, "", text("handover.place-entry", entry=entry)))
     return tuple(found) if at == len(data) and found else None

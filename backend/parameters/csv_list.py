@@ -11,12 +11,13 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from backend.drive.readings import Reading
 from backend.parameters.set_file import MAX_BYTES, BadSet, Row
 from backend.store.spreadsheet import as_text
+from drivers.texts.message import Text, Unsuitable, text
 from profiles.schema import Parameter, Profile, Raw
 
 _MAX_LINES = 20_000
@@ -51,10 +52,10 @@ class _Columns:
 
 @dataclass(frozen=True, slots=True)
 class ParameterList:
-    """Rows that can go on, and a sentence for each line that cannot."""
+    """Rows that can go on, and a message for each line that cannot."""
 
     readings: tuple[Reading, ...]
-    problems: tuple[str, ...]
+    problems: tuple[Text, ...]
 
 
 def write_csv(profile: Profile, rows: Iterable[Row]) -> str:
@@ -84,12 +85,12 @@ def read_csv(data: bytes, profile: Profile, name: str = "the file") -> Parameter
     """
     if len(data) > MAX_BYTES:
         raise BadSet("sets.larger-bytes", name=name, max_bytes=MAX_BYTES)
-    text = _decoded(data, name)
-    separator = _separator(text)
-    places, lines = _lines(text)
+    content = _decoded(data, name)
+    separator = _separator(content)
+    places, lines = _lines(content)
     columns: _Columns | None = None
     readings: dict[str, Reading] = {}
-    problems: list[str] = []
+    problems: list[Text] = []
     try:
         rows = csv.reader(lines[:_MAX_LINES], delimiter=separator, skipinitialspace=True)
         for cells in rows:
@@ -101,54 +102,59 @@ def read_csv(data: bytes, profile: Profile, name: str = "the file") -> Parameter
                 columns = _bare(cells)
             try:
                 reading = _reading(cells, columns, profile, separator)
-            except ValueError as error:
-                problems.append(f"line {number}: {error}")
+            except Unsuitable as error:
+                problems.append(text("sets.line", line=number, cause=error.why))
                 continue
             if reading.key in readings:
-                problems.append(f"line {number}: {reading.key} comes twice, the first one counts")
+                twice = text("sets.line-twice", key=reading.key)
+                problems.append(text("sets.line", line=number, cause=twice))
                 continue
             readings[reading.key] = reading
     except csv.Error as error:
         raise BadSet("sets.no-csv-file", name=name, cause=str(error)) from error
     if len(lines) > _MAX_LINES:
-        problems.append(f"only the first {_MAX_LINES} lines were read")
+        problems.append(text("sets.lines-left", lines=_MAX_LINES))
     if not readings:
-        first = f" ({problems[0]})" if problems else ""
-        raise BadSet("sets.no-value", name=name, profile_title=profile.title, first=first)
+        raise BadSet("sets.no-value", name=name, profile_title=profile.title, first=first(problems))
     return ParameterList(tuple(readings.values()), tuple(problems))
+
+
+def first(problems: Sequence[Text]) -> Text | str:
+    """The first problem, as it stands in the message that nothing could be read."""
+    return text("sets.first-problem", problem=problems[0]) if problems else ""
 
 
 def _decoded(data: bytes, name: str) -> str:
     encodings = ["utf-16"] if data[:2] in (b"\xff\xfe", b"\xfe\xff") else _ENCODINGS
     for encoding in encodings:
         try:
-            text = data.decode(encoding)
+            content = data.decode(encoding)
         except UnicodeDecodeError:
             continue
-        if "\0" not in text:
-            return text
+        if "\0" not in content:
+            return content
     raise BadSet("sets.no-text-file", name=name)
 
 
-def _lines(text: str) -> tuple[list[int], list[str]]:
+def _lines(content: str) -> tuple[list[int], list[str]]:
     """Lines that are neither empty nor a comment, and their numbers in the file."""
     kept = [
         (number, line)
-        for number, line in enumerate(text.splitlines(keepends=True), start=1)
+        for number, line in enumerate(content.splitlines(keepends=True), start=1)
         if line.strip() and line.lstrip()[0] != "#" and not _SEPARATOR_LINE.fullmatch(line.strip())
     ]
     return [number for number, _ in kept], [line for _, line in kept]
 
 
-def _separator(text: str) -> str:
+def _separator(content: str) -> str:
     """As a spreadsheet's first line says; else of the first line that is no comment: tabulator
     before semicolon before comma.
     """
-    reported = _SEPARATOR_LINE.fullmatch(text.partition("\n")[0].strip(" \r"))
+    reported = _SEPARATOR_LINE.fullmatch(content.partition("\n")[0].strip(" \r"))
     if reported is not None:
         return reported[1]
-    first = next(iter(_lines(text)[1]), "")
-    return next((mark for mark in ("\t", ";") if mark in first), ",")
+    line = next(iter(_lines(content)[1]), "")
+    return next((mark for mark in ("\t", ";") if mark in line), ",")
 
 
 def _headed(cells: list[str]) -> _Columns | None:
@@ -181,24 +187,24 @@ def _reading(cells: list[str], columns: _Columns, profile: Profile, separator: s
     raw = cell(columns.raw)
     if raw:
         return _made(parameter, _value(parameter, raw, separator))
-    text = cell(columns.value)
-    if not text:
-        raise ValueError(f"{parameter.key} has no value")
-    value = _value(parameter, text, separator)
+    written = cell(columns.value)
+    if not written:
+        raise Unsuitable(text("sets.line-no-value", key=parameter.key))
+    value = _value(parameter, written, separator)
     if isinstance(value, str):
         return _made(parameter, value)
     if not _same_unit(cell(columns.unit), parameter.unit):
-        raise ValueError(
-            f"{parameter.key}: {text[:40]} is in {cell(columns.unit)[:20]}, and this parameter "
-            f"is in {parameter.unit or 'plain numbers'}"
-        )
+        facts = {"key": parameter.key, "word": written[:40], "theirs": cell(columns.unit)[:20]}
+        if not parameter.unit:
+            raise Unsuitable(text("sets.line-has-unit", **facts))
+        raise Unsuitable(text("sets.line-other-unit", **facts, ours=parameter.unit))
     return _made(parameter, parameter.to_raw(value))
 
 
 def _made(parameter: Parameter, raw: Raw) -> Reading:
     if parameter.is_integer and isinstance(raw, float):
         if not raw.is_integer():
-            raise ValueError(f"{parameter.key}: {raw} is no whole number")
+            raise Unsuitable(text("sets.line-no-whole-number", key=parameter.key, word=f"{raw:g}"))
         raw = int(raw)
     return Reading(parameter.key, raw, parameter.to_value(raw), None)
 
@@ -213,7 +219,7 @@ def _parameter(key: str, index: str, subindex: str, profile: Profile) -> Paramet
         number = int(match[1] or match[2], 16)
         found = profile.by_key.get(f"{number:04X}:{sub:02X}") if sub is not None else None
     if found is None:
-        raise ValueError(f"{profile.title} has no parameter {shown[:60]!r}")
+        raise Unsuitable(text("sets.line-no-parameter", title=profile.title, word=shown[:60]))
     return found
 
 
@@ -227,24 +233,24 @@ def _same_unit(theirs: str, ours: str) -> bool:
     return not theirs or plain(theirs) == plain(ours)
 
 
-def _whole(text: str) -> int | None:
-    match = re.fullmatch(r"([+-]?)(?:0x([0-9a-f]{1,16})|([0-9]{1,20}))", text, re.I | re.A)
+def _whole(word: str) -> int | None:
+    match = re.fullmatch(r"([+-]?)(?:0x([0-9a-f]{1,16})|([0-9]{1,20}))", word, re.I | re.A)
     if match is None:
         return None
     number = int(match[2], 16) if match[2] else int(match[3])
     return -number if match[1] == "-" else number
 
 
-def _value(parameter: Parameter, text: str, separator: str) -> Raw:
+def _value(parameter: Parameter, word: str, separator: str) -> Raw:
     if parameter.type in ("STRING", "OCTETS"):
-        return text.removeprefix("'") if text[:2] in ("'=", "'+", "'-", "'@") else text
-    if (whole := _whole(text)) is not None:
+        return word.removeprefix("'") if word[:2] in ("'=", "'+", "'-", "'@") else word
+    if (whole := _whole(word)) is not None:
         return whole
-    if separator != "," and re.fullmatch(r"[+-]?[1-9]\d{0,2}([,.])\d{3}(\1\d{3})*", text, re.A):
+    if separator != "," and re.fullmatch(r"[+-]?[1-9]\d{0,2}([,.])\d{3}(\1\d{3})*", word, re.A):
         # 1,000 and 1.000 are a thousand to one person and one to another.
-        raise ValueError(f"{parameter.key}: {text} can be read in two ways")
+        raise Unsuitable(text("sets.line-two-ways", key=parameter.key, word=word))
     if separator != ",":
-        text = text.replace(",", ".")
-    if re.fullmatch(r"[+-]?(\d{1,20}\.?\d{0,20}|\.\d{1,20})(e[+-]?\d{1,2})?", text, re.I | re.A):
-        return float(text)
-    raise ValueError(f"{parameter.key}: {text[:40]!r} is no number")
+        word = word.replace(",", ".")
+    if re.fullmatch(r"[+-]?(\d{1,20}\.?\d{0,20}|\.\d{1,20})(e[+-]?\d{1,2})?", word, re.I | re.A):
+        return float(word)
+    raise Unsuitable(text("sets.line-no-number", key=parameter.key, word=word[:40]))

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from datetime import datetime
 
 from backend.drive.readings import Reading
-from backend.parameters.csv_list import ParameterList
+from backend.parameters.csv_list import ParameterList, first
 from backend.parameters.set_file import BadSet, Row
-from drivers.texts.message import reason_of
+from drivers.texts.message import Text, prose, reason_of, text
 from profiles.importer import (
     ImportFailed,
     ImportReport,
@@ -46,33 +46,37 @@ def read_dcf(data: bytes, profile: Profile, name: str = "the file") -> Parameter
     """
     report = ImportReport()
     readings: dict[str, Reading] = {}
-    problems: list[str] = []
+    problems: list[Text] = []
     try:
         problems += _of_another_drive(data, profile, name)
         for value in read_dcf_values(data, name, report):
             key = f"{value.index:04X}:{value.subindex:02X}"
             parameter = profile.by_key.get(key)
             if parameter is None:
-                problems.append(f"line {value.line}: {profile.title} has no parameter {key}")
+                unknown = text("sets.line-no-parameter", title=profile.title, word=key)
+                problems.append(text("sets.line", line=value.line, cause=unknown))
                 continue
             place = f"line {value.line}"
             raw, _ = default_value(value.text, parameter.type, place, report)
             if raw is None:
-                problems.append(f"{place}: {key}: {value.text[:40]!r} is no value of this type")
+                wrong = text("sets.line-wrong-type", key=key, word=value.text[:40])
+                problems.append(text("sets.line", line=value.line, cause=wrong))
             else:
                 readings[key] = Reading(key, raw, parameter.to_value(raw), None)
     except ImportFailed as error:
         raise BadSet(reason_of(error), remedy="sets.choose-dcf-or-csv") from error
-    problems += [str(finding) for finding in report.findings]
+    problems += [prose(str(finding)) for finding in report.findings]
     if not readings:
-        first = f" ({problems[0]})" if problems else ""
         raise BadSet(
-            "sets.no-value-choose-file", name=name, profile_title=profile.title, first=first
+            "sets.no-value-choose-file",
+            name=name,
+            profile_title=profile.title,
+            first=first(problems),
         )
     return ParameterList(tuple(readings.values()), tuple(problems))
 
 
-def _of_another_drive(data: bytes, profile: Profile, name: str) -> list[str]:
+def _of_another_drive(data: bytes, profile: Profile, name: str) -> list[Text]:
     """What the file says of its drive against the profile: the same numbers of another maker's
     drive mean something else.
 
@@ -91,8 +95,5 @@ def _of_another_drive(data: bytes, profile: Profile, name: str) -> list[str]:
             vendor_id=ours.vendor_id,
         )
     if product is not None and ours.product_code and product != ours.product_code:
-        return [
-            f"{name} is for product {product:08X}h, this family is {ours.product_code:08X}h: "
-            "check every value"
-        ]
+        return [text("sets.other-product", name=name, product=product, ours=ours.product_code)]
     return []

@@ -31,7 +31,7 @@ def import_list(
             source.found = Found(0, vendor_id=vendor, product_code=product)
     else:
         found = read_csv(data, profile, name)
-    notes = "\n".join(("imported from a list", *found.problems))[:4000]
+    notes = "\n".join(("imported from a list", *map(str, found.problems)))[:4000]
     return dump(source, found.readings, author="", notes=notes, saved=saved), found
 
 

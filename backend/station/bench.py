@@ -25,6 +25,7 @@ from backend.restore.store import RestoreStore
 from backend.scope.hub import ScopeHub
 from backend.station.buses import Buses
 from backend.station.connected_drive import ConnectedDrive
+from backend.station.doctor import Doctor
 from backend.station.drive_list import DriveList, SavedDrive, SavedPort
 from backend.station.exchanges import Exchanges
 from backend.station.matching import profile_for
@@ -80,6 +81,7 @@ class Bench:
         self._unstopped: set[tuple[str, int]] = set()
         self.exchanges = Exchanges(self)
         self.sessions = self.exchanges.running
+        self.doctor = Doctor(self)
         self.leases = Leases(self._lease_changed)
         self.recorder = AuditRecorder(self.audit, self.name_of)
         self.on_job.append(self.recorder.job_changed)

@@ -152,6 +152,24 @@ class Exchanges:
         finally:
             self._searched[url] -= 1
 
+    @contextlib.contextmanager
+    def reserved(self, url: str) -> Iterator[None]:
+        """Nothing else starts an exchange of this bus meanwhile, and no motion begins on it.
+
+        Raises:
+            Busy: its exchange runs or is being changed, it is searched, or a drive of it moves.
+        """
+        bench = self._bench
+        self._require_settled(url)
+        if url in self.running:
+            raise Busy("station.cyclic-exchange-runs-already", url=url)
+        for connected in bench.connected_drives.values():
+            if url in bench.buses.urls_of(connected.drive):
+                bench.motion.require_idle(connected)
+                self.require_calm(connected.drive.name, [url])
+        with self._changing_of(url):
+            yield
+
     def require_calm(self, name: str, urls: Collection[str]) -> None:
         """A motion of the axis of this ``name`` may begin.
 

@@ -30,6 +30,7 @@ from drivers.link import CyclicSignal, LinkEvent, ScopeBlock, Trajectory, Unsubs
 from drivers.motion.playback import AxisLoop
 from drivers.motion.setpoint_plan import Phase
 from drivers.motion.setpoints import require_fits
+from drivers.texts.message import Text, text
 
 SHORTEST_CYCLE_S = 0.001
 _MODE = 0x6060
@@ -90,9 +91,9 @@ class CanopenCyclic:
         return self
 
     @property
-    def trouble(self) -> str:
-        """Empty: an exchange that broke off is not set up again by itself."""
-        return ""
+    def trouble(self) -> Text | None:
+        """None: an exchange that broke off is not set up again by itself."""
+        return None
 
     def watch_nodes_by(self, heard: Callable[[int], bool]) -> None:
         """How to determine whether a node of this number is on the bus."""
@@ -215,7 +216,9 @@ class CanopenCyclic:
         try:
             await self.stop()
         except DriveError as error:
-            self._send_event(LinkEvent("fault", None, f"the PDOs could not be restored: {error}"))
+            self._send_event(
+                LinkEvent("fault", None, text("event.pdos-not-restored", cause=error.text))
+            )
 
     async def play(self, trajectories: Sequence[Trajectory]) -> int:
         """Play trajectories in step; returns the cycle counter of the first value.
@@ -353,7 +356,7 @@ class CanopenCyclic:
         own = self._settings.own_id
         if (event.kind, event.station) == ("boot", own) and self._loop.images.outputs:
             # From now on its heartbeat stands for ours: see `_require_own_number`.
-            twice = f"node {own}, the number of this computer's heartbeat, started"
+            twice = text("event.own-number-started", node=own)
             self._loop.halt(None, Halted(HaltCause.LOST, note=twice))
         elif event.kind in ("lost", "boot") or (event.kind == "fault" and event.station is None):
             self._loop.abandon(event.station, Halted(HaltCause.LOST, note=event.text))
@@ -392,8 +395,10 @@ class CanopenCyclic:
         if not self.owns(station):
             raise NotAllowed("canopen.node-control-word-not", node=station)
 
-    def _report(self, station: int, text: str) -> None:
-        self._send_event(LinkEvent("fault", station, f"node {station}: {text}"))
+    def _report(self, station: int, why: Text) -> None:
+        self._send_event(
+            LinkEvent("fault", station, text("event.of-node", node=station, event=why))
+        )
 
     def _deliver(self, block: ScopeBlock) -> None:
         for consumer in list(self._consumers):
@@ -421,12 +426,7 @@ class CanopenCyclic:
             if not self._setup.guard(station):
                 unguarded.add(station)
                 self._send_event(
-                    LinkEvent(
-                        "state",
-                        station,
-                        f"node {station} offers no heartbeat watchdog (1016h): it would not "
-                        "notice if this computer stopped sending",
-                    )
+                    LinkEvent("state", station, text("event.no-heartbeat-watchdog", node=station))
                 )
         self.unguarded = frozenset(unguarded)
         for key, slot in images.outputs.items():

@@ -10,6 +10,7 @@ from drivers.canopen.pdo import PdoPlan
 from drivers.codec import decode, encode, size_of
 from drivers.halt import Halted
 from drivers.motion.playback import AxisLoop
+from drivers.texts.message import Text
 from profiles.schema import INTEGER_RANGE, DataType
 
 Key = tuple[int, int, int]
@@ -42,7 +43,7 @@ class Images:
         self,
         pdos: Sequence[PdoPlan],
         cycle_s: float,
-        report: Callable[[int, str], None],
+        report: Callable[[int, Text], None],
         dialects: Mapping[int, cia402.Dialect] | None = None,
     ) -> None:
         self.channels: tuple[str, ...] = ()

@@ -433,7 +433,7 @@ class CanopenLink:
         self._announce(event)
 
     def _announce(self, event: LinkEvent) -> None:
-        self._port.ring.note(f"{event.kind}: {event.text}", event.station)
+        self._port.ring.note(f"{event.kind}: {event.text.words()}", event.station)
         loop = self._loop
         if loop is not None and not loop.is_closed():
             loop.call_soon_threadsafe(self._notify, event)

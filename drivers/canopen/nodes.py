@@ -10,30 +10,49 @@ from dataclasses import dataclass, field
 
 from drivers.canopen.frames import EMERGENCY, HEARTBEAT, NMT_STATES, SDO_REQUEST, SYNC, Frame
 from drivers.link import LinkEvent
+from drivers.texts.message import Param, Text, text
 
-_EMERGENCY_TEXT = {
-    0x00: "error reset or no error", 0x10: "generic error", 0x20: "current",
-    0x21: "current at the input", 0x22: "current inside the drive", 0x23: "current at the output",
-    0x30: "voltage", 0x31: "mains voltage", 0x32: "voltage inside the drive",
-    0x33: "voltage at the output", 0x40: "temperature", 0x41: "ambient temperature",
-    0x42: "temperature of the drive", 0x50: "hardware", 0x60: "software",
-    0x61: "internal software", 0x62: "user software", 0x63: "data set",
-    0x70: "additional modules", 0x80: "monitoring", 0x81: "communication",
-    0x82: "protocol error", 0x90: "external error", 0xF0: "additional functions",
-    0xFF: "specific to the maker",
-}  # fmt: skip
-
-_EMERGENCY_EXACT = {
-    0x8110: "CAN overrun: frames were lost",
-    0x8120: "CAN in error passive mode",
-    0x8130: "life guard or heartbeat error: the drive no longer hears its master",
-    0x8140: "recovered from bus-off",
-    0x8150: "two nodes send with the same identifier",
-    0x8210: "a PDO was too short and was not processed",
-    0x8220: "a PDO was too long",
-    0x8240: "SYNC of an unexpected length",
-    0x8250: "an expected PDO did not come in time",
+#: By the upper byte of the error code: its class (CiA 301 table 26).
+_EMERGENCY_CLASSES = {
+    0x00: text("emergency.none"),
+    0x10: text("emergency.generic"),
+    0x20: text("emergency.current"),
+    0x21: text("emergency.current-input"),
+    0x22: text("emergency.current-inside"),
+    0x23: text("emergency.current-output"),
+    0x30: text("emergency.voltage"),
+    0x31: text("emergency.mains-voltage"),
+    0x32: text("emergency.voltage-inside"),
+    0x33: text("emergency.voltage-output"),
+    0x40: text("emergency.temperature"),
+    0x41: text("emergency.ambient-temperature"),
+    0x42: text("emergency.drive-temperature"),
+    0x50: text("emergency.hardware"),
+    0x60: text("emergency.software"),
+    0x61: text("emergency.internal-software"),
+    0x62: text("emergency.user-software"),
+    0x63: text("emergency.data-set"),
+    0x70: text("emergency.additional-modules"),
+    0x80: text("emergency.monitoring"),
+    0x81: text("emergency.communication"),
+    0x82: text("emergency.protocol"),
+    0x90: text("emergency.external"),
+    0xF0: text("emergency.additional-functions"),
+    0xFF: text("emergency.makers"),
 }
+
+_EMERGENCIES = {
+    0x8110: text("emergency.can-overrun"),
+    0x8120: text("emergency.error-passive"),
+    0x8130: text("emergency.life-guard"),
+    0x8140: text("emergency.recovered-from-bus-off"),
+    0x8150: text("emergency.same-identifier"),
+    0x8210: text("emergency.pdo-too-short"),
+    0x8220: text("emergency.pdo-too-long"),
+    0x8240: text("emergency.sync-length"),
+    0x8250: text("emergency.pdo-missing"),
+}
+_UNLISTED = text("emergency.unlisted")
 
 #: A heartbeat this many of its own periods late is lost; 0.1 s more for a busy host.
 _LATE_PERIODS = 2.5
@@ -48,12 +67,12 @@ _FORGIVEN_S = 60.0
 _EMERGENCIES_PER_S = 10
 
 
-def emergency_text(code: int) -> str:
-    """Words for an emergency error code: exact where CiA 301 has one, else its class."""
-    exact = _EMERGENCY_EXACT.get(code)
-    if exact:
+def emergency_text(code: int) -> Text:
+    """What an emergency error code means: exact where CiA 301 has one, else its class."""
+    exact = _EMERGENCIES.get(code)
+    if exact is not None:
         return exact
-    return _EMERGENCY_TEXT.get(code >> 8, _EMERGENCY_TEXT.get(code >> 12 << 4, "unlisted code"))
+    return _EMERGENCY_CLASSES.get(code >> 8, _EMERGENCY_CLASSES.get(code >> 12 << 4, _UNLISTED))
 
 
 @dataclass(slots=True)
@@ -135,7 +154,9 @@ class NodeWatch:
         in_its_turn = record.alive and state == record.state
         if not record.alive:
             record.alive = True
-            events.append(LinkEvent("back", record.node, f"node {record.node} answers again"))
+            events.append(
+                LinkEvent("back", record.node, text("event.node-answers-again", node=record.node))
+            )
         if state == 0 and not toggle:
             events.append(self._boot(record, now_s))
         elif record.guard_asked_s is not None and not self._is_heartbeat(record, toggle):
@@ -150,7 +171,11 @@ class NodeWatch:
             record.state = state
             if known and state != 0:
                 events.append(
-                    LinkEvent("state", record.node, f"node {record.node} is {record.state_text}")
+                    LinkEvent(
+                        "state",
+                        record.node,
+                        text("event.node-state", node=record.node, state=record.state_text),
+                    )
                 )
         return events
 
@@ -166,12 +191,8 @@ class NodeWatch:
         record.guard_toggle = record.guard_asked_s = None
         record.guarded = False
         if record.in_use:
-            return LinkEvent(
-                "boot",
-                record.node,
-                f"node {record.node} restarted: values that were not saved are gone, read it again",
-            )
-        return LinkEvent("boot", record.node, f"node {record.node} started")
+            return LinkEvent("boot", record.node, text("event.node-restarted", node=record.node))
+        return LinkEvent("boot", record.node, text("event.node-started", node=record.node))
 
     def _guard_answer(self, record: NodeRecord, toggle: int, now_s: float) -> list[LinkEvent]:
         record.guard_asked_s = None
@@ -183,10 +204,7 @@ class NodeWatch:
         record.toggle_repeated_s = now_s
         return [
             LinkEvent(
-                "fault",
-                record.node,
-                f"node {record.node} repeated its guarding answer: an answer was lost, or two "
-                "nodes have this number",
+                "fault", record.node, text("event.guarding-answer-repeated", node=record.node)
             )
         ]
 
@@ -196,22 +214,24 @@ class NodeWatch:
         record.emergencies += 1
         record.last_emergency = code
         record.open_emergency = code or None
-        text = emergency_text(code)
+        meaning = emergency_text(code)
         if code == 0x8150:
-            record.conflict = text
+            record.conflict = meaning.words()
         if record.emergencies_reported >= _EMERGENCIES_PER_S:
             record.emergencies_untold += 1
             return events
         record.emergencies_reported += 1
-        extra = f", maker's bytes {data[3:8].hex(' ')}" if any(data[3:8]) else ""
-        reported = LinkEvent(
-            "emergency",
-            record.node,
-            f"node {record.node}: {text} (emergency {code:04X}h, "
-            f"error register {data[2]:02X}h{extra})",
-            code,
-        )
-        return [*events, reported]
+        facts: dict[str, Param] = {
+            "node": record.node,
+            "meaning": meaning,
+            "number": code,
+            "register": data[2],
+        }
+        if any(data[3:8]):
+            message = text("event.node-emergency-bytes", **facts, bytes=data[3:8].hex(" "))
+        else:
+            message = text("event.node-emergency", **facts)
+        return [*events, LinkEvent("emergency", record.node, message, code)]
 
     def _end_of_storm(self, record: NodeRecord, now_s: float) -> list[LinkEvent]:
         """Every second emergencies are reported again, after how many were not."""
@@ -222,11 +242,8 @@ class NodeWatch:
         record.emergencies_reported = record.emergencies_untold = 0
         if not untold:
             return []
-        text = (
-            f"node {record.node} sent {untold} more emergencies within a second, the last one "
-            f"{code:04X}h: a contact or a limit flickers"
-        )
-        return [LinkEvent("emergency", record.node, text, code)]
+        message = text("event.more-emergencies", node=record.node, count=untold, number=code or 0)
+        return [LinkEvent("emergency", record.node, message, code)]
 
     def overdue(self, now_s: float) -> list[LinkEvent]:
         """Nodes whose heartbeat stopped, each once; and emergencies not reported yet."""
@@ -248,7 +265,7 @@ class NodeWatch:
                     LinkEvent(
                         "lost",
                         record.node,
-                        f"node {record.node} stopped its heartbeat {silent_s:.1f} s ago",
+                        text("event.heartbeat-stopped", node=record.node, silent_s=silent_s),
                     )
                 )
         return events
@@ -272,7 +289,9 @@ class NodeWatch:
             if asked is not None and record.alive and record.guarded:
                 record.alive = False
                 events.append(
-                    LinkEvent("lost", record.node, f"node {record.node} does not answer guarding")
+                    LinkEvent(
+                        "lost", record.node, text("event.no-guarding-answer", node=record.node)
+                    )
                 )
             record.guard_asked_s = now_s
             ask.append(record.node)
@@ -292,16 +311,6 @@ class NodeWatch:
         foreign = record.foreign_master_s
         if foreign is not None and now_s - foreign < _DUPLICATE_WINDOW_S:
             record.conflict = "another master is talking to this node"
-            return LinkEvent(
-                "fault",
-                node,
-                f"another master is talking to node {node}: answers can be mixed up. "
-                "Stop the other master before writing anything",
-            )
+            return LinkEvent("fault", record.node, text("event.another-master", node=record.node))
         record.conflict = "two nodes have this number"
-        return LinkEvent(
-            "fault",
-            node,
-            f"two nodes answer as number {node}: both would obey a write. "
-            "Switch one off and give it another number",
-        )
+        return LinkEvent("fault", record.node, text("event.two-nodes-answer", node=record.node))

@@ -20,6 +20,7 @@ from drivers.canopen.url import CanUrl
 from drivers.errors import DriveError, LinkLost
 from drivers.flight.kinds import can_data, can_ring
 from drivers.link import LinkEvent
+from drivers.texts.message import text
 
 _IDLE_S = 0.05
 _FIRST_RETRY_S = 0.2
@@ -180,8 +181,9 @@ class CanPort:
         """Tell of the loss, then try until the adapter is open again or the port closes."""
         self._why = why
         self._drop_bus()
-        text = f"{why.message}. {why.remedy}" if why.remedy else why.message
-        self._on_event(LinkEvent("fault" if kind == "fault" else "lost", None, text))
+        remedy = why.remedy_text
+        event = why.text if remedy is None else text("event.lost", cause=why.text, remedy=remedy)
+        self._on_event(LinkEvent("fault" if kind == "fault" else "lost", None, event))
         while not self._closing.wait(retry_s):
             try:
                 bus = self._opener(self.url)
@@ -193,7 +195,9 @@ class CanPort:
                 self._bus = bus
             self._why = None
             self.reopened += 1
-            self._on_event(LinkEvent("back", None, f"CAN adapter {self.url.channel} is back"))
+            self._on_event(
+                LinkEvent("back", None, text("event.can-adapter-back", channel=self.url.channel))
+            )
             return
 
     def _drop_bus(self) -> None:

@@ -307,7 +307,9 @@ class SyncLoop:
                 self._lock.notify_all()
             if lost:
                 self.abandon(None, Halted(HaltCause.LOST, note=error.text))
-                self._notify(LinkEvent("state", None, f"cyclic exchange interrupted: {error}"))
+                self._notify(
+                    LinkEvent("state", None, text("event.exchange-interrupted", cause=error.text))
+                )
             return
         self._bus_lost = False
 

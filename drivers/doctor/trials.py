@@ -1,6 +1,6 @@
 """Settings of ours that can be tried where a drive does not reach Operational. Pure.
 
-A trial is a profile (or a cycle) that differs in one setting. It is kept nowhere: whoever tries it
+A trial is a profile (or a cycle) that differs in one setting. It is stored nowhere: who tries it
 attaches the profile as it was afterwards, and a person writes the setting into the profile.
 """
 
@@ -31,6 +31,11 @@ class Trial:
     after: str
     profile: Profile
     cycle_factor: int = 1
+
+    @property
+    def of_profile(self) -> bool:
+        """Whether it is a setting of the profile, and not the cycle of the exchange."""
+        return self.cycle_factor == 1
 
 
 def trials(causes: Sequence[Cause], profile: Profile) -> tuple[Trial, ...]:

@@ -194,7 +194,7 @@ class EthercatLink:
             retries=int(details["mailbox_repeats"]),
             lost_frames=int(cyclic.get("lost_frames", 0)),
             wkc_errors=int(cyclic.get("wkc_errors", 0)),
-            state=str(here["words"]) if here else self._host.words,
+            state=str(here["words"]) if here else self._host.why.words(),
             details=details,
         )
 
@@ -364,23 +364,24 @@ class EthercatLink:
             if kind == "back" and station is None and self.process_data.trouble:
                 # Who reads everything again on "back" waits until the drives have been set up.
                 kind = "state"
-            self._notify(LinkEvent(kind, station, message["text"], message["code"]))
+            self._notify(LinkEvent(kind, station, Text.from_wire(message["text"]), message["code"]))
 
-    def _restarted(self, why: str) -> None:
+    def _restarted(self, why: Text) -> None:
         self._status = {}
         self._notify(LinkEvent("lost", None, why))
         self.process_data.host_gone(why)
 
-    def _exchange_changed(self, text: str, well: bool) -> None:
+    def _exchange_changed(self, why: Text, well: bool) -> None:
         if not well:
-            self._notify(LinkEvent("fault", None, text))
+            self._notify(LinkEvent("fault", None, why))
             return
-        self._notify(LinkEvent("state", None, text))
+        self._notify(LinkEvent("state", None, why))
         for station in self.process_data.stations:
-            self._notify(LinkEvent("back", station, f"station {station} is in OP again, disabled"))
+            again = text("event.station-operational-disabled", station=station)
+            self._notify(LinkEvent("back", station, again))
 
     def _notify(self, event: LinkEvent) -> None:
-        self.recorder.note(f"{event.kind}: {event.text}", event.station)
+        self.recorder.note(f"{event.kind}: {event.text.words()}", event.station)
         for listener in tuple(self._listeners):
             listener(event)
 

@@ -34,6 +34,7 @@ from drivers.modbus.framing import (
 from drivers.modbus.late import LateAnswers
 from drivers.modbus.port import LineSettings, Port, is_pseudo_terminal, open_port
 from drivers.modbus.timing import sleep_precisely
+from drivers.texts.message import Text, text
 
 #: A line that talks longer than this without a pause is no Modbus line at these settings.
 _BABBLE_S = 1.0
@@ -65,7 +66,7 @@ class Line:
         self,
         settings: LineSettings,
         *,
-        on_change: Callable[[bool, str], None] = lambda _up, _text: None,
+        on_change: Callable[[bool, Text], None] = lambda _up, _text: None,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = sleep_precisely,
         opener: Callable[[LineSettings], Port] = open_port,
@@ -124,7 +125,7 @@ class Line:
                 self.open()
             except DriveError:
                 return False
-            self._on_change(True, f"the serial port {self.settings.device} is back")
+            self._on_change(True, text("event.serial-port-back", device=self.settings.device))
         return True
 
     def read(self, station: int, start: int, count: int, timeout_s: float | None = None) -> bytes:
@@ -223,7 +224,7 @@ class Line:
             self._port.close()
             self._port = None
             self.losses += 1
-            self._on_change(False, error.message)
+            self._on_change(False, error.text)
             raise
 
     def _exchange(

@@ -328,10 +328,10 @@ class RegisterLink:
             return True
         return None
 
-    def _changed(self, up: bool, text: str) -> None:
-        self._line.ring.note(text)
+    def _changed(self, up: bool, why: Text) -> None:
+        self._line.ring.note(why.words())
         if self._loop is not None and not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._notify, up, text)
+            self._loop.call_soon_threadsafe(self._notify, up, why)
 
     # --- on the event loop ---
 
@@ -340,10 +340,10 @@ class RegisterLink:
             raise LinkLost("modbus.not-open", url=self.url)
         return await self._thread.run(job, urgent=urgent)
 
-    def _notify(self, up: bool, text: str) -> None:
+    def _notify(self, up: bool, why: Text) -> None:
         if self._thread is None:
             return
-        event = LinkEvent("back" if up else "lost", None, text)
+        event = LinkEvent("back" if up else "lost", None, why)
         for listener in tuple(self._listeners):
             listener(event)
         if not up and (self._watcher is None or self._watcher.done()):

@@ -37,7 +37,7 @@ from drivers.motion.setpoint_plan import (
     Motion,
     Phase,
 )
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 
 STOP_S = 0.1
 """From any speed to standstill; shorter than the 200 ms in which a lost setpoint must end."""
@@ -70,7 +70,7 @@ class AxisLoop:
         outputs: dict[int, int],
         output_count: int,
         cycle_s: float,
-        report: Callable[[int, str], None],
+        report: Callable[[int, Text], None],
         dialect: cia402.Dialect = _STANDARD,
     ) -> None:
         self.station = station
@@ -179,13 +179,13 @@ class AxisLoop:
             if self._after_brake is State.OPERATION_ENABLED:
                 # It braked to hold on; now its motion is over.
                 self.halted, self._after_brake = why, goal
-                self._report(self.station, why.words)
+                self._report(self.station, why.text)
             return
         if self.phase is Phase.IDLE:
             self.goal = goal if self.goal is State.OPERATION_ENABLED else self.goal
             return
         self.halted = why
-        self._report(self.station, why.words)
+        self._report(self.station, why.text)
         motion, self._motion = self._motion, None
         self._clear_offsets()
         if motion is not None and motion.target == TORQUE:
@@ -291,7 +291,7 @@ class AxisLoop:
             self.halted = Halted(
                 HaltCause.LEFT_ENABLED, note=self.state.value, left_by=self._left_by(word)
             )
-            self._report(self.station, self.halted.words)
+            self._report(self.station, self.halted.text)
         self.phase = Phase.IDLE
         self._motion = None
         self._clear_offsets()
@@ -417,7 +417,7 @@ class AxisLoop:
                 self._after_quick_stop = State.READY if held else self._after_brake
                 if held:
                     self.halted = _RESTLESS_STILL
-                    self._report(self.station, _RESTLESS_STILL.words)
+                    self._report(self.station, _RESTLESS_STILL.text)
 
     def _lags_behind(self) -> bool:
         """Whether an axis that is to be held still follows its ramp, within the time for that."""

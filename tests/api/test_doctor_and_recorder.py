@@ -193,3 +193,68 @@ def test_the_command_shows_causes_with_facts_and_ends_with_1(station: Station) -
     assert rows[0]["station"] == 3
     assert rows[0]["causes"][0]["facts"]
     assert "the doctor supports" in command(station, "doctor", LINE, code=1)
+
+
+def slave(running: Station, command: str, **arguments: Any) -> Any:
+    return running.drives.segments[SEGMENT].command(command, slave=0, **arguments)
+
+
+def test_a_setting_is_tried_kept_and_undone(station: Station) -> None:
+    """The drive refuses Safe-Op at first, and takes the setting later, as after a repair."""
+    slave(station, "refuse", state="SAFEOP", code=0x0030)  # ETG.1020: invalid DC SYNC configuration
+    try:
+        refused = station.http.post("/buses/cyclic", json={"url": SEGMENT, "cycle_us": 2000})
+        assert refused.status_code == 409, refused.text
+        (seen,) = doctor(station, SEGMENT)
+        assert seen["causes"][0]["code"] == "clock_mode_wrong"
+        assert seen["kept"] is None
+        offered = {(each["setting"], each["after"]): each for each in seen["trials"]}
+        # Without an ESI file AssignActivate is 0300h; 0000h is no distributed clock.
+        trial = offered["bring_up.clock_modes", "0000h"]
+        assert trial["before"] == "0300h"
+        body = {"url": SEGMENT, "station": 1, "setting": trial["setting"], "after": "0000h"}
+        result = station.done(station.http.post("/buses/doctor/trials", json=body))
+        assert not result["reached"]
+        assert result["refusal"]["code"].startswith("ethercat.")
+        early = station.http.put("/buses/doctor/kept", json=body)
+        assert early.status_code == 409
+        assert "did not reach Operational" in early.json()["detail"]
+    finally:
+        slave(station, "refuse", state="SAFEOP", code=None)
+    result = station.done(station.http.post("/buses/doctor/trials", json=body))
+    assert (result["reached"], result["refusal"]) == (True, None)
+    assert not any(bus["cyclic"] for bus in station.ok(station.http.get("/buses")))
+
+    assert station.ok(station.http.put("/buses/doctor/kept", json=body)) == trial
+    (seen,) = doctor(station, SEGMENT)
+    assert (seen["kept"], seen["trials"]) == (trial, [])
+    bus = station.ok(station.http.post("/buses/cyclic", json={"url": SEGMENT, "cycle_us": 2000}))
+    assert bus["cyclic"]["running"]
+    # Register 0980h has the AssignActivate with which the exchange was started (ETG.1000.4).
+    assert slave(station, "register", address=0x0980) == 0x0000, "the kept setting counts"
+    running = station.http.delete("/buses/doctor/kept", params={"url": SEGMENT, "station": 1})
+    assert running.status_code == 409
+    station.ok(station.http.delete("/buses/cyclic", params={"url": SEGMENT}))
+    station.ok(station.http.delete("/buses/doctor/kept", params={"url": SEGMENT, "station": 1}))
+    (seen,) = doctor(station, SEGMENT)
+    assert seen["kept"] is None
+    station.ok(station.http.post("/buses/cyclic", json={"url": SEGMENT, "cycle_us": 2000}))
+    assert slave(station, "register", address=0x0980) == 0x0300
+    station.ok(station.http.delete("/buses/cyclic", params={"url": SEGMENT}))
+
+    rows = station.ok(station.http.get("/audit", params={"limit": 100}))["entries"]
+    told = [(row["action"], row["target"]) for row in rows if "doctor" in row["target"]]
+    assert ("changed", "/buses/doctor/kept") in told
+    assert ("deleted", "/buses/doctor/kept") in told
+    assert ("made", "/buses/doctor/trials") in told
+
+
+def test_what_is_not_offered_is_not_tried(station: Station) -> None:
+    body = {"url": SEGMENT, "station": 1, "setting": "pdo.remappable", "after": "other"}
+    job = station.job(station.http.post("/buses/doctor/trials", json=body))
+    assert job["state"] == "failed"
+    assert "does not offer" in job["problem"]["detail"]
+    on_the_line = station.http.post("/buses/doctor/trials", json=body | {"url": LINE})
+    assert on_the_line.status_code == 409
+    unknown = body | {"url": "canopen://virtual9"}
+    assert station.http.post("/buses/doctor/trials", json=unknown).status_code == 404

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 
@@ -14,6 +15,8 @@ from profiles.importer import export_eds
 from tests.support.jogging import jogged
 from tests.support.machine import within
 from tests.support.station import Station
+from tests.wire.makers_files.samples import SAMPLES
+from tests.wire.makers_files.strict_slave import File
 
 CAN = "canopen://virtual0"
 BENCH = """
@@ -227,3 +230,29 @@ def test_a_profile_is_exported_as_eds(station: Station) -> None:
     assert "[6083]" in answer.text
     assert station.http.get("/profiles/nobody/eds").status_code == 404
     assert station.http.get("/profiles/..%2Fmms7/eds").status_code in (404, 422)
+
+
+def test_an_imported_profile_is_exported_as_esi(station: Station) -> None:
+    """Read by the strict slave's reader, which shares nothing with the importer."""
+    original = SAMPLES["two_pulses"]
+    made = imported(station, original, "a.xml", profile="with_two_pulses")
+    assert "ethercat" in made["links"]
+    answer = station.http.get("/profiles/with_two_pulses/esi")
+    assert answer.status_code == 200
+    assert 'filename="with_two_pulses.xml"' in answer.headers["content-disposition"]
+    ours, theirs = read(answer.content), read(original)
+    assert (ours.pdos, ours.managers, ours.modes) == (theirs.pdos, theirs.managers, theirs.modes)
+
+
+def test_there_is_no_esi_of_a_drive_without_ethercat(station: Station) -> None:
+    answer = station.http.get("/profiles/ds_c/esi")
+    assert answer.status_code == 409
+    assert "without EtherCAT" in answer.json()["detail"]
+    assert station.http.get("/profiles/nobody/esi").status_code == 404
+
+
+def read(data: bytes) -> File:
+    """The device of an ESI file."""
+    device = ElementTree.fromstring(data).find("Descriptions/Devices/Device")
+    assert device is not None
+    return File(device)

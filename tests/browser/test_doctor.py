@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Locator, Page, expect
 
 from backend.station.demo import DemoBench
 from drivers.doctor.diagnosis import catalogue
@@ -120,3 +120,53 @@ def test_the_first_cause_is_the_injected_one(
         expect(first.locator("ul li").first).to_be_visible()
     finally:
         undo()
+
+
+def test_a_setting_is_tried_kept_and_undone(laptop: Page, station: Station) -> None:
+    """The drive refuses Safe-Op for its clock first, and takes the setting after a repair."""
+    drop = refusing(0x0030)(station)
+    try:
+        card = _card(laptop, SEGMENT, "Why not in Operational?")
+        trials = card.get_by_role("region", name="Settings to try")
+        attempt = trials.get_by_role("button", name="Try bring_up.clock_modes = 0000h")
+        attempt.click(timeout=SLOW_MS)
+        expect(trials).to_contain_text("does not reach Operational:", timeout=SLOW_MS)
+        expect(trials).to_contain_text("The setting is undone.")
+        expect(trials.get_by_role("button", name="Keep")).to_have_count(0)
+    finally:
+        drop()
+    attempt.click(timeout=SLOW_MS)
+    expect(trials).to_contain_text("the drive reaches Operational.", timeout=SLOW_MS)
+    trials.get_by_role("button", name="Keep").click()
+    kept = "Until the drive is connected anew: bring_up.clock_modes is 0000h instead of 0300h."
+    expect(trials).to_contain_text(kept, timeout=SLOW_MS)
+    expect(attempt).to_have_count(0)
+    trials.get_by_role("button", name="Undo").click()
+    expect(card).not_to_contain_text(kept, timeout=SLOW_MS)
+
+
+def test_settings_to_try_on_a_phone_in_chinese(phone: Page, station: Station) -> None:
+    phone.evaluate("localStorage.setItem('servodeck.language', 'zh')")
+    phone.reload()
+    drop = refusing(0x0030)(station)
+    try:
+        card = _card(phone, SEGMENT, "为何未进入 Operational？")
+        trials = card.get_by_role("region", name="可尝试的设置")
+        attempt = trials.get_by_role("button", name="尝试 bring_up.clock_modes = 0000h")
+        attempt.click(timeout=SLOW_MS)
+        expect(trials).to_contain_text("驱动器未进入 Operational：", timeout=SLOW_MS)
+        wide = phone.evaluate("document.documentElement.scrollWidth - window.innerWidth")
+        assert wide <= 0
+        box = attempt.bounding_box()
+        assert box is not None
+        assert box["x"] + box["width"] <= 390
+    finally:
+        drop()
+
+
+def _card(page: Page, url: str, title: str) -> Locator:
+    """The doctor of a bus, asked."""
+    page.evaluate("location.hash = '#/connect'")
+    card = page.locator(".bus").filter(has_text=url).get_by_role("region", name=title)
+    card.get_by_role("button", name=title).click(timeout=SLOW_MS)
+    return card

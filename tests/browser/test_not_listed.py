@@ -92,3 +92,19 @@ def test_a_serial_line_offers_the_search(laptop: Page, tmp_path: Path) -> None:
     page.get_by_label("Bus URL").first.fill(f"modbus://{tmp_path}/nothing")
     search.click()
     expect(page.get_by_role("alert")).to_contain_text("there is no serial port")
+
+
+def test_a_profile_is_saved_as_esi(laptop: Page) -> None:
+    page = laptop
+    page.get_by_text("Export a profile as EDS or ESI").click()
+    panel = page.get_by_role("region", name="My drive is not listed")
+    choice = panel.get_by_label("Profile")
+    choice.select_option("ds_c")
+    expect(panel.get_by_role("button", name="Export as EDS")).to_be_visible()
+    expect(panel.get_by_role("button", name="Export as ESI")).to_have_count(0)
+    choice.select_option("mms7")
+    with page.expect_download() as saved:
+        panel.get_by_role("button", name="Export as ESI").click()
+    assert saved.value.suggested_filename == "mms7.xml"
+    content = saved.value.path().read_text("utf-8")
+    assert "<EtherCATInfo" in content

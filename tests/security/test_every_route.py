@@ -200,6 +200,9 @@ def test_every_change_of_an_axis_asks_for_control(server: GuardedServer, cast: C
         server.call(lambda: server.bench.leases.give("x", "c0"))
 
 
+TRIAL = {"url": URL, "station": 1, "setting": "cycle", "after": "2"}
+
+
 @pytest.mark.parametrize(
     ("method", "path", "body"),
     [
@@ -207,6 +210,9 @@ def test_every_change_of_an_axis_asks_for_control(server: GuardedServer, cast: C
         ("POST", "/drives", {"url": URL, "station": 2, "profile": "mms7"}),
         ("POST", "/buses/cyclic", {"url": URL}),
         ("DELETE", f"/buses/cyclic?url={URL}", None),
+        ("POST", "/buses/doctor/trials", TRIAL),
+        ("PUT", "/buses/doctor/kept", TRIAL),
+        ("DELETE", f"/buses/doctor/kept?url={URL}&station=1", None),
     ],
 )
 def test_what_touches_a_bus_asks_for_its_drives(

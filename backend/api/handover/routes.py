@@ -207,7 +207,10 @@ async def compare_handover(
         conflicts=[_conflict(drive.profile, each) for each in verdict.conflicts],
         defects=[
             HandoverDefect(
-                kind=each.kind, key=each.key, place=each.place, text=each.text.words(language())
+                kind=each.kind,
+                key=each.key,
+                place=each.place.words(language()),
+                text=each.text.words(language()),
             )
             for each in verdict.findings
         ],

@@ -83,6 +83,7 @@ _API: dict[str, Need] = {
     "GET /profiles": _LOOK,
     "GET /profiles/matches": _LOOK,
     "GET /profiles/{profile}/eds": _LOOK,
+    "GET /profiles/{profile}/esi": _LOOK,
     "GET /profiles/{profile}/texts": _LOOK,
     "GET /profiles/{profile}/parameters/{key}/motion": _LOOK,
     "PUT /profiles/{profile}/parameters/{key}/motion": _STATION,
@@ -93,6 +94,10 @@ _API: dict[str, Need] = {
     "DELETE /buses": _STATION,
     "GET /buses/flight": _LOOK,
     "GET /buses/doctor": _LOOK,
+    # A trial takes a drive to Operational, not enabled; what is kept is of our own bring-up.
+    "POST /buses/doctor/trials": _STATION_BUS,
+    "PUT /buses/doctor/kept": _STATION_BUS,
+    "DELETE /buses/doctor/kept": _STATION_BUS,
     "POST /scan": _STATION_BUS,
     "POST /search-line": _STATION,
     "GET /preflight": _LOOK,

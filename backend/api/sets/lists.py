@@ -13,7 +13,7 @@ from backend.api.station.models_description import ImportedList
 from backend.parameters.lists import export_list, import_list
 from backend.parameters.set_file import MAX_BYTES, BadSet
 from drivers.errors import NotAllowed
-from drivers.texts.message import reason_of, text
+from drivers.texts.message import language, reason_of, text
 from profiles import load_profile
 from profiles.loader import ProfileError
 from profiles.schema import Profile
@@ -90,5 +90,7 @@ async def store_list(
     line = text("journal.set-imported", file=stored, count=len(found.readings))
     bench.journal.add(line)
     return ImportedList(
-        file=stored, parameters=len(found.readings), problems=list(found.problems[:200])
+        file=stored,
+        parameters=len(found.readings),
+        problems=[each.words(language()) for each in found.problems[:200]],
     )

@@ -31,13 +31,13 @@ from drivers.link import Found
 from drivers.texts import limits
 from drivers.texts.message import reason_of, text
 from profiles import drive_names, load_profile
-from profiles.importer import ImportFailed, export_eds
+from profiles.importer import ImportFailed, export_eds, export_esi
 from profiles.importer.esi import MAX_BYTES
 from profiles.importer.process import DevicesTask, FileTask
 from profiles.language.overlay import Language, load_overlay
 from profiles.language.texts import translations
 from profiles.loader import ProfileError, user_folder
-from profiles.schema import LinkKind
+from profiles.schema import LinkKind, Profile
 
 router = APIRouter()
 
@@ -47,6 +47,7 @@ _BODY = {
         "content": {"application/octet-stream": {"schema": {"type": "string"}}},
     }
 }
+ProfileName = Annotated[str, Path(pattern=PROFILE_NAME, description="name of the profile")]
 FileName = Annotated[str, Query(min_length=1, max_length=200, description="name of the file")]
 
 
@@ -155,16 +156,9 @@ async def profile_matches(
 
 
 @router.get("/profiles/{profile}/eds", response_class=Response)
-async def export_profile(
-    profile: Annotated[str, Path(pattern=PROFILE_NAME, description="name of the profile")],
-) -> Response:
+async def export_profile(profile: ProfileName) -> Response:
     """A profile's objects as a CANopen EDS file."""
-    try:
-        known = load_profile(profile)
-    except ProfileError as error:
-        raise NotFound(
-            reason_of(error), value=profile, remedy="api-station.see-profiles"
-        ) from error
+    known = _known(profile)
     text = export_eds(known, datetime.now())
     return Response(
         text.encode("utf-8"),
@@ -173,9 +167,29 @@ async def export_profile(
     )
 
 
+@router.get("/profiles/{profile}/esi", response_class=Response)
+async def export_slave_information(profile: ProfileName) -> Response:
+    """A profile's identity, objects, PDOs and bring-up as an EtherCAT ESI file (ETG.2000)."""
+    known = _known(profile)
+    if known.link("ethercat") is None:
+        raise NotAllowed("api-station.no-ethercat-profile", value=profile)
+    return Response(
+        export_esi(known),
+        media_type="application/xml",
+        headers={"Content-Disposition": f'attachment; filename="{known.drive}.xml"'},
+    )
+
+
+def _known(name: str) -> Profile:
+    try:
+        return load_profile(name)
+    except ProfileError as error:
+        raise NotFound(reason_of(error), value=name, remedy="api-station.see-profiles") from error
+
+
 @router.get("/profiles/{profile}/texts")
 async def profile_texts(
-    profile: Annotated[str, Path(pattern=PROFILE_NAME, description="name of the profile")],
+    profile: ProfileName,
     language: Annotated[Language, Query(description="language of the texts")],
 ) -> ProfileTexts:
     """The texts of a profile in another language, by their English original."""

@@ -102,7 +102,7 @@ async def start_cyclic(
     bench: TheBench, request: CyclicRequest, connection: Connection = None
 ) -> Bus:
     """Exchange process data with all drives of a bus."""
-    _require_bus(bench, request.url, connection)
+    require_bus(bench, request.url, connection)
     await bench.start_cyclic(request.url, request.cycle_us / 1e6)
     return convert.bus(bench, request.url, bench.buses.opened[request.url])
 
@@ -112,12 +112,12 @@ async def stop_cyclic(
     bench: TheBench, url: Annotated[str, Query()], connection: Connection = None
 ) -> Response:
     """End the cyclic exchange of a bus; what moves is braked."""
-    _require_bus(bench, url, connection)
+    require_bus(bench, url, connection)
     await bench.stop_cyclic(url)
     return Response(status_code=204)
 
 
-def _require_bus(bench: Bench, url: str, connection: str | None) -> None:
+def require_bus(bench: Bench, url: str, connection: str | None) -> None:
     """Control of every drive of a bus."""
     for connected in bench.connected_drives.values():
         if any(bench.buses.url_of(port) == url for port in connected.drive.ports):
@@ -134,7 +134,7 @@ async def close_bus(bench: TheBench, url: Annotated[str, Query()]) -> Response:
 @router.post("/scan", status_code=202)
 async def scan(bench: TheBench, request: ScanRequest, connection: Connection = None) -> JobInfo:
     """Look for drives; the job's result is ``{"found": [FoundDrive]}``."""
-    _require_bus(bench, request.url, connection)
+    require_bus(bench, request.url, connection)
 
     async def work(progress: Progress) -> JobResult:
         seen: list[Found] = await bench.buses.scan(
@@ -158,7 +158,7 @@ async def connect(
     bench: TheBench, request: ConnectRequest, connection: Connection = None
 ) -> DriveSummary:
     """Make a station a drive of the bench. Its identity is asked for first."""
-    _require_bus(bench, request.url, connection)
+    require_bus(bench, request.url, connection)
     seen = await bench.buses.scan(request.url, [request.station], lambda _fraction, _step: None)
     found = next((f for f in seen if f.station == request.station), None)
     connected = await bench.connect(

@@ -181,7 +181,7 @@ class Exchange:
         def one(number: int) -> Done:
             def reached(_result: object, error: DriveError | None) -> None:
                 if error is not None:
-                    self._report("state", number, error.message)
+                    self._report("state", number, error.text)
                 waiting.discard(number)
                 if not waiting:
                     self.abandon()
@@ -247,9 +247,9 @@ class Exchange:
             if error is not None:
                 if self.loop is not None:
                     self.loop.leave_out(number, lost=True)
-                self._report("state", number, error.message)
+                self._report("state", number, error.text)
             elif self.loop is not None:
-                self._report("back", number, f"station {number} is in OP again")
+                self._report("back", number, text("event.station-operational", station=number))
 
         self._lanes.submit(number, "mailbox", self._heal(station, restarted=restarted), done)
 

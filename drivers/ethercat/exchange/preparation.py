@@ -20,15 +20,17 @@ from drivers.ethercat.process.station import Station, identify
 from drivers.ethercat.wire import coe
 from drivers.ethercat.wire.lanes import Done, LaneName, Lanes
 from drivers.ethercat.wire.steps import Steps
+from drivers.link import EventKind
 from drivers.motion.interpolation import interpolation_period
 from drivers.motion.playback import AxisLoop
 from drivers.texts import limits
+from drivers.texts.message import Text, text
 
 CYCLE_NS = (250_000, 10_000_000)
 _SETUP_S = 30.0
 T = TypeVar("T")
-Report = Callable[[str, int | None, str], None]
-"""Kind of event, station, text."""
+Report = Callable[[EventKind, int | None, Text], None]
+"""Kind of event, station, message."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +66,7 @@ class Preparation:
     def identify(self, stations: Sequence[Station]) -> None:
         """Identify all stations after a search, which leaves those that can in PREOP."""
         jobs = {s.number: identify(s, time.monotonic) for s in stations}
-        self._run("mailbox", jobs, "identifying the stations")
+        self._run("mailbox", jobs, "ethercat.doing-identifying")
 
     def configure(self, stations: Sequence[Station], message: Message) -> Prepared:
         """Write mappings, build the IO map, set clocks and watchdogs; ends in SAFEOP.
@@ -116,7 +118,7 @@ class Preparation:
             number: setup_.write_mapping(self._stations[number - 1], plan)
             for number, plan in self._setups.items()
         }
-        self._run("mailbox", jobs, "writing the process data mapping")
+        self._run("mailbox", jobs, "ethercat.doing-writing-mapping")
 
     def _map(self) -> dict[int, list[int]]:
         """Build the IO map; returns the values that the outputs begin with."""
@@ -125,21 +127,21 @@ class Preparation:
             for station in self._stations
             if station.mailbox is not None
         }
-        total = sum(self._run("mailbox", sizes, "reading the process data sizes").values())
+        total = sum(self._run("mailbox", sizes, "ethercat.doing-reading-sizes").values())
         initial = self._run(
             "mailbox",
             {
                 number: setup_.initial_outputs(self._stations[number - 1], plan.rx.entries)
                 for number, plan in self._setups.items()
             },
-            "reading the values of the mapped objects",
+            "ethercat.doing-reading-values",
         )
         probes = {
             s.number: setup_.reads_whole(s)
             for s in self._stations
             if s.mailbox is not None and not (s.vendor_id or s.product_code)
         }
-        whole = self._run("mailbox", probes, "asking who knows complete access")
+        whole = self._run("mailbox", probes, "ethercat.doing-complete-access")
         entry_by_entry = [number for number, can in whole.items() if not can]
         entry_by_entry += [
             n for n, plan in self._setups.items() if plan.bring_up.complete_access is False
@@ -148,8 +150,8 @@ class Preparation:
             self._segment.map(total)
         # An emergency that lies in a mailbox would make SOEM's mapping fail.
         drains = {s.number: s.box.drain() for s in self._stations if s.mailbox is not None}
-        self._run("mailbox", drains, "emptying the mailboxes")
-        self._announce_life("building the process data map")
+        self._run("mailbox", drains, "ethercat.doing-emptying-mailboxes")
+        self._announce_life("ethercat.doing-building-map")
         self._segment.map(total, entry_by_entry)
         wrong = {n: p for n, p in self._setups.items() if not self._fits(n, p)}
         if not wrong:
@@ -174,33 +176,35 @@ class Preparation:
             number: setup_.check_places(self._stations[number - 1], plan, time.monotonic)
             for number, plan in self._setups.items()
         }
-        self._run("register", jobs, "looking where the process data are")
+        self._run("register", jobs, "ethercat.doing-locating-process-data")
         controls = {
             number: set_controls(self._stations[number - 1], plan.bring_up)
             for number, plan in self._setups.items()
         }
-        self._run("register", controls, "setting the sync managers")
+        self._run("register", controls, "ethercat.doing-sync-managers")
 
     def _clocks_and_watchdogs(self) -> None:
-        self._announce_life("starting the distributed clocks")
+        self._announce_life("ethercat.doing-clocks")
         if self._segment.master.config_dc() and self._dc:
             starts = {
                 number: setup_.start_sync0(self._stations[number - 1], plan, time.monotonic)
                 for number, plan in self._setups.items()
             }
-            self._run("register", starts, "starting SYNC0")
+            self._run("register", starts, "ethercat.doing-sync0")
         # SOEM used the mailboxes by itself: its counter is unknown to us.
         fences = {
             s.number: coe.settle(s.box, force=True) for s in self._stations if s.mailbox is not None
         }
-        self._run("mailbox", fences, "taking the mailboxes over")
+        self._run("mailbox", fences, "ethercat.doing-mailboxes")
         guards = {
             number: setup_.arm_watchdog(self._stations[number - 1], plan)
             for number, plan in self._setups.items()
         }
-        self._run("register", guards, "setting the watchdogs")
+        self._run("register", guards, "ethercat.doing-watchdogs")
         self._snapshots = self._run(
-            "register", {n: setup_.take_snapshot() for n in self._setups}, "noting the registers"
+            "register",
+            {n: setup_.take_snapshot() for n in self._setups},
+            "ethercat.doing-registers",
         )
         # Other drives stay in PREOP: nobody has set their process data up.
         spared = {
@@ -208,7 +212,7 @@ class Preparation:
             for s in self._stations
             if s.number not in self._setups and s.mailbox is not None
         }
-        self._run("register", spared, "leaving other drives alone", optional=set(spared))
+        self._run("register", spared, "ethercat.doing-other-drives", optional=set(spared))
         states = {
             station.number: setup_.to_safeop(
                 station, self._setups.get(station.number), time.monotonic
@@ -216,7 +220,9 @@ class Preparation:
             for station in self._stations
             if station.number not in spared
         }
-        self._run("register", states, "going to SAFEOP", optional=set(states) - set(self._setups))
+        self._run(
+            "register", states, "ethercat.doing-safeop", optional=set(states) - set(self._setups)
+        )
 
     def _image(self, number: int, initial: list[int]) -> Image:
         plan = self._setups[number]
@@ -227,7 +233,7 @@ class Preparation:
             outputs=places(plan.rx.entries),
             output_count=len(initial),
             cycle_s=self._cycle_ns / 1e9,
-            report=lambda station, text: self._report("fault", station, text),
+            report=lambda station, why: self._report("fault", station, why),
         )
         axis.outputs[:] = initial
         wkc = (2 if rx.size else 0) + (1 if tx.size else 0)
@@ -236,6 +242,7 @@ class Preparation:
         )
 
     def _announce_life(self, doing: str) -> None:
+        """Show a sign of life; ``doing`` is the code of what takes so long."""
         self._ring.host_lives_until(time.monotonic_ns() + int(_SETUP_S * 1e9), doing)
 
     def _run(
@@ -264,14 +271,15 @@ class Preparation:
         deadline = time.monotonic() + _SETUP_S
         while len(results) + len(errors) < len(jobs):
             if time.monotonic() > deadline:
-                self._lanes.drop(f"{doing} takes longer than {_SETUP_S:g} s")
-                raise LinkTimeout("ethercat.takes-longer", doing=doing, setup_s=_SETUP_S)
+                late = LinkTimeout("ethercat.takes-longer", doing=text(doing), setup_s=_SETUP_S)
+                self._lanes.drop(late.text)
+                raise late
             if not self._lanes.step():
                 time.sleep(0.0002)
         for number, error in errors.items():
             if number not in optional:
                 raise error
-            self._report("state", number, error.message)
+            self._report("state", number, error.text)
         return results
 
 

@@ -13,34 +13,34 @@ import contextlib
 from collections.abc import Awaitable, Callable
 
 from drivers.errors import DriveError
-from drivers.texts.message import Text
+from drivers.texts.message import Text, text
 
 PAUSES_S = (0.3, 1.0, 3.0, 10.0)
 
 
 class Recovery:
-    """Calls ``set_up`` until it succeeds; ``notify`` gets a sentence at every change."""
+    """Calls ``set_up`` until it succeeds; ``notify`` gets a message at every change."""
 
     def __init__(
         self,
         ready: Callable[[], bool],
         set_up: Callable[[], Awaitable[None]],
-        notify: Callable[[str, bool], None],
+        notify: Callable[[Text, bool], None],
     ) -> None:
         """``ready`` says whether an attempt makes sense, ``notify`` whether all is well again."""
         self._ready = ready
         self._set_up = set_up
         self._notify = notify
         self._task: asyncio.Task[None] | None = None
-        self.trouble = ""
-        """Why the exchange does not run although it is wanted, as text; else empty."""
+        self.trouble: Text | None = None
+        """Why the exchange does not run although it is wanted; else None."""
 
     @property
     def active(self) -> bool:
         """Whether the exchange is being set up again, or waits for that."""
         return self._task is not None
 
-    def begin(self, why: str) -> None:
+    def begin(self, why: Text) -> None:
         """Start trying; does nothing while that goes on already."""
         if self._task is None:
             self.trouble = why
@@ -49,7 +49,7 @@ class Recovery:
     async def end(self) -> None:
         """Give up, because the exchange is no longer wanted."""
         task, self._task = self._task, None
-        self.trouble = ""
+        self.trouble = None
         if task is not None and task is not asyncio.current_task():
             task.cancel()
             with contextlib.suppress(asyncio.CancelledError):
@@ -66,19 +66,12 @@ class Recovery:
             try:
                 await self._set_up()
             except DriveError as error:
-                self.trouble = error.message
+                self.trouble = error.text
                 if error.text != last:
                     last = error.text
-                    self._notify(
-                        f"the cyclic exchange could not be set up again: {last};"
-                        " it is tried again by itself",
-                        False,
-                    )
+                    self._notify(text("event.exchange-not-restored", cause=last), False)
                 continue
             self._task = None
-            self.trouble = ""
-            self._notify(
-                "the cyclic exchange runs again; every axis is disabled until you enable it",
-                True,
-            )
+            self.trouble = None
+            self._notify(text("event.exchange-runs-again"), True)
             return

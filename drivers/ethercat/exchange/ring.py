@@ -79,7 +79,10 @@ class Ring:
     # Signs of life -------------------------------------------------------------------------
 
     def host_lives_until(self, deadline_ns: int, doing: str = "") -> None:
-        """The host announces that it comes back before ``deadline_ns`` (monotonic)."""
+        """The host announces that it comes back before ``deadline_ns`` (monotonic).
+
+        ``doing`` is the code of what it does until then.
+        """
         if doing:
             text = doing.encode()[: _BUSY_ROOM - 1].ljust(_BUSY_ROOM, b"\0")
             self._view[_BUSY_TEXT : _BUSY_TEXT + _BUSY_ROOM] = text
@@ -90,7 +93,7 @@ class Ring:
         return int(_U64.unpack_from(self._view, _HOST_DEADLINE)[0])
 
     def host_doing(self) -> str:
-        """What the host last said it would do."""
+        """What the host does until its deadline, as a code; empty where it reported nothing."""
         raw = bytes(self._view[_BUSY_TEXT : _BUSY_TEXT + _BUSY_ROOM])
         return raw.split(b"\0", 1)[0].decode("utf-8", "replace")
 

@@ -24,6 +24,7 @@ from drivers.ethercat.process.protocol import Message
 from drivers.halt import Halted, LoopState
 from drivers.link import CyclicSignal, ScopeBlock, Trajectory, Unsubscribe
 from drivers.motion.setpoint_plan import Phase
+from drivers.texts.message import Text, text
 from profiles.schema import Profile
 
 _ANSWER_S, _CONFIGURE_S, _START_S, _STOP_S = 5.0, 60.0, 25.0, 15.0
@@ -50,10 +51,10 @@ class EthercatCyclic:
         self,
         host: HostProcess,
         profiles: Mapping[int, Profile],
-        notify: Callable[[str, bool], None],
+        notify: Callable[[Text, bool], None],
         note: Callable[[str, int | None], None] = lambda _text, _station: None,
     ) -> None:
-        """``notify`` gets a sentence when the exchange breaks off (False) or runs again (True).
+        """``notify`` gets a message when the exchange breaks off (False) or runs again (True).
 
         ``note`` gets what is commanded, with its station, for the record of the bus.
         """
@@ -278,17 +279,17 @@ class EthercatCyclic:
         return tuple(plan.station for plan in self._plans)
 
     @property
-    def trouble(self) -> str:
-        """Why the exchange does not run although it is wanted, as text; else empty."""
+    def trouble(self) -> Text | None:
+        """Why the exchange does not run although it is wanted; else None."""
         return self._recovery.trouble
 
     def update(self, status: Message, *, reachable: bool) -> None:
         """Newest figures of the loop, from the host; ``reachable``: the interface is open."""
         self._status = status
         if self._wanted and reachable and not status["running"] and not self._recovery.active:
-            self._broke_off("the exchange ended by itself")
+            self._broke_off(text("event.exchange-ended-by-itself"))
 
-    def host_gone(self, why: str) -> None:
+    def host_gone(self, why: Text) -> None:
         """The host ended: so did the exchange."""
         if self._wanted and not self._recovery.active:
             self._broke_off(why)
@@ -325,13 +326,9 @@ class EthercatCyclic:
         self._reader = reader = ring.reader(self._fields)
         self._draining = asyncio.get_running_loop().create_task(self._drain(reader))
 
-    def _broke_off(self, why: str) -> None:
+    def _broke_off(self, why: Text) -> None:
         self.shut_down()
-        self._notify(
-            f"the cyclic exchange broke off: {why}; every axis stops, and the exchange is set up"
-            " again by itself",
-            False,
-        )
+        self._notify(text("event.exchange-broke-off", cause=why), False)
         self._recovery.begin(why)
 
     async def _set_up_again(self) -> None:

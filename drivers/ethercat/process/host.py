@@ -64,7 +64,7 @@ class Host:
             return
         while not self._orphaned:
             self._turn()
-        self._ring.host_lives_until(time.monotonic_ns() + 10_000_000_000, "ending")
+        self._ring.host_lives_until(time.monotonic_ns() + 10_000_000_000, "ethercat.doing-ending")
         self.operations.shut_down(text("ethercat.server-is-gone"))
 
     def _turn(self) -> None:

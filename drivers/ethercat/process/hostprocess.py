@@ -13,12 +13,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from drivers.errors import DriveError, LinkLost, LinkTimeout
+from drivers.errors import DriveError, LinkLost, LinkTimeout, why_of
 from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.process import protocol
 from drivers.ethercat.process.protocol import Message
 from drivers.link import Progress
-from drivers.texts.message import Text
+from drivers.texts.message import Text, text
 
 _WATCH_S = 0.1
 _RESTART_PAUSE_S = (0.2, 1.0, 3.0, 10.0)
@@ -36,12 +36,12 @@ class HostProcess:
         interface: str,
         launcher: Sequence[str],
         received: Callable[[Message], None],
-        restarted: Callable[[str], None],
+        restarted: Callable[[Text], None],
         options: Sequence[str] = (),
     ) -> None:
         self._options = tuple(options)
         self.restarts = 0
-        self.words, self._opened = "not opened", False
+        self.why, self._opened = text("ethercat.process-not-opened"), False
         self.granted: tuple[str, ...] = ()
         self.ring: Ring | None = None
         self._interface = interface
@@ -99,7 +99,7 @@ class HostProcess:
                 await self._care
             self._care = None
         await self._end(kill=False)
-        self.words = "closed"
+        self.why = text("ethercat.process-closed")
 
     async def call(
         self, message: Message, timeout_s: float, progress: Progress | None = None
@@ -113,7 +113,7 @@ class HostProcess:
         """
         if not self.running or self._socket is None:
             raise LinkLost(
-                "ethercat.ethercat-process-not-running", interface=self._interface, words=self.words
+                "ethercat.ethercat-process-not-running", interface=self._interface, words=self.why
             )
         number = next(self._numbers)
         future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
@@ -151,7 +151,7 @@ class HostProcess:
         self._socket = ours
         self._ready = loop.create_future()
         self._reader = loop.create_task(self._read(ours))
-        self.words = "starting"
+        self.why = text("ethercat.process-starting")
         try:
             async with asyncio.timeout(timeout_s):
                 await asyncio.shield(self._ready)
@@ -161,7 +161,7 @@ class HostProcess:
                 interface=self._interface,
                 timeout_s=timeout_s,
             ) from None
-        self.words, self._opened = "open", True
+        self.why, self._opened = text("ethercat.process-open"), True
 
     async def _launch(self) -> socket.socket:
         """Start the child; our end of its control channel. Raises OSError, with nothing left."""
@@ -194,14 +194,14 @@ class HostProcess:
             except OSError:
                 data = b""
             if not data:
-                self._gone("the EtherCAT process ended")
+                self._gone(text("ethercat.ethercat-process-ended"))
                 return
             try:
                 for message in unpacker.feed(data):
                     self._take(message)
-            except (DriveError, ValueError, KeyError) as error:
+            except (DriveError, ValueError, KeyError, TypeError) as error:
                 # Not our language any more: the child is replaced.
-                self._gone(f"the EtherCAT process sent nonsense ({error})")
+                self._gone(text("ethercat.process-unreadable", cause=why_of(error)))
                 if self._process is not None and self._process.returncode is None:
                     self._process.kill()
                 return
@@ -230,14 +230,14 @@ class HostProcess:
                 ready.set_result(None)
         elif message["event"] == "failed":
             error = protocol.error_from_wire(message["error"])
-            self.words, self._opened = error.message, False
+            self.why, self._opened = error.text, False
             if ready is not None and not ready.done():
                 ready.set_exception(error)
         else:
             self._received(message)
 
-    def _gone(self, why: str) -> None:
-        self.words, self._opened = why, False
+    def _gone(self, why: Text) -> None:
+        self.why, self._opened = why, False
         lost = LinkLost(why, remedy="ethercat.started-again-by-itself")
         if self._ready is not None and not self._ready.done():
             self._ready.set_exception(lost)
@@ -248,7 +248,7 @@ class HostProcess:
     async def _write(self, data: bytes) -> None:
         ours = self._socket
         if ours is None:
-            raise LinkLost(self.words)
+            raise LinkLost(self.why)
         async with self._outgoing:
             try:
                 await asyncio.get_running_loop().sock_sendall(ours, data)
@@ -265,14 +265,14 @@ class HostProcess:
             now = time.monotonic_ns()
             ring.server_lives(now)
             if process.returncode is not None:
-                await self._replace(f"the EtherCAT process died (status {process.returncode})")
+                await self._replace(text("event.process-died", status=process.returncode))
             elif 0 < ring.host_deadline_ns() < now:
-                doing = ring.host_doing() or "exchanging frames"
-                await self._replace(f"the EtherCAT process hung while {doing} and was killed")
+                doing = ring.host_doing() or "ethercat.doing-frames"
+                await self._replace(text("event.process-hung", doing=text(doing)))
 
-    async def _replace(self, why: str) -> None:
+    async def _replace(self, why: Text) -> None:
         self.restarts += 1
-        self._restarted(f"{why}; it is started again")
+        self._restarted(text("event.process-started-again", cause=why))
         await self._end(kill=True)
         for pause_s in itertools.chain(_RESTART_PAUSE_S, itertools.repeat(_RESTART_PAUSE_S[-1])):
             await asyncio.sleep(pause_s)
@@ -280,7 +280,7 @@ class HostProcess:
                 await self._spawn()
             except DriveError as error:
                 await self._end(kill=True)
-                self.words = error.message
+                self.why = error.text
                 continue
             self._received(
                 {
@@ -288,7 +288,7 @@ class HostProcess:
                     "kind": "back",
                     "station": None,
                     "code": None,
-                    "text": "the EtherCAT process runs again",
+                    "text": text("event.process-runs-again").to_wire(),
                 }
             )
             return
@@ -307,7 +307,7 @@ class HostProcess:
             except TimeoutError:
                 process.kill()
                 await process.wait()
-        self._gone("the EtherCAT process was ended" if self._opened else self.words)
+        self._gone(text("ethercat.process-ended") if self._opened else self.why)
         if self._ready is not None and self._ready.done() and not self._ready.cancelled():
             self._ready.exception()
         self._ready = None

@@ -18,6 +18,8 @@ from drivers.ethercat.wire.al_status import ERROR_BIT, AlState, al_status_text, 
 from drivers.ethercat.wire.lanes import Lanes
 from drivers.ethercat.wire.mailbox import Mailbox
 from drivers.ethercat.wire.steps import Steps
+from drivers.link import EventKind
+from drivers.texts.message import Text, text
 
 _FIND_S, _WATCH_S, _REOPEN_S = 30.0, 0.25, 1.0
 _LET_END_S = 0.3
@@ -104,11 +106,11 @@ class Roster:
             self._wanted, self._search_due = 0, True
         elif not self._search_due:
             for number in self.new_aliases:
-                self.event("back", number, f"station {number} was switched on again")
+                self.event("back", number, text("event.station-switched-on", station=number))
             self.new_aliases.clear()
 
     def _interface_gone(self) -> None:
-        why = f"the interface {self.segment.interface} is gone"
+        why = text("event.interface-gone", interface=self.segment.interface)
         self.exchange.abandon()
         self.lanes.drop(why)
         self.segment.close()
@@ -125,7 +127,7 @@ class Roster:
         except DriveError:
             return
         self.is_open = True
-        self.event("back", None, f"the interface {self.segment.interface} is back")
+        self.event("back", None, text("event.interface-back", interface=self.segment.interface))
 
     def _watch(self, station: Station) -> Steps[None]:
         before = station.al_state
@@ -139,7 +141,7 @@ class Roster:
                 self._fell_back(station, before)
             return
         if station.al_state != before and station.al_state & ERROR_BIT:
-            self.event("state", station.number, self.al_words(station))
+            self.event("state", station.number, self.al_text(station))
         if station.al_state & ~ERROR_BIT == AlState.INIT and (
             station.al_state & ERROR_BIT or station.mailbox is not None
         ):
@@ -170,7 +172,7 @@ class Roster:
         if self.exchange.healing(station.number):
             return
         if station.al_state != before:
-            self.event("state", station.number, self.al_words(station))
+            self.event("state", station.number, self.al_text(station))
         self.exchange.station_lost(station.number)
         self.exchange.heal(station, restarted=False)
 
@@ -179,12 +181,8 @@ class Roster:
             station.lost = True
             self._powered.discard(station.number)
             station.al_state = 0
-            self.event(
-                "lost",
-                station.number,
-                f"station {station.number} ({station.name}) no longer answers:"
-                " supply off or cable cut",
-            )
+            why = text("event.station-lost", station=station.number, name=station.name)
+            self.event("lost", station.number, why)
             self.exchange.station_lost(station.number)
         if self.segment.recover(station.number):
             self._returned(station, restarted=True)
@@ -194,8 +192,8 @@ class Roster:
 
     def _returned(self, station: Station, *, restarted: bool) -> None:
         station.lost = False
-        how = "was switched on again" if restarted else "answers again"
-        self.event("back", station.number, f"station {station.number} {how}")
+        code = "event.station-switched-on" if restarted else "event.station-answers-again"
+        self.event("back", station.number, text(code, station=station.number))
         if self.exchange.loop is not None and station.number in self.exchange.setups:
             self.exchange.heal(station, restarted=restarted)
         elif restarted and station.mailbox is not None:
@@ -203,17 +201,21 @@ class Roster:
             steps = restore_mailbox(station, managers, time.monotonic)
             self.lanes.submit(station.number, "mailbox", steps, _ignore)
 
-    def al_words(self, station: Station) -> str:
-        """AL state and status of a station as text."""
-        words = f"station {station.number} is in {state_name(station.al_state)}"
+    def al_text(self, station: Station) -> Text:
+        """AL state and status of a station."""
+        number, state = station.number, state_name(station.al_state)
         if station.al_state & ERROR_BIT:
-            words += f": {al_status_text(station.al_code)}"
-        return words
+            cause = al_status_text(station.al_code)
+            return text("event.station-error", station=number, state=state, cause=cause)
+        return text("event.station-state", station=number, state=state)
 
-    def event(self, kind: str, station: int | None, text: str, code: int | None = None) -> None:
+    def event(
+        self, kind: EventKind, station: int | None, why: Text, code: int | None = None
+    ) -> None:
         """Inform the server; the figures go first, so that who looks at them sees the same."""
         self._send({"event": "status"} | self.status())
-        self._send({"event": "link", "kind": kind, "station": station, "text": text, "code": code})
+        event = {"kind": kind, "station": station, "text": why.to_wire(), "code": code}
+        self._send({"event": "link"} | event)
 
     def _emergency(self, number: int) -> Callable[[bytes], None]:
         def received(data: bytes) -> None:
@@ -224,13 +226,15 @@ class Roster:
                 return
             self._emergencies[number] = (data, now)
             code, register = struct.unpack_from("<HB", data)
-            text = (
-                f"station {number}: emergency {code:#06x}, error register {register:#04x},"
-                f" data {data[3:8].hex(' ')}"
+            facts = {"station": number, "number": code, "register": register}
+            self.event(
+                "emergency",
+                number,
+                text("event.station-emergency", **facts, bytes=data[3:8].hex(" "))
                 if code
-                else f"station {number}: the error is gone"
+                else text("event.station-error-gone", station=number),
+                code,
             )
-            self.event("emergency", number, text, code)
 
         return received
 
@@ -277,10 +281,10 @@ class Roster:
             raise Busy("ethercat.cyclic-exchange-runs-segment")
         self.require_not_held()
         self._ring.host_lives_until(
-            time.monotonic_ns() + int(_FIND_S * 1e9), "searching the segment"
+            time.monotonic_ns() + int(_FIND_S * 1e9), "ethercat.doing-search"
         )
         self._let_end()
-        self.lanes.drop("the segment is being searched again")
+        self.lanes.drop(text("ethercat.segment-searched-again"))
         self.segment.find()
         self.stations = [self._make_station(n + 1) for n in range(len(self.segment.slaves))]
         self.attached = True
@@ -355,7 +359,7 @@ class Roster:
                 s.number: {
                     "lost": s.lost,
                     "al": s.al_state,
-                    "words": "no answer" if s.lost else self.al_words(s),
+                    "words": "no answer" if s.lost else self.al_text(s).words(),
                     "repeats": s.mailbox.repeats if s.mailbox is not None else 0,
                 }
                 for s in self.stations

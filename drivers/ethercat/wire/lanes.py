@@ -22,6 +22,7 @@ from drivers.errors import DriveError, LinkLost, ProtocolError
 from drivers.ethercat.wire.coe import stopped_first
 from drivers.ethercat.wire.frames import ROOM_BYTES, Request, bytes_of
 from drivers.ethercat.wire.steps import Gap, Pause, Read, Step, Steps, Write
+from drivers.texts.message import Text
 
 GRACE_S = 0.01
 """How long a stop lets the answer under way come: most drives need 1 to 5 ms."""
@@ -178,7 +179,7 @@ class Lanes:
         for (job, _), reply in zip(frame, replies, strict=True):
             job.reply = reply
 
-    def drop(self, why: str) -> None:
+    def drop(self, why: Text) -> None:
         """End everything that runs or waits with an error."""
         for lane in tuple(self._order):
             jobs = [*lane.running, *lane.waiting]

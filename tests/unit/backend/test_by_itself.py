@@ -8,6 +8,7 @@ from pathlib import Path
 from backend.people.identity import LOCAL, Actor, acting, acting_person, by_itself
 from backend.station.bench import Bench
 from drivers.link import LinkEvent, Unsubscribe
+from drivers.texts.message import text
 from tests.support.memory_link import MemoryLink
 
 
@@ -41,7 +42,7 @@ async def test_a_drive_that_falls_silent_later_is_not_reported_of_who_connected_
     try:
         await bench.connect("mlink://virtual0", 1, "mms7", "X")
         for listener in link.listeners:
-            listener(LinkEvent("lost", 1, "station 1 no longer answers"))
+            listener(LinkEvent("lost", 1, text("event.station-lost", station=1, name="M")))
     finally:
         acting.reset(token)
         await bench.close()

@@ -33,6 +33,7 @@ from backend.tools.moves.end_search import limited
 from backend.work.jobs import Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import Busy, LinkTimeout, NotAllowed
+from drivers.texts.message import Text, text
 from tests.support.servo import STATUS, URL, Servo
 
 ENABLED = 0x237
@@ -53,7 +54,8 @@ class Loop:
     """An exchange of several drives whose loop owns the control words."""
 
     def __init__(self, *connected_drives: ConnectedDrive) -> None:
-        self.running, self.trouble, self.stopped = True, "", 0
+        self.running, self.stopped = True, 0
+        self.trouble: Text | None = None
         self.state = CyclicState(0.002, None, (), ())
         self.drives = tuple(connected.drive for connected in connected_drives)
         self.by_speed: frozenset[str] = frozenset()
@@ -225,7 +227,7 @@ async def test_a_motion_whose_loop_does_not_take_its_halt_owes_a_stop(
 
 async def test_an_exchange_that_broke_off_in_a_motion_owes_a_stop(x: ConnectedDrive) -> None:
     loop = Loop(x)
-    loop.running, loop.trouble = False, "the process died"
+    loop.running, loop.trouble = False, text("event.process-died", status=1)
     await x.axis.leave_cyclic(loop, 1.0)  # type: ignore[arg-type]
     assert x.axis.stop_pending
 

@@ -17,6 +17,7 @@ from backend.commands.params import app
 from backend.parameters.dcf import read_dcf, write_dcf
 from backend.parameters.lists import import_list
 from backend.parameters.set_file import BadSet, Row, parse
+from drivers.texts.message import Text
 from profiles import load_profile
 from profiles.importer import export_eds
 from profiles.schema import Profile
@@ -80,7 +81,7 @@ def test_another_makers_file() -> None:
     found = read_dcf(THEIRS, DS_C, "theirs.dcf")
     # FFFFFB50h as a 32-bit two's complement is -1200; a default is no value to be set.
     assert {r.key: r.raw for r in found.readings} == {"6083:00": 250, "607C:00": -1200}
-    assert any("5FFF:00" in problem for problem in found.problems)
+    assert any("5FFF:00" in problem.words() for problem in found.problems)
 
 
 def test_arrays_in_compact_storage() -> None:
@@ -94,12 +95,12 @@ def test_a_file_for_another_makers_drive_is_refused() -> None:
     identity = DS_C.identity.model_copy(update={"vendor_id": 0x31, "product_code": 5})
     known = DS_C.model_copy(update={"identity": identity})
 
-    def read(numbers: bytes, profile: Profile = known) -> tuple[str, ...]:
+    def read(numbers: bytes, profile: Profile = known) -> tuple[Text, ...]:
         return read_dcf(THEIRS.replace(b"VendorName=somebody", numbers), profile).problems
 
     for numbers in (b"VendorNumber=0x31\r\nProductNumber=5", b"VendorNumber=0", b"VendorNumber="):
-        assert not any("product" in problem for problem in read(numbers))
-    assert "for product 00000006h, this family is 00000005h" in read(b"ProductNumber=6")[0]
+        assert not any("product" in problem.words() for problem in read(numbers))
+    assert "for product 00000006h, this family is 00000005h" in read(b"ProductNumber=6")[0].words()
     with pytest.raises(BadSet, match="is for a drive of vendor 00000099h"):
         read(b"VendorNumber=0x99")
     read(b"VendorNumber=0x99", DS_C)  # whose manual prints no vendor number

@@ -36,7 +36,7 @@ TITLES = {
 class Idle:
     """An exchange through which nothing is moved."""
 
-    running, trouble = True, ""
+    running, trouble = True, None
 
     async def stop(self) -> None:
         """End it."""

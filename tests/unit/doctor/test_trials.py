@@ -106,7 +106,7 @@ class _Bus:
     async def start(self) -> None:
         rules = self.attached[-1].bring_up
         if rules is None or rules.clock_mode is None or rules.clock_mode.assign_activate != 0x700:
-            raise NotAllowed("command.doctor-knows-not", value="x")
+            raise NotAllowed("station.doctor-knows-not", value="x")
         self.running = True
 
     async def stop(self) -> None:

@@ -151,7 +151,7 @@ class DirectLink:
     traits = bus_kind("ethercat").traits
     left_over = ()
     doctor = frames = speeds = None
-    trouble = ""
+    trouble = None
 
     def __init__(self, device: Device, profile: Profile) -> None:
         self.device = device

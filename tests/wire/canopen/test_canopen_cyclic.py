@@ -195,7 +195,9 @@ async def test_leaving_the_envelope_stops_the_axis(bench: Bench, link: CanopenLi
     envelope = Envelope(position_max=500)
     await _cyclic(link).play([Trajectory(5, TARGET.address, values, envelope, renew_s=10)])
     await until(lambda: bench.device.value(0x6041) != 0x0237)
-    assert any("position" in e.text and "beyond the limit of 500" in e.text for e in events)
+    assert any(
+        "position" in e.text.words() and "beyond the limit of 500" in e.text.words() for e in events
+    )
     assert bench.device.value(0x6064) < 2000
 
 

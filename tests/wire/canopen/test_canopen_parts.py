@@ -139,7 +139,9 @@ def reported_by(watch: NodeWatch, beats: list[tuple[float, int]], until_s: float
     for now_ms in range(round(until_s * 1000)):
         while waiting and waiting[0][0] <= now_ms / 1000:
             watch.observe(Frame(0x705, bytes([waiting.pop(0)[1]])), now_ms / 1000)
-        reported += [event.text for event in watch.overdue(now_ms / 1000) if event.kind == "lost"]
+        reported += [
+            event.text.words() for event in watch.overdue(now_ms / 1000) if event.kind == "lost"
+        ]
     return reported
 
 
@@ -174,10 +176,10 @@ def test_state_changes_and_restarts_are_reported() -> None:
     watch.record(5).in_use = True
     watch.observe(Frame(0x705, b"\x05"), 0.0)
     stopped = watch.observe(Frame(0x705, b"\x04"), 0.1)
-    assert [e.text for e in stopped] == ["node 5 is stopped"]
+    assert [e.text.words() for e in stopped] == ["node 5 is stopped"]
     boot = watch.observe(Frame(0x705, b"\x00"), 0.2)
     assert [e.kind for e in boot] == ["boot"]
-    assert "restarted" in boot[0].text
+    assert "restarted" in boot[0].text.words()
 
 
 def test_guarding_notices_a_toggle_bit_that_stands_still() -> None:
@@ -189,7 +191,7 @@ def test_guarding_notices_a_toggle_bit_that_stands_still() -> None:
     assert watch.observe(Frame(0x705, b"\xff"), 0.21) == []
     watch.guard_due(0.1, 0.4)
     events = watch.observe(Frame(0x705, b"\xff"), 0.41)
-    assert "two nodes have this number" in events[0].text
+    assert "two nodes have this number" in events[0].text.words()
 
 
 def test_answers_that_nobody_asked_for_are_two_nodes_only_while_they_come() -> None:
@@ -198,7 +200,7 @@ def test_answers_that_nobody_asked_for_are_two_nodes_only_while_they_come() -> N
     assert watch.stray_answer(5, 0.0) is None
     reported = watch.stray_answer(5, 3.0)
     assert reported is not None
-    assert "two nodes answer as number 5" in reported.text
+    assert "two nodes answer as number 5" in reported.text.words()
     assert watch.stray_answer(5, 50.0) is None, "reported once"
     watch.overdue(100.0)
     assert record.conflict == "two nodes have this number"
@@ -219,7 +221,7 @@ def test_answers_that_nobody_asked_for_are_two_nodes_only_while_they_come() -> N
     ],
 )
 def test_emergency_codes(code: int, text: str) -> None:
-    assert emergency_text(code) == text
+    assert emergency_text(code).words() == text
 
 
 def test_a_storm_of_emergencies_does_not_fill_the_log() -> None:
@@ -232,8 +234,8 @@ def test_a_storm_of_emergencies_does_not_fill_the_log() -> None:
     assert watch.record(5).emergencies == 1000
     assert watch.overdue(0.9) == []
     (summary,) = watch.overdue(1.0)
-    assert "990 more emergencies" in summary.text
-    assert "0000h" in summary.text
+    assert "990 more emergencies" in summary.text.words()
+    assert "0000h" in summary.text.words()
     assert watch.overdue(3.0) == []
     assert len(watch.observe(storm[0], 3.1)) == 1
 

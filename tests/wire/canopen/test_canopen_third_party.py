@@ -284,7 +284,7 @@ async def test_two_links_share_one_wire(bench: Bench) -> None:
     """A second master is distinguished from a second node of the same number."""
     first, second = CanopenLink(bench.url), CanopenLink(bench.url)
     events: list[str] = []
-    first.listen(lambda e: events.append(e.text))
+    first.listen(lambda e: events.append(e.text.words()))
     await first.open()
     await second.open()
     try:

@@ -94,7 +94,7 @@ class Bus:
 
     @property
     def texts(self) -> list[str]:
-        return [event.text for _, event in self.events]
+        return [event.text.words() for _, event in self.events]
 
     async def reported(self, *words: str, within_s: float = 30.0) -> str:
         """Wait for an event with all these words."""

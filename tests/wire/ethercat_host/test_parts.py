@@ -27,6 +27,7 @@ from drivers.ethercat.wire.lanes import Lanes
 from drivers.ethercat.wire.mailbox import Mailbox
 from drivers.ethercat.wire.steps import Pause, Read, Step, Steps, Write
 from drivers.motion.interpolation import interpolation_period
+from drivers.texts.message import text
 
 
 @pytest.fixture
@@ -85,8 +86,8 @@ def test_the_newest_sample_is_looked_at_and_not_taken(ring: Ring) -> None:
 
 def test_signs_of_life(ring: Ring) -> None:
     assert ring.host_deadline_ns() == 0
-    ring.host_lives_until(77, "searching the segment")
-    assert (ring.host_deadline_ns(), ring.host_doing()) == (77, "searching the segment")
+    ring.host_lives_until(77, "ethercat.doing-search")
+    assert (ring.host_deadline_ns(), ring.host_doing()) == (77, "ethercat.doing-search")
 
 
 def test_blocks_are_cut_at_gaps_of_the_cycle_counter() -> None:
@@ -163,8 +164,8 @@ def test_dropped_transactions_end_with_an_error() -> None:
     for _ in range(2):
         lanes.submit(1, "mailbox", job(), lambda _r, e: ended.append(e))
     lanes.step()
-    lanes.drop("gone")
-    assert [str(e) for e in ended] == ["gone", "gone"]
+    lanes.drop(text("event.interface-gone", interface="eth9"))
+    assert [str(e) for e in ended] == ["the interface eth9 is gone"] * 2
     assert not lanes.pending()
 
 

@@ -28,7 +28,7 @@ class Bench:
         self.reported: list[str] = []
         self.axis = AxisLoop(
             1, inputs=IN, outputs=OUT, output_count=6, cycle_s=cycle_s,
-            report=lambda _station, text: self.reported.append(text),
+            report=lambda _station, why: self.reported.append(why.words()),
         )  # fmt: skip
         self.status, self.position, self.speed, self.torque, self.mode = DISABLED, position, 0, 0, 8
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from backend.commands.doctor import _examined, tried
+from backend.commands.doctor import tried
+from backend.station.doctor import examined
 from drivers.virtual.wires.netns import Namespace
 from profiles.schema import Profile
 from tests.wire.makers_files.test_bring_up import brought, namespace, profile_of
@@ -50,12 +51,12 @@ async def test_a_wrong_setting_is_found(
     wrong = _as_remappable(right) if setting.startswith("pdo") else _with_activate(right, 0x300)
     async with brought(namespace, name) as (link, segment):
         link.attach(1, wrong)
-        causes, result = await _examined(link, 1)
-        assert not result["reached"]
-        found = await tried(link, 1, wrong, causes)
+        first = await examined(link, 1)
+        assert not first.reached
+        found = await tried(link, 1, wrong, first.causes)
         last = found[-1]
         assert (last["setting"], last["after"], last["reached"]) == (setting, after, True), found
         # Nothing of it is left: the drive is out of Operational, and refuses as before.
         assert segment.command("state")["slaves"][0]["state"] != "OP"
-        again, result = await _examined(link, 1)
-        assert [cause.code for cause in again] == [cause.code for cause in causes]
+        again = await examined(link, 1)
+        assert [cause.code for cause in again.causes] == [cause.code for cause in first.causes]

@@ -41,8 +41,9 @@ export const notListed = {
   'notListed.outcome.repaired': ['repaired', '已修复'],
   'notListed.outcome.left out': ['left out', '已忽略'],
   'notListed.outcome.noted': ['noted', '注意'],
-  'notListed.export': ['Export a profile as EDS', '将配置文件导出为 EDS'],
-  'notListed.exportNow': ['Export', '导出'],
+  'notListed.export': ['Export a profile as EDS or ESI', '将配置文件导出为 EDS 或 ESI'],
+  'notListed.exportEds': ['Export as EDS', '导出为 EDS'],
+  'notListed.exportEsi': ['Export as ESI', '导出为 ESI'],
   'notListed.broken': [
     'Your profile cannot be used: {problem}',
     '您的这个配置文件无法使用：{problem}',

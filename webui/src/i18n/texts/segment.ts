@@ -129,5 +129,35 @@ export const segment = {
     '{name} = {actual}, should be {expected}',
     '{name} = {actual}，应为 {expected}',
   ],
+  'segment.trials': ['Settings to try', '可尝试的设置'],
+  'segment.trialsHelp': [
+    'A trial takes the drive to Operational with one setting of servodeck changed, then undoes it. No parameter of the drive is written, and no axis is enabled.',
+    '尝试时仅更改 servodeck 的一项设置，使驱动器进入 Operational，随后撤销该更改。不写入驱动器参数，也不使能任何轴。',
+  ],
+  'segment.trial': [
+    '{setting}: {after} instead of {before}',
+    '{setting}：{after}（原为 {before}）',
+  ],
+  'segment.try': ['Try it', '尝试'],
+  'segment.tryThis': ['Try {setting} = {after}', '尝试 {setting} = {after}'],
+  'segment.trialReached': [
+    'With {setting} = {after} the drive reaches Operational. Keep this setting until the drive is connected anew, or leave it undone?',
+    '设置 {setting} = {after} 时，驱动器可进入 Operational。是否保留该设置直到重新连接驱动器，或保持撤销？',
+  ],
+  'segment.trialFailed': [
+    'With {setting} = {after} the drive does not reach Operational: {why}. The setting is undone.',
+    '设置 {setting} = {after} 时，驱动器未进入 Operational：{why}。该设置已撤销。',
+  ],
+  'segment.trialNoReason': ['the drive reports no reason', '驱动器未报告原因'],
+  'segment.trialCycle': [
+    'Choose this multiple of the cycle where the exchange is started: it is not a setting of the profile.',
+    '请在启动交换时选择该倍数的周期：它不属于配置文件的设置。',
+  ],
+  'segment.trialKeep': ['Keep', '保留'],
+  'segment.trialUndo': ['Undo', '撤销'],
+  'segment.trialKept': [
+    'Until the drive is connected anew: {setting} is {after} instead of {before}. To keep it longer, write it into the profile.',
+    '在重新连接驱动器之前：{setting} 为 {after}（原为 {before}）。如需长期保留，请写入配置文件。',
+  ],
   'segment.frames': ['Frames of the last minute (pcapng)', '最近一分钟的数据帧（pcapng）'],
 } satisfies Texts

@@ -1,5 +1,6 @@
 import type { FoundDrive, ImportedDescription } from '../../api/schema'
 import { useT } from '../../i18n'
+import { ProfileExport } from './ProfileExport'
 
 type Finding = ImportedDescription['findings'][number]
 
@@ -35,6 +36,7 @@ export function ImportReport({
       )}
       <p>{t('notListed.before')}</p>
       <p className="dim">{t('notListed.path', { path: made.path })}</p>
+      <ProfileExport profile={made.profile} links={made.links} />
       {made.findings.length > 0 && (
         <details>
           <summary>{t('notListed.odd', { count: made.findings.length + made.not_listed })}</summary>

@@ -6,10 +6,8 @@ import { useT } from '../../i18n'
 import { useLink } from '../../live/store'
 import { Icon } from '../../widgets/Icon'
 import { Panel } from '../../widgets/Panel'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { useAction } from '../../widgets/useAction'
-import { offerDownload } from '../files/sets'
 import { ImportForm } from './ImportForm'
+import { ProfileExport } from './ProfileExport'
 
 /** Offered where no profile fits a found drive for certain. */
 export function NotListedButton({
@@ -41,25 +39,14 @@ export function NotListedPanel() {
   const { open } = useLink()
   const [profiles, setProfiles] = useState<ProfileInfo[]>([])
   const [chosen, setChosen] = useState('')
-  const save = useAction()
   const refresh = useCallback(() => {
     ask(api.GET('/api/v1/profiles')).then(setProfiles, () => {})
   }, [])
   useEffect(() => {
     if (open) refresh()
   }, [open, refresh])
-  const profile = chosen || (profiles[0]?.profile ?? '')
-  const broken = profiles.find((each) => each.profile === profile)?.problem ?? ''
-  const download = () =>
-    save.run(async () => {
-      const text = await ask(
-        api.GET('/api/v1/profiles/{profile}/eds', {
-          params: { path: { profile } },
-          parseAs: 'text',
-        }),
-      )
-      offerDownload(`${profile}.eds`, [text], 'text/plain')
-    })
+  const profile = profiles.find((each) => each.profile === chosen) ?? profiles[0]
+  const broken = profile?.problem ?? ''
   return (
     <Panel title={t('notListed.title')}>
       <details>
@@ -72,21 +59,13 @@ export function NotListedPanel() {
           <NativeSelect
             className="grow"
             label={t('connect.profile')}
-            value={profile}
+            value={profile?.profile ?? ''}
             onChange={(event) => setChosen(event.currentTarget.value)}
             data={profiles.map((each) => ({ value: each.profile, label: each.title }))}
           />
-          <Button
-            disabled={profile === '' || broken !== ''}
-            loading={save.busy}
-            leftSection={<Icon name="download" />}
-            onClick={() => void download()}
-          >
-            {t('notListed.exportNow')}
-          </Button>
         </div>
         {broken !== '' && <p className="warn-text">{t('notListed.broken', { problem: broken })}</p>}
-        <ProblemNote problem={save.problem} onClose={save.clear} />
+        {profile && broken === '' && <ProfileExport key={profile.profile} {...profile} />}
       </details>
     </Panel>
   )

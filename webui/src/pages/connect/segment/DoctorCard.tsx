@@ -5,6 +5,7 @@ import type { StationDiagnosis } from '../../../api/schema'
 import { useLanguage, useT } from '../../../i18n'
 import { ProblemNote } from '../../../widgets/ProblemNote'
 import { useAction } from '../../../widgets/useAction'
+import { TrialList } from './TrialList'
 
 /** Why stations of a bus are not in Operational: causes with evidence, the likeliest first. */
 export function DoctorCard({ url }: { url: string }) {
@@ -12,16 +13,12 @@ export function DoctorCard({ url }: { url: string }) {
   const chinese = useLanguage() === 'zh'
   const [found, setFound] = useState<StationDiagnosis[] | null>(null)
   const examine = useAction()
+  const look = async () => {
+    setFound(await ask(api.GET('/api/v1/buses/doctor', { params: { query: { url } } })))
+  }
   return (
     <section aria-label={t('segment.doctor')}>
-      <Button
-        loading={examine.busy}
-        onClick={() =>
-          void examine.run(async () => {
-            setFound(await ask(api.GET('/api/v1/buses/doctor', { params: { query: { url } } })))
-          })
-        }
-      >
+      <Button loading={examine.busy} onClick={() => void examine.run(look)}>
         {t('segment.doctor')}
       </Button>
       <ProblemNote problem={examine.problem} onClose={examine.clear} />
@@ -53,6 +50,7 @@ export function DoctorCard({ url }: { url: string }) {
               ))}
             </ol>
           )}
+          <TrialList url={url} diagnosis={each} onChanged={look} />
         </div>
       ))}
     </section>
