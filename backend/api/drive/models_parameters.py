@@ -100,7 +100,7 @@ class MotionSettingWrite(ParameterWrite):
     """A new value of a setting that can start a motion, and why it is set."""
 
     reason: str = Field(
-        default="", max_length=300, description="why it is set; is in log and audit"
+        default="", max_length=300, description="why it is set; shown in log and audit"
     )
 
 

@@ -78,7 +78,7 @@ class LibraryChange(Message):
 
     notes: str | None = Field(default=None, max_length=4000)
     tags: list[TagText] | None = Field(default=None, max_length=20)
-    deleted: Literal[False] | None = Field(default=None, description="false undoes it")
+    deleted: Literal[False] | None = Field(default=None, description="false restores it")
 
 
 class StoredSet(SetFileInfo):

@@ -20,7 +20,7 @@ class RecordingColumn(Message):
     high: float
     missing: int = Field(description="rows without a number")
     rises: bool = Field(description="whether every value is above the one before, as a time is")
-    unit: str = Field(description="unit of time that its name reports: s, ms, us or ns")
+    unit: str = Field(description="unit of time that its name states: s, ms, us or ns")
     curve: list[float] = Field(description="every n-th value")
 
 

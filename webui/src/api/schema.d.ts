@@ -8028,7 +8028,7 @@ export interface components {
         LibraryChange: {
             /**
              * Deleted
-             * @description false undoes it
+             * @description false restores it
              */
             deleted?: false | null;
             /** Notes */
@@ -8466,7 +8466,7 @@ export interface components {
             raw?: number | string | null;
             /**
              * Reason
-             * @description why it is set; is in log and audit
+             * @description why it is set; shown in log and audit
              * @default
              */
             reason: string;
@@ -9815,7 +9815,7 @@ export interface components {
             rises: boolean;
             /**
              * Unit
-             * @description unit of time that its name reports: s, ms, us or ns
+             * @description unit of time that its name states: s, ms, us or ns
              */
             unit: string;
         };
