@@ -61,8 +61,9 @@ class LoadSide:
 
     ``backlash_rad`` is None where friction or a pull keeps the load on its flank in every move;
     the lost motion bounds it then. ``twist_s2`` is J/k, None where it is no larger than its
-    uncertainty; ``least_twist_s2`` is what it does not exceed. ``load_inertia_kgm2`` needs the
-    motor's own inertia. ``orders`` holds the transmission error per revolution of the load.
+    uncertainty; ``most_twist_s2`` is what it does not exceed. Both are None where the load is
+    ``pulled`` too much. ``load_inertia_kgm2`` needs the motor's own inertia. ``orders`` holds the
+    transmission error per revolution of the load.
     """
 
     counts_per_rev: float
@@ -76,6 +77,7 @@ class LoadSide:
     error_angle_rad: FloatArray
     error_rad: FloatArray
     whole_revolution: bool
+    pulled: bool
     residual_rad: float
 
 
@@ -162,11 +164,12 @@ def load_side(sides: TwoSides, motor_inertia_kgm2: float | None) -> LoadSide:
     floor = threshold.COUNTS / abs(whole.counts_per_rad)
 
     def value(of: Callable[[_Fit], float], least: float = 0.0) -> Value:
-        half = _jackknife([of(fit) for fit in again])
+        half = np.hypot(_jackknife([of(fit) for fit in again]), threshold.SHARE * of(whole))
         return Value(of(whole), float(np.hypot(half, least)))
 
+    pulled = _pulled(table)
     gap = None
-    if whole.half_gap is not None and all(fit.half_gap is not None for fit in again):
+    if not pulled and whole.half_gap is not None and all(fit.half_gap is not None for fit in again):
         gap = value(lambda fit: 2.0 * (fit.half_gap or 0.0), floor)
     twist = value(lambda fit: fit.twist)
     angle, columns = _curve(sides, shape)
@@ -178,13 +181,14 @@ def load_side(sides: TwoSides, motor_inertia_kgm2: float | None) -> LoadSide:
         counts_per_rev=whole.counts_per_rad * _TURN,
         lost_motion_rad=value(lambda fit: fit.lost, floor),
         backlash_rad=gap,
-        twist_s2=twist if twist.value > twist.half else None,
+        twist_s2=twist if twist.value > twist.half and not pulled else None,
         most_twist_s2=max(twist.value + twist.half, 0.0),
         load_inertia_kgm2=_load_inertia(table, groups, motor_inertia_kgm2),
         orders=sizes,
         error_span_rad=value(lambda fit: float(np.ptp(columns @ fit.errors)), floor),
         error_angle_rad=angle, error_rad=columns @ whole.errors,
-        whole_revolution=shape.powers == 0, residual_rad=float(np.sqrt(whole.square)),
+        whole_revolution=shape.powers == 0, pulled=pulled,
+        residual_rad=float(np.sqrt(whole.square)),
     )  # fmt: skip
 
 
@@ -319,6 +323,12 @@ def _pulls(table: _Table, largest: float) -> list[float]:
     return [float(ratio * factor) for factor in threshold.PULLS]
 
 
+def _pulled(table: _Table) -> bool:
+    """Whether a pull takes so much of what accelerates the load that flanks hardly change."""
+    largest = float(np.quantile(np.abs(table.alpha[table.moves]), threshold.LARGE))
+    return abs(_pulls(table, largest)[0]) > threshold.PULLED * largest
+
+
 def _agrees(
     table: _Table, fit: _Fit, flanks: FloatArray, pull: float, largest: float
 ) -> bool:  # fmt: skip
@@ -408,7 +418,8 @@ def _load_inertia(
 
     everything = np.ones(table.counts.size, dtype=np.bool_)
     again = [found(table.group != group) for group in groups]
-    return Value(found(everything), _jackknife(again))
+    inertia = found(everything)
+    return Value(inertia, float(np.hypot(_jackknife(again), threshold.SHARE * inertia)))
 
 
 def _jackknife(again: Sequence[float]) -> float:

@@ -46,7 +46,8 @@ def evaluate(data: Sides, settings: LoadSideSettings, facts: AxisFacts) -> LoadS
         NotAllowed: the load's position does not follow the motor, or too few samples came.
     """
     inertia = settings.motor_inertia_kgm2 or facts.motor_inertia_kgm2
-    usable = inertia if facts.torque_known else None
+    # A loop answers each setpoint that is held within its cycle, between the samples of the torque.
+    usable = inertia if facts.torque_known and facts.interpolates else None
     sides = TwoSides(
         data.sample_rate_hz, data.position_rad, data.load_counts, data.torque_nm, data.valid,
         data.part, settings.gear_ratio,
@@ -126,7 +127,7 @@ def _inertia(found: Value, motor_kgm2: float) -> Estimate:
 
 def _stiffness(found: LoadSide, motor_kgm2: float) -> tuple[Estimate | None, float | None]:
     """J over J/k in Nm/rad of the motor shaft, or what it is at least."""
-    if found.load_inertia_kgm2 is None:
+    if found.load_inertia_kgm2 is None or found.pulled:
         return None, None
     inertia = _inertia(found.load_inertia_kgm2, motor_kgm2)
     low, high = inertia.ci95
@@ -179,6 +180,10 @@ def _findings(
         findings.append(Finding(code="rated_torque_unknown"))
     elif inertia is None:
         findings.append(Finding(code="motor_inertia_unknown"))
+    elif not facts.interpolates:
+        findings.append(Finding(code="setpoints_held"))
+    elif found.pulled:
+        findings.append(Finding(code="pull_large"))
     elif stiffness is None and found.twist_s2 is None:
         findings.append(Finding(code="stiffness_not_seen"))
     elif stiffness is None:

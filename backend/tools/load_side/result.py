@@ -16,6 +16,8 @@ Code = Literal[
     "motor_inertia_unknown",
     "rated_torque_unknown",
     "load_light",
+    "pull_large",
+    "setpoints_held",
     "revolution_not_covered",
 ]
 

@@ -37,7 +37,7 @@ _TURN = 2 * np.pi
 @dataclass(frozen=True)
 class Room:
     """What the moves may use: rev to each side, rev/s, s, and rad/s² beyond friction; and what
-    friction alone would decelerate, in rad/s²."""
+    friction and a pull alone would accelerate, in rad/s²."""
 
     travel_rev: float
     speed_rps: float
@@ -229,7 +229,7 @@ def _room(envelope: Envelope, facts: AxisFacts, rough: RoughFit) -> Room:
         threshold.FAST * envelope.speed_rpm / 60.0,
         envelope.time_s,
         max(threshold.TORQUE_SHARE * free_nm, 0.0) / rough.inertia_kgm2,
-        rough.coulomb_nm / rough.inertia_kgm2,
+        (rough.coulomb_nm + abs(rough.gravity_nm)) / rough.inertia_kgm2,
     )
 
 

@@ -65,6 +65,16 @@ TEXTS: dict[str, tuple[str, str]] = {
         "Stiffness cannot be known: nobody states the rated torque that 100 % means.",
         "无法得知刚度：未给出与 100 % 对应的额定转矩。",
     ),
+    "finding.setpoints_held": (
+        "Stiffness cannot be known: the drive holds each setpoint for a cycle (no 60C2h), and the "
+        "torque within a cycle is not seen.",
+        "无法得知刚度：驱动器在每个周期内保持设定值（无 60C2h），看不到周期内的转矩。",
+    ),
+    "finding.pull_large": (
+        "Stiffness cannot be known: a pull takes too much of the torque that accelerates the load. "
+        "Balance the load, or permit more torque and speed.",
+        "无法得知刚度：恒定拉力占用了过多用于加速负载的转矩。请平衡负载，或允许更高的转矩和速度。",
+    ),
     "finding.load_light": (
         "Stiffness cannot be known: the inertia of the load is no larger than its uncertainty.",
         "无法得知刚度：负载惯量未超过其不确定度。",

@@ -19,6 +19,8 @@ from drivers.virtual.mechanics import MechanicsSpec
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import settings_of, silent
 
+pytestmark = pytest.mark.timeout(600)
+
 MOTOR, LOAD, STIFFNESS, GAP, RATED = 5e-5, 1.5e-4, 60.0, 0.004, 1.27
 DRIVE = "generic402"
 #: 60A9h and 60AAh of this drive state increments; 6076h states its rated torque.

@@ -12348,7 +12348,7 @@ export interface components {
              * Code
              * @enum {string}
              */
-            code: "measured" | "flank_kept" | "backlash_not_seen" | "stiffness_not_seen" | "motor_inertia_unknown" | "rated_torque_unknown" | "load_light" | "revolution_not_covered";
+            code: "measured" | "flank_kept" | "backlash_not_seen" | "stiffness_not_seen" | "motor_inertia_unknown" | "rated_torque_unknown" | "load_light" | "pull_large" | "setpoints_held" | "revolution_not_covered";
             /**
              * Unit
              * @default
