@@ -70,6 +70,8 @@ class load_side:
     PULLED = 0.2
     """[ratio] A pull of more than this share of the largest acceleration leaves no certain flanks.
     Origin: 28457f47."""
+    SEEN = 2.0
+    """[ratio] A twist counts as seen from so many times its uncertainty on. Origin: 28457f47."""
     SHARE = 0.03
     """[ratio] Nothing is known better than this share of it, whatever the scatter. Origin:
     28457f47."""

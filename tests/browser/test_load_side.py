@@ -63,7 +63,6 @@ def test_backlash_and_stiffness_are_measured_and_shown(page: Page, station: Stat
     axis = station.add(1, tuning.URL, "generic402", "Spindle")
     tuning.keep_exchanging(page, axis)
     open_axis(page, axis, "tune")
-    tuning.agree(page)
     tuning.open_step(page, "more")
     heading = page.get_by_role("heading", name="Load side", exact=True)
     panel = page.locator("section.panel").filter(has=heading).last

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -142,6 +143,10 @@ class _Fit:
     lost: float
     square: float
 
+    def amplitude(self, number: int) -> float:
+        """Of the error's order of this number."""
+        return float(np.hypot(self.errors[2 * number], self.errors[2 * number + 1]))
+
 
 def load_side(sides: TwoSides, motor_inertia_kgm2: float | None) -> LoadSide:
     """The figures of these samples.
@@ -174,14 +179,14 @@ def load_side(sides: TwoSides, motor_inertia_kgm2: float | None) -> LoadSide:
     twist = value(lambda fit: fit.twist)
     angle, columns = _curve(sides, shape)
     sizes = tuple(
-        (order, value(lambda fit, n=2 * n: float(np.hypot(*fit.errors[n : n + 2]))))
+        (order, value(partial(_Fit.amplitude, number=n)))
         for n, order in enumerate(shape.orders)
     )  # fmt: skip
     return LoadSide(
         counts_per_rev=whole.counts_per_rad * _TURN,
         lost_motion_rad=value(lambda fit: fit.lost, floor),
         backlash_rad=gap,
-        twist_s2=twist if twist.value > twist.half and not pulled else None,
+        twist_s2=twist if twist.value > threshold.SEEN * twist.half and not pulled else None,
         most_twist_s2=max(twist.value + twist.half, 0.0),
         load_inertia_kgm2=_load_inertia(table, groups, motor_inertia_kgm2),
         orders=sizes,
@@ -435,8 +440,8 @@ def _curve(sides: TwoSides, shape: _Shape) -> tuple[FloatArray, FloatArray]:
     if shape.powers == 0:
         angle = np.arange(threshold.BINS) * _TURN * sides.ratio / threshold.BINS
     else:
-        ends = shape.centre_rad + np.array([-0.5, 0.5]) * shape.span_rad
-        angle = np.linspace(*ends, threshold.BINS)
+        share = np.linspace(-0.5, 0.5, threshold.BINS)
+        angle = shape.centre_rad + share * shape.span_rad
     return angle, shape.columns(angle)
 
 
@@ -445,4 +450,4 @@ def unwrapped(counts: FloatArray, bits: int = 32) -> FloatArray:
     turn = 2.0**bits
     steps = np.diff(counts)
     steps -= turn * np.round(steps / turn)
-    return np.concatenate([counts[:1], counts[0] + np.cumsum(steps)])
+    return np.concatenate([counts[:1], counts[0] + np.cumsum(steps)]).astype(np.float64)

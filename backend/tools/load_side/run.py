@@ -181,8 +181,8 @@ async def run(run: Run, settings: LoadSideSettings) -> LoadSideResult:
     found = _sides((slow, moves), (plan.slow_part, plan.moves_part))
     if run.keep is not None:
         meta = {"settings": settings.model_dump(mode="json"), "facts": asdict(facts)}
-        meta["sample_rate_hz"] = found.sample_rate_hz
-        run.keep("load-side", found.arrays(), {"tool": "load-side", **meta})
+        rate = {"sample_rate_hz": found.sample_rate_hz}
+        run.keep("load-side", found.arrays(), {"tool": "load-side", **meta, **rate})
     return await meanwhile(
         lambda: evaluate(found, settings, facts), go_back(axis, session, home, envelope, facts)
     )

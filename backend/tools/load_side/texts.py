@@ -54,7 +54,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "finding.stiffness_not_seen": (
         "The coupling is too stiff for a value: no twist shows above its uncertainty.",
-        "联轴器刚度过高，无法给出数值：扭转未超过其不确定度。",
+        "扭转刚度太大，无法给出数值：扭转未超过其不确定度。",
     ),
     "finding.motor_inertia_unknown": (
         "Stiffness needs the inertia of the motor alone: the drive does not state it, and none was "

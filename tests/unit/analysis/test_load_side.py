@@ -22,7 +22,7 @@ from tests.unit.analysis.two_sided_axis import RATE_HZ, TURN, Axis, moved
 
 pytestmark = pytest.mark.timeout(600)
 
-AXES = 46
+AXES = 52
 TRAVEL_REV, SPEED_RPM, TORQUE = 4.0, 2000.0, 0.8
 
 
