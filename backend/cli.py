@@ -87,6 +87,10 @@ COMMANDS = {
         "tools:friction",
         "Map friction over speed and torque over position, both directions. The axis moves.",
     ),
+    "load-side": (
+        "tools:load_side",
+        "Measure backlash, stiffness and transmission error with a second encoder. The axis moves.",
+    ),
     "first-power": (
         "tools:first_power",
         "Before the first closed loop: supply, counts, direction, switches, brake and phase order. "

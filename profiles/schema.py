@@ -345,6 +345,7 @@ class Signal(Frozen):
     role: Literal[
         "status_word", "control_word", "mode", "mode_display", "error_code",
         "position_actual", "position_demand", "position_target", "position_offset",
+        "load_position",
         "velocity_actual", "velocity_demand", "velocity_target", "velocity_offset",
         "torque_actual", "torque_demand", "torque_target", "torque_offset",
         "following_error", "dc_voltage", "temperature", "current_actual", "load_ratio",

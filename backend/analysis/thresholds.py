@@ -12,6 +12,92 @@ coefficients of a drive's format) stand in their modules.
 from __future__ import annotations
 
 
+class load_side:
+    """`mechanics/load_side.py`."""
+
+    # WINDOW_S, THINNED_HZ: Length of the low-pass window that all signals pass, and how many
+    # samples a second are kept after it.
+    WINDOW_S = 0.03
+    """[s] Origin: 28457f47."""
+    THINNED_HZ = 250.0
+    """[Hz] Origin: 28457f47."""
+    # FEWEST, GROUPS: Samples of slow passes, and groups of moves, below which nothing is said.
+    FEWEST = 100
+    """[count] Origin: 28457f47."""
+    GROUPS = 4
+    """[count] Origin: 28457f47."""
+    MOVED = 16.0
+    """[count] A load that turned by less over the slow passes does not follow. Origin: 28457f47."""
+    COUNTS = 0.5
+    """[count] Nothing is known better than this share of a count of the load. Origin: 28457f47."""
+    # COVERED, ORDERS, APART: This share of a revolution counts as one; errors of so many orders per
+    # revolution are looked for, those of the motor where they are so far from those of the load.
+    COVERED = 0.98
+    """[ratio] Origin: 28457f47."""
+    ORDERS = 6
+    """[count] Origin: 28457f47."""
+    APART = 0.05
+    """[ratio] Origin: 28457f47."""
+    # QUIETEST, RESTLESS: A load that moves against the motor by so many times what it does in the
+    # quietest share of the samples crosses the gap, or bounces.
+    QUIETEST = 0.2
+    """[ratio] Origin: 28457f47."""
+    RESTLESS = 2.0
+    """[ratio] Origin: 28457f47."""
+    POWERS = 8
+    """[count] Polynomials that stand for the error over a part of a revolution. Origin:
+    28457f47."""
+    # LARGE, NEAR: Quantile of the accelerations that counts as the largest; a force on the load of
+    # a smaller share of it does not say on which flank it lies.
+    LARGE = 0.9
+    """[ratio] Origin: 28457f47."""
+    NEAR = 0.08
+    """[ratio] Origin: 28457f47."""
+    COARSE = 4
+    """[count] One of so many samples is enough for that search. Origin: 28457f47."""
+    # FRICTION, STEPS: Friction of the load is searched for up to this share of the largest force,
+    # in so many steps.
+    FRICTION = 1.6
+    """[ratio] Origin: 28457f47."""
+    STEPS = 33
+    """[count] Origin: 28457f47."""
+    # NO_PULL, PULLS: A smaller pull than this share counts for nothing; a larger one may act on so
+    # many times less inertia than the motor turns.
+    NO_PULL = 0.04
+    """[ratio] Origin: 28457f47."""
+    PULLS = (1.0, 1.25, 1.6, 2.0, 3.0, 5.0)
+    """[ratio] Origin: 28457f47."""
+    PULLED = 0.2
+    """[ratio] A pull of more than this share of the largest acceleration leaves no certain flanks.
+    Origin: 28457f47."""
+    SEEN = 2.0
+    """[ratio] A twist counts as seen from so many times its uncertainty on. Origin: 28457f47."""
+    SHARE = 0.03
+    """[ratio] Nothing is known better than this share of it, whatever the scatter. Origin:
+    28457f47."""
+    # SMALL, ENDLESS, SAME: Friction that twists by a smaller share of the gap moves no flank, one
+    # above so many times the largest force always decides; flanks agree where this share does.
+    SMALL = 0.03
+    """[ratio] Origin: 28457f47."""
+    ENDLESS = 100.0
+    """[ratio] Origin: 28457f47."""
+    SAME = 0.98
+    """[ratio] Origin: 28457f47."""
+    SEPARABLE = 0.02
+    """[ratio] Share of the flanks' variance that direction and acceleration must leave. Origin:
+    28457f47."""
+    # TRIMMED, OUTSIDE, MOST_OUTSIDE: So often samples are left out that lie so many deviations off,
+    # as they bounce or cross the gap, unless they are more than this share.
+    TRIMMED = 2
+    """[count] Origin: 28457f47."""
+    OUTSIDE = 5.0
+    """[ratio] Origin: 28457f47."""
+    MOST_OUTSIDE = 0.2
+    """[ratio] Origin: 28457f47."""
+    BINS = 180
+    """[count] Places at which the error is drawn. Origin: 28457f47."""
+
+
 class loop_goals:
     """`loop/loop_goals.py`."""
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from backend.drive.drive import Drive
+from backend.drive.optional import existing
 from backend.drive.ports import Port, address_of
 from drivers.errors import Busy, DriveError, NotAllowed
 from drivers.link import (
@@ -25,13 +26,16 @@ from drivers.texts.message import Text
 
 #: Signals mapped as far as they fit, the important ones first.
 INPUT_ROLES = (
-    "status_word", "position_actual", "velocity_actual", "torque_actual", "mode_display",
-    "following_error", "error_code", "digital_inputs", "velocity_demand", "position_demand",
+    "status_word", "position_actual", "velocity_actual", "torque_actual", "load_position",
+    "mode_display", "following_error", "error_code", "digital_inputs", "velocity_demand",
+    "position_demand",
 )  # fmt: skip
 OUTPUT_ROLES = (
     "control_word", "mode", "position_target", "velocity_target", "torque_target",
     "position_offset", "velocity_offset", "torque_offset",
 )  # fmt: skip
+#: Left to the maker by CiA 402-2: a profile names them, and a drive may have none.
+_OPTIONAL_ROLES = ("load_position",)
 #: For a drive that is commanded by its profile velocity.
 _SPEED_ROLES = ("control_word", "velocity_target")
 
@@ -79,7 +83,8 @@ class CyclicSession:
             if self.cyclic.speeds is not None:
                 self.cyclic.speeds.take_speeds(port.station, by_speed)
             roles = _SPEED_ROLES if by_speed else OUTPUT_ROLES
-            inputs += _signals(drive, port, INPUT_ROLES, ("tx", "rxtx"))
+            found = [role for role in INPUT_ROLES if await _has(drive, role)]
+            inputs += _signals(drive, port, found, ("tx", "rxtx"))
             outputs += _signals(drive, port, roles, ("rx", "rxtx"), needed=roles[:1])
         outputs = _fitting_outputs(self.drives, outputs)
         mapped = await self.cyclic.configure(inputs, outputs, cycle_s)
@@ -195,6 +200,17 @@ class CyclicSession:
 def channel(drive: Drive, key: str) -> str:
     """Name of a signal in the blocks of a bus."""
     return f"{drive.id}/{key}"
+
+
+async def _has(drive: Drive, role: str) -> bool:
+    """Whether a signal may be mapped: one that a drive need not have is asked for first."""
+    key = drive.key(role)
+    if role not in _OPTIONAL_ROLES or key is None:
+        return True
+    try:
+        return key in await existing(drive, (key,))
+    except DriveError:
+        return False
 
 
 def _signals(

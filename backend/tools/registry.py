@@ -9,6 +9,7 @@ from backend.tools.first_power.run import TOOL as FIRST_POWER
 from backend.tools.friction.run import TOOL as FRICTION
 from backend.tools.health.run import TOOL as HEALTH
 from backend.tools.inertia.run import TOOL as INERTIA
+from backend.tools.load_side.run import TOOL as LOAD_SIDE
 from backend.tools.safety_check.run import TOOL as SAFETY_CHECK
 from backend.tools.step.run import TOOL as STEP
 from backend.tools.sweep.run import TOOL as SWEEP
@@ -20,6 +21,7 @@ TOOLS: tuple[AnyTool, ...] = (
     SWEEP,
     STEP,
     FRICTION,
+    LOAD_SIDE,
     BRAKE_TEST,
     HEALTH,
     SAFETY_CHECK,

@@ -16,6 +16,7 @@ from backend.tools.first_power.result import FirstPowerResult
 from backend.tools.friction.result import FrictionResult
 from backend.tools.health.result import HealthResult
 from backend.tools.inertia.result import InertiaAnswer
+from backend.tools.load_side.result import LoadSideResult
 from backend.tools.safety_check.result import SafetyResult
 from backend.tools.step.result import StepAnswer
 from backend.tools.sweep.result import SweepAnswer
@@ -24,6 +25,7 @@ ToolOutcome: TypeAlias = Annotated[
     FrictionResult
     | InertiaAnswer
     | StepAnswer
+    | LoadSideResult
     | BrakeResult
     | HealthResult
     | FirstPowerResult

@@ -616,6 +616,80 @@ class jog_run:
     Origin: a412d0d6."""
 
 
+class load_side_evaluate:
+    """`load_side/evaluate.py`."""
+
+    CATALOGUE = 0.05
+    """[ratio] What a catalogue states of the motor's inertia may be off by this. Origin:
+    28457f47."""
+
+
+class load_side_run:
+    """`load_side/run.py`."""
+
+    # USED, FAST, TORQUE_SHARE: Share of the permitted travel to each side, of the permitted speed,
+    # and of the torque beyond friction that is used.
+    USED = 0.8
+    """[ratio] Origin: 28457f47."""
+    FAST = 0.85
+    """[ratio] Origin: 28457f47."""
+    TORQUE_SHARE = 0.5
+    """[ratio] Origin: 28457f47."""
+    # QUARTERS_S, BEYOND: A triangle of speed lasts four times the first of these with which its
+    # acceleration is so many times what friction decelerates, else the last.
+    QUARTERS_S = (0.3, 0.2, 0.14)
+    """[s] Origin: 28457f47."""
+    BEYOND = 2.5
+    """[ratio] Origin: 28457f47."""
+    # CORNER_S, CYCLES: Corners are rounded over this; so many triangles in a group.
+    CORNER_S = 0.03
+    """[s] Origin: 28457f47."""
+    CYCLES = 2
+    """[count] Origin: 28457f47."""
+    # LEVELS, REPEATS: Accelerations of the groups, as shares of the largest; how often they follow.
+    LEVELS = (1.0, 0.75, 0.5)
+    """[ratio] Origin: 28457f47."""
+    REPEATS = 3
+    """[count] Origin: 28457f47."""
+    # CONTACT, LATE_S: In this share of a quarter the gap is crossed, and the load settles; before
+    # the next corner the filter would see it.
+    CONTACT = 0.5
+    """[ratio] Origin: 28457f47."""
+    LATE_S = 0.035
+    """[s] Origin: 28457f47."""
+    # RAMP_S, SETTLE_S, DWELL_S, POSITIONING_S: Ramps of the slow passes, what does not count behind
+    # them, standstill between moves, time of the way to where they begin.
+    RAMP_S = 0.2
+    """[s] Origin: 28457f47."""
+    SETTLE_S = 0.2
+    """[s] Origin: 28457f47."""
+    DWELL_S = 0.15
+    """[s] Origin: 28457f47."""
+    POSITIONING_S = 0.8
+    """[s] Origin: 28457f47."""
+    # PASSES, SLOW_RPM, SLOW_SHARE: Slow passes, their speed where there is time for it, and the
+    # share of the permitted speed that they may have at most.
+    PASSES = 6
+    """[count] Origin: 28457f47."""
+    SLOW_RPM = 20.0
+    """[rpm] Origin: 28457f47."""
+    SLOW_SHARE = 0.3
+    """[ratio] Origin: 28457f47."""
+    # WHOLE, WIDER: The passes cover so many load revolutions, and so many strokes of the moves.
+    WHOLE = 1.1
+    """[rev] Origin: 28457f47."""
+    WIDER = 1.1
+    """[ratio] Origin: 28457f47."""
+    # LEAST_RPS, LEAST_REV, SPARE_S: Slower and shorter moves show nothing; ways to where the moves
+    # begin take this time.
+    LEAST_RPS = 0.2
+    """[rev/s] Origin: 28457f47."""
+    LEAST_REV = 0.2
+    """[rev] Origin: 28457f47."""
+    SPARE_S = 6.0
+    """[s] Origin: 28457f47."""
+
+
 class measuring_alignment:
     """`measuring/alignment.py`."""
 

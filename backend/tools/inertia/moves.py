@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,8 +73,12 @@ async def speed_move(
     progress: Callable[[float], None],
     until: Callable[[npt.NDArray[np.float64]], bool] | None = None,
     torque_nm: npt.NDArray[np.float64] | None = None,
+    also: Sequence[str] = (),
 ) -> Recording:
-    """Enable, play a speed profile, brake, disable; ``torque_nm`` [n] is sent ahead of the loop."""
+    """Enable, play a speed profile, brake, disable; ``torque_nm`` [n] is sent ahead of the loop.
+
+    ``also`` are keys of further signals that are recorded.
+    """
     units = await axis.units()
     values = np.round(speed_rpm * (units.velocity_raw(1e6) / 1e6)).astype(np.int64)
     sent = Play(Mode.CSV, values)
@@ -91,6 +95,7 @@ async def speed_move(
         limits = await bus_limits(axis, envelope, start)
         return await play(
             axis, session, sent, limits, facts.rated_torque_nm, progress, until=until,
+            also=also,
         )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
 
@@ -50,6 +50,7 @@ class Recording:
 
     ``position_rad``, ``velocity_rad_s``, ``torque_nm`` are at the motor; ``sent`` and ``offset``
     in raw units as they went out. ``valid`` is False where a sample was lost or not trusted.
+    ``also`` [n, k] holds further signals that were asked for, raw.
     """
 
     sample_rate_hz: float
@@ -59,6 +60,7 @@ class Recording:
     sent: FloatArray
     offset: FloatArray
     valid: BoolArray
+    also: FloatArray | None = None
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
         """For storage."""
@@ -264,11 +266,13 @@ async def play(
     progress: Callable[[float], None],
     *,
     until: Callable[[FloatArray], bool] | None = None,
+    also: Sequence[str] = (),
 ) -> Recording:
     """Play one sequence on an enabled axis and return the recording.
 
     ``until`` is called about 20 times a second with the rows [n, 3] of raw position, velocity and
-    torque that came since, and ends the motion early, by braking, when it returns True.
+    torque that came since, and ends the motion early, by braking, when it returns True. ``also``
+    are keys of further signals that come with every cycle.
 
     Raises:
         MotionHalted: the envelope ended the motion; `MotionHalted.halt` is why.
@@ -280,7 +284,7 @@ async def play(
     keys = [drive.require(role) for role in _ROLES[:3]]
     target_key = drive.require(_TARGET_OF[sequence.mode])
     offset_key = drive.require(sequence.offset_role) if sequence.offset_role else None
-    names = [channel(drive, key) for key in [*keys, target_key]]
+    names = [channel(drive, key) for key in [*keys, *also, target_key]]
     if offset_key is not None:
         names.append(channel(drive, offset_key))
     catch = _Catch(tuple(names))
@@ -307,7 +311,9 @@ async def play(
     )
     if limits.feedback is not None:
         _require_agreement(axis, bridged(table, valid), valid, period_s, limits.feedback)
-    return await _in_si(axis, whole, table, valid, period_s, rated_torque_nm)
+    recording = await _in_si(axis, whole, table, valid, period_s, rated_torque_nm)
+    further = bridged(table, valid)[:, len(keys) : len(keys) + len(also)] if also else None
+    return replace(recording, also=further)
 
 
 def _require_agreement(

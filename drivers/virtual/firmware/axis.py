@@ -326,6 +326,11 @@ class VirtualAxis:
         return float(self.s[k.S_OMEGA])
 
     @property
+    def load_angle_rad(self) -> float:
+        """True angle of the last inertia, in rad of the motor shaft."""
+        return float(self._x[0] - np.sum(self._x[FIRST_LOAD::2]))
+
+    @property
     def torque_nm(self) -> float:
         """Motor torque."""
         return float(self.s[k.S_TORQUE])

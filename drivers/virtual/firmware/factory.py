@@ -8,6 +8,7 @@ from pathlib import Path
 
 from drivers.virtual.device import Device
 from drivers.virtual.firmware import families
+from drivers.virtual.firmware.load_encoder import without_load_encoder
 from drivers.virtual.firmware.rough_feedback import without_lacking
 from drivers.virtual.firmware.servo import VirtualServo
 from drivers.virtual.mechanics import MechanicsSpec, standard_mechanics
@@ -48,6 +49,7 @@ def make_device(
     elif not isinstance(mechanics, MechanicsSpec):
         mechanics = MechanicsSpec.model_validate(dict(mechanics))
     profile = without_lacking(profile, mechanics.rough_feedback)
+    profile = without_load_encoder(profile, mechanics.load_encoder)
     if family.supply_v is not None and "supply" not in mechanics.model_fields_set:
         supply = mechanics.supply.model_copy(update={"voltage_v": family.supply_v})
         mechanics = mechanics.model_copy(update={"supply": supply})

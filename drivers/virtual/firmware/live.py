@@ -8,6 +8,8 @@ from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.dictionary import Number
 from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.load_encoder import KEY as LOAD_POSITION
+from drivers.virtual.firmware.load_encoder import LoadEncoder
 from drivers.virtual.firmware.monitors import monitors
 from drivers.virtual.firmware.panel import Panel
 from drivers.virtual.firmware.rough_feedback import position_value, speed_value
@@ -93,6 +95,8 @@ def live_values(
     }
     if core.family.traits.error_status_key is not None:
         values[core.family.traits.error_status_key] = lambda: core.axis.faults & 0x1FFF
+    if core.axis.spec.load_encoder is not None:
+        values[LOAD_POSITION] = LoadEncoder(core.axis, core.axis.spec.load_encoder)
     values |= core.family.readings(core.axis)
     values |= monitors(core, control, panel if isinstance(panel, Terminals) else None)
     # The same quantity under a number of the maker's own (2102h is DS_C's error code).

@@ -47,6 +47,7 @@ def write_physics(p: Parameters, spec: MechanicsSpec, motor: MotorData) -> None:
     p[k.P_FIELD_ANGLE] = shifted + math.radians(phases.angle_deg)
     p[k.P_POLE_PAIRS] = phases.pole_pairs
     p[k.P_COULOMB] = spec.friction.coulomb_nm
+    p[k.P_LOAD_COULOMB] = spec.friction.load_coulomb_nm
     p[k.P_STICTION] = max(spec.friction.static_nm - spec.friction.coulomb_nm, 0.0)
     p[k.P_STRIBECK] = spec.friction.stribeck_rad_s
     p[k.P_STRIBECK_TANH] = spec.friction.stribeck_law == "tanh"

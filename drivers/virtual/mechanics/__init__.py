@@ -2,6 +2,7 @@
 
 from drivers.virtual.mechanics.chain import analytic_response
 from drivers.virtual.mechanics.friction_curve import friction_nm, ripple_nm
+from drivers.virtual.mechanics.load_encoder import LoadEncoderSpec
 from drivers.virtual.mechanics.rough import RoughTorqueSpec
 from drivers.virtual.mechanics.spec import (
     EncoderSpec,
@@ -22,6 +23,7 @@ from drivers.virtual.mechanics.spec import (
 __all__ = [
     "EncoderSpec",
     "FrictionSpec",
+    "LoadEncoderSpec",
     "LoadSpec",
     "MechanicsSpec",
     "MotorSpec",

@@ -12,6 +12,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from drivers.virtual.mechanics.load_encoder import LoadEncoderSpec
 from drivers.virtual.mechanics.rough import RoughTorqueSpec
 from drivers.virtual.mechanics.rough_feedback import RoughFeedbackSpec
 
@@ -66,6 +67,9 @@ class FrictionSpec(_Finite):
     static_nm: float = Field(default=0.0, ge=0)
     stribeck_rad_s: float = Field(default=1.0, gt=0)
     stribeck_law: Literal["gaussian", "tanh"] = "gaussian"
+    load_coulomb_nm: float = Field(
+        default=0.0, ge=0, description="dry friction of the last inertia, behind the couplings"
+    )
     gravity_nm: float = 0.0
     fan_nms2: float = Field(default=0.0, ge=0)
 
@@ -220,6 +224,7 @@ class MechanicsSpec(_Part):
     switches: SwitchSpec = SwitchSpec()
     supply: SupplySpec = SupplySpec()
     load: tuple[LoadSpec, ...] = ()
+    load_encoder: LoadEncoderSpec | None = None
     rough_feedback: RoughFeedbackSpec = RoughFeedbackSpec()
     rough_torque: RoughTorqueSpec = RoughTorqueSpec()
 

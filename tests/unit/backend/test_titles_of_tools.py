@@ -26,6 +26,7 @@ TITLES = {
     "autotune": ("Tune", "整定"),
     "step": ("Step response", "阶跃响应"),
     "friction": ("Friction map", "摩擦图谱"),
+    "load-side": ("Load side", "负载侧"),
     "brake-test": ("Brake test", "抱闸测试"),
     "health": ("Health check", "健康检查"),
     "safety-check": ("Safety acceptance record", "安全验收记录"),

@@ -6,6 +6,7 @@ import type {
   HealthResult,
   InertiaAnswer,
   JobInfo,
+  LoadSideResult,
   SafetyResult,
   StepAnswer,
 } from './schema'
@@ -18,6 +19,7 @@ type ToolOutcome =
   | FrictionResult
   | HealthResult
   | InertiaAnswer
+  | LoadSideResult
   | SafetyResult
   | StepAnswer
 
@@ -34,6 +36,12 @@ export function plainResult(result: JobInfo['result'] | undefined): Record<strin
 export function asFriction(result: unknown): FrictionResult | null {
   const found = outcome(result)
   return found?.tool === 'friction' ? found : null
+}
+
+/** The figures of the load side, or null where it is something else. */
+export function asLoadSide(result: unknown): LoadSideResult | null {
+  const found = outcome(result)
+  return found?.tool === 'load-side' ? found : null
 }
 
 /** The result of a brake test, or null where it is something else. */

@@ -1227,6 +1227,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/jobs/load-side": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Load-Side
+         * @description Measure backlash, stiffness and transmission error with a second encoder. The axis moves.
+         */
+        post: operations["start_load-side"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/jobs/load_set": {
         parameters: {
             query?: never;
@@ -5424,6 +5444,21 @@ export interface components {
             type: "enable_renew";
         };
         /**
+         * ErrorOrder
+         * @description Transmission error of ``order_per_rev`` periods per revolution of the load.
+         */
+        ErrorOrder: {
+            /** Amplitude Ci95 Deg */
+            amplitude_ci95_deg: [
+                number | null,
+                number | null
+            ];
+            /** Amplitude Deg */
+            amplitude_deg: number;
+            /** Order Per Rev */
+            order_per_rev: number;
+        };
+        /**
          * Estimate
          * @description A value with its 95 % interval, in the unit that the field's name says.
          */
@@ -7651,7 +7686,7 @@ export interface components {
              * Result
              * @description of a tool: its result, which its field tool names
              */
-            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | components["schemas"]["PlainResult"] | null;
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["LoadSideResult"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | components["schemas"]["PlainResult"] | null;
             /**
              * Started
              * Format: date-time
@@ -8147,6 +8182,129 @@ export interface components {
             version?: number | null;
         };
         /**
+         * LoadSideResult
+         * @description ``lost_motion_deg`` is between slow passes in both directions: backlash and what friction
+         *     twists. ``backlash_deg`` is the gap alone. Values are None where the data do not show them;
+         *     ``findings`` state why.
+         */
+        LoadSideResult: {
+            backlash_deg: components["schemas"]["Estimate"] | null;
+            backlash_motor_rev: components["schemas"]["Estimate"] | null;
+            /**
+             * Counts Per Load Rev
+             * @description measured; negative: counts the other way
+             */
+            counts_per_load_rev: number;
+            /**
+             * Error Angle Deg
+             * @description [n] at the load, of the motor angle
+             */
+            error_angle_deg: number[];
+            /**
+             * Error Deg
+             * @description [n] load behind the motor
+             */
+            error_deg: number[];
+            /** Error Orders */
+            error_orders: components["schemas"]["ErrorOrder"][];
+            /** @description transmission error, peak to peak */
+            error_span_deg: components["schemas"]["Estimate"];
+            /** Findings */
+            findings: components["schemas"]["backend__tools__load_side__result__Finding"][];
+            /** Gear Ratio */
+            gear_ratio: number;
+            /** @description at the motor shaft */
+            load_inertia_kgm2: components["schemas"]["Estimate"] | null;
+            /** @description frequency of the load while the motor is held: the anti-resonance */
+            locked_motor_hz: components["schemas"]["Estimate"] | null;
+            lost_motion_deg: components["schemas"]["Estimate"];
+            /**
+             * Measurements
+             * @description names of the stored raw data
+             * @default []
+             */
+            measurements: string[];
+            /** Motion S */
+            motion_s: number;
+            /**
+             * Residual Deg
+             * @description root mean square of what the model leaves
+             */
+            residual_deg: number;
+            /**
+             * Stiffness At Least Nm Per Rad
+             * @description at the load, where it is too stiff for a value
+             */
+            stiffness_at_least_nm_per_rad: number | null;
+            /** @description at the load */
+            stiffness_nm_per_rad: components["schemas"]["Estimate"] | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            tool: "load-side";
+        };
+        /**
+         * LoadSideSettings
+         * @description The limits of every measurement, the gear, and the motor's own inertia.
+         */
+        LoadSideSettings: {
+            /**
+             * Consent
+             * @description the user agreed that nothing in the drive ends a speed when this computer falls silent; needed where the drive has no watchdog (DS_C)
+             * @default false
+             */
+            consent: boolean;
+            /**
+             * Cycle Ms
+             * @description cycle of the exchange that is started where none runs, and ended afterwards
+             * @default 1
+             */
+            cycle_ms: number;
+            /**
+             * Gear Ratio
+             * @description motor revolutions for one revolution of the load encoder
+             * @default 1
+             */
+            gear_ratio: number;
+            /**
+             * Motor Inertia Kgm2
+             * @description inertia of the motor alone by its catalogue in kg·m², if not the drive's
+             */
+            motor_inertia_kgm2?: number | null;
+            /**
+             * Rated Torque Nm
+             * @description overrides what the drive says
+             */
+            rated_torque_nm?: number | null;
+            /**
+             * Slow Rpm
+             * @description speed of the slow passes; chosen by the limits without it
+             */
+            slow_rpm?: number | null;
+            /**
+             * Speed Limit
+             * @description highest speed, in rpm
+             */
+            speed_limit: number;
+            /**
+             * Time Limit S
+             * @description longest time of all moves together, in s
+             * @default 90
+             */
+            time_limit_s: number;
+            /**
+             * Torque Limit
+             * @description highest torque, in % of rated
+             */
+            torque_limit: number;
+            /**
+             * Travel Limit
+             * @description longest way from the start, in revolutions
+             */
+            travel_limit: number;
+        };
+        /**
          * LogEntry
          * @description The tool's own log.
          */
@@ -8263,7 +8421,7 @@ export interface components {
              * Result
              * @description of a tool: its result, which its field tool names
              */
-            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | {
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["LoadSideResult"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | {
                 [key: string]: unknown;
             };
             /** Settings */
@@ -12316,6 +12474,24 @@ export interface components {
             /** Value */
             value?: number | null;
         };
+        /**
+         * Finding
+         * @description What the measurement shows, or cannot show, as a code with the figure that it rests on.
+         */
+        backend__tools__load_side__result__Finding: {
+            /**
+             * Code
+             * @enum {string}
+             */
+            code: "measured" | "flank_kept" | "backlash_not_seen" | "stiffness_not_seen" | "motor_inertia_unknown" | "rated_torque_unknown" | "load_light" | "pull_large" | "setpoints_held" | "revolution_not_covered";
+            /**
+             * Unit
+             * @default
+             */
+            unit: string;
+            /** Value */
+            value?: number | null;
+        };
     };
     responses: never;
     parameters: never;
@@ -12394,6 +12570,7 @@ export type EepromPlan = components['schemas']['EepromPlan'];
 export type EnablePress = components['schemas']['EnablePress'];
 export type EnableRelease = components['schemas']['EnableRelease'];
 export type EnableRenew = components['schemas']['EnableRenew'];
+export type ErrorOrder = components['schemas']['ErrorOrder'];
 export type Estimate = components['schemas']['Estimate'];
 export type EthercatPermissions = components['schemas']['EthercatPermissions'];
 export type EthercatSegment = components['schemas']['EthercatSegment'];
@@ -12490,6 +12667,8 @@ export type LibraryPage = components['schemas']['LibraryPage'];
 export type LineSearchRequest = components['schemas']['LineSearchRequest'];
 export type LineSearchResult = components['schemas']['LineSearchResult'];
 export type LoadSetRequest = components['schemas']['LoadSetRequest'];
+export type LoadSideResult = components['schemas']['LoadSideResult'];
+export type LoadSideSettings = components['schemas']['LoadSideSettings'];
 export type LogEntry = components['schemas']['LogEntry'];
 export type LogIn = components['schemas']['LogIn'];
 export type Logged = components['schemas']['Logged'];
@@ -12663,6 +12842,7 @@ export type Where = components['schemas']['Where'];
 export type WriteResult = components['schemas']['WriteResult'];
 export type BackendToolsCycleResultFinding = components['schemas']['backend__tools__cycle__result__Finding'];
 export type BackendToolsFrictionResultFinding = components['schemas']['backend__tools__friction__result__Finding'];
+export type BackendToolsLoadSideResultFinding = components['schemas']['backend__tools__load_side__result__Finding'];
 export type $defs = Record<string, never>;
 export interface operations {
     accounts: {
@@ -22838,6 +23018,149 @@ export interface operations {
         requestBody: {
             content: {
                 "application/json": components["schemas"]["InertiaRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    "start_load-side": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["LoadSideSettings"];
             };
         };
         responses: {

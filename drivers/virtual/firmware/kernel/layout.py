@@ -86,7 +86,8 @@ P_BRAKE_STIFFNESS, P_BRAKE_DAMPING = range(P_NOTCHES + 49, P_NOTCHES + 51)
     P_PHASES_WRONG, P_FIELD_SENSE, P_FIELD_ANGLE, P_POLE_PAIRS, P_COMMUTATION_SENSE,
     P_ENCODER_SENSE,
 ) = range(P_NOTCHES + 51, P_NOTCHES + 57)  # fmt: skip
-P_SIZE = P_NOTCHES + 57
+P_LOAD_COULOMB = P_NOTCHES + 57
+P_SIZE = P_NOTCHES + 58
 
 # --- state ----------------------------------------------------------------------------------
 (

@@ -92,6 +92,18 @@ def _grip(p, s, angle, speed):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True)
+def _load_friction(p, x, scratch, b, last):  # type: ignore[no-untyped-def]
+    """Dry friction of the last inertia, by the same rule as the motor's."""
+    most = p[k.P_LOAD_COULOMB]
+    needed = -scratch[last] / b[last, 2]
+    friction = clamp(needed, -most, most)
+    for i in range(x.shape[0]):
+        scratch[i] += b[i, 2] * friction
+    if friction == needed:
+        scratch[last] = 0.0
+
+
+@njit(nogil=True)
 def step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-untyped-def]
     """One exact step of the linear chain, then friction and end stops on the velocity level."""
     size = x.shape[0]
@@ -134,6 +146,8 @@ def step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-
             if x[1] == 0.0:
                 scratch[0] = x[0]
     last = size - 1 if size > 3 else 1
+    if p[k.P_LOAD_COULOMB] > 0.0 and size > 3:
+        _load_friction(p, x, scratch, bm, last)
     beyond = _beyond(p, scratch, size)
     if beyond * scratch[last] > 0.0:
         push = -scratch[last] / bm[last, 2]

@@ -23,6 +23,7 @@ import { FrictionPanel } from './FrictionPanel'
 import { GainsPanel } from './GainsPanel'
 import { HealthPanel } from './HealthPanel'
 import { InertiaPanel } from './InertiaPanel'
+import { LoadSidePanel } from './LoadSidePanel'
 import { type Known, later, nextStep, type StepName, STEPS, stepsDone, tunedAt } from './path'
 import { PathNav } from './PathNav'
 import { PreChecks } from './PreChecks'
@@ -57,6 +58,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
   const tuneJob = useToolJob(drive, 'autotune').job
   const stepJob = useToolJob(drive, 'step').job
   const frictionJob = useToolJob(drive, 'friction').job
+  const loadSideJob = useToolJob(drive, 'load-side').job
   const brakeJob = useToolJob(drive, 'brake-test').job
   const firstJob = useToolJob(drive, 'first-power').job
   const healthJob = useToolJob(drive, 'health').job
@@ -64,6 +66,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
   const cycleJob = useToolJob(drive, 'cycle').job
   useJobEnd(inertiaJob?.id ?? null, () => void measured.refresh())
   useJobEnd(frictionJob?.id ?? null, () => void measured.refresh())
+  useJobEnd(loadSideJob?.id ?? null, () => void measured.refresh())
   useJobEnd(brakeJob?.id ?? null, () => void measured.refresh())
   useJobEnd(firstJob?.id ?? null, () => void measured.refresh())
   useJobEnd(cycleJob?.id ?? null, () => void measured.refresh())
@@ -115,6 +118,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
     [stepJob, 'verify'],
     [firstJob, 'first'],
     [frictionJob, 'more'],
+    [loadSideJob, 'more'],
     [brakeJob, 'more'],
     [healthJob, 'more'],
     [safetyJob, 'more'],
@@ -243,6 +247,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
           {possible && (
             <>
               <FrictionPanel {...measure} />
+              <LoadSidePanel {...measure} />
               <BrakePanel {...measure} />
               <HealthPanel {...measure} />
               <SafetyPanel {...measure} />

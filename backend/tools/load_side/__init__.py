@@ -1,0 +1,1 @@
+"""Load side: backlash, stiffness and transmission error between motor and second encoder."""
