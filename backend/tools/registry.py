@@ -10,6 +10,7 @@ from backend.tools.friction.run import TOOL as FRICTION
 from backend.tools.health.run import TOOL as HEALTH
 from backend.tools.inertia.run import TOOL as INERTIA
 from backend.tools.safety_check.run import TOOL as SAFETY_CHECK
+from backend.tools.shaping.run import TOOL as SHAPING
 from backend.tools.step.run import TOOL as STEP
 from backend.tools.sweep.run import TOOL as SWEEP
 from backend.tools.tool import AnyTool
@@ -23,6 +24,7 @@ TOOLS: tuple[AnyTool, ...] = (
     BRAKE_TEST,
     HEALTH,
     SAFETY_CHECK,
+    SHAPING,
     CYCLE,
     AUTOTUNE,
 )

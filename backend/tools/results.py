@@ -17,6 +17,7 @@ from backend.tools.friction.result import FrictionResult
 from backend.tools.health.result import HealthResult
 from backend.tools.inertia.result import InertiaAnswer
 from backend.tools.safety_check.result import SafetyResult
+from backend.tools.shaping.result import ShapingResult
 from backend.tools.step.result import StepAnswer
 from backend.tools.sweep.result import SweepAnswer
 
@@ -28,6 +29,7 @@ ToolOutcome: TypeAlias = Annotated[
     | HealthResult
     | FirstPowerResult
     | SafetyResult
+    | ShapingResult
     | CycleResult
     | SweepAnswer
     | AutotuneAnswer,

@@ -7,6 +7,7 @@ import type {
   InertiaAnswer,
   JobInfo,
   SafetyResult,
+  ShapingResult,
   StepAnswer,
 } from './schema'
 
@@ -19,6 +20,7 @@ type ToolOutcome =
   | HealthResult
   | InertiaAnswer
   | SafetyResult
+  | ShapingResult
   | StepAnswer
 
 /** The result of a tool, or null where it is something else. */
@@ -52,6 +54,12 @@ export function asSafetyCheck(result: unknown): SafetyResult | null {
 export function asFirstPower(result: unknown): FirstPowerResult | null {
   const found = outcome(result)
   return found?.tool === 'first-power' ? found : null
+}
+
+/** Slow vibration and its shapers, or null where it is something else. */
+export function asShaping(result: unknown): ShapingResult | null {
+  const found = outcome(result)
+  return found?.tool === 'shaping' ? found : null
 }
 
 /** The load of a cycle, or null where it is something else. */

@@ -27,6 +27,7 @@ import { type Known, later, nextStep, type StepName, STEPS, stepsDone, tunedAt }
 import { PathNav } from './PathNav'
 import { PreChecks } from './PreChecks'
 import { SafetyPanel } from './SafetyPanel'
+import { ShapingPanel } from './ShapingPanel'
 import { ReportPanel, useReports } from './ReportPanel'
 import { present, type Section, useSections } from './sections'
 import { StepPanel } from './StepPanel'
@@ -61,12 +62,14 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
   const firstJob = useToolJob(drive, 'first-power').job
   const healthJob = useToolJob(drive, 'health').job
   const safetyJob = useToolJob(drive, 'safety-check').job
+  const shapingJob = useToolJob(drive, 'shaping').job
   const cycleJob = useToolJob(drive, 'cycle').job
   useJobEnd(inertiaJob?.id ?? null, () => void measured.refresh())
   useJobEnd(frictionJob?.id ?? null, () => void measured.refresh())
   useJobEnd(brakeJob?.id ?? null, () => void measured.refresh())
   useJobEnd(firstJob?.id ?? null, () => void measured.refresh())
   useJobEnd(cycleJob?.id ?? null, () => void measured.refresh())
+  useJobEnd(shapingJob?.id ?? null, () => void measured.refresh())
   useJobEnd(stepJob?.id ?? null, () => void measured.refresh())
   useJobEnd(tuneJob?.id ?? null, () => {
     void measured.refresh()
@@ -119,6 +122,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
     [healthJob, 'more'],
     [safetyJob, 'more'],
     [cycleJob, 'more'],
+    [shapingJob, 'more'],
   ]
   const now: Section[] = possible
     ? present(done, {
@@ -242,6 +246,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
           <CyclePanel drive={drive} open={open} />
           {possible && (
             <>
+              <ShapingPanel {...measure} />
               <FrictionPanel {...measure} />
               <BrakePanel {...measure} />
               <HealthPanel {...measure} />
