@@ -98,11 +98,7 @@ def fit_mode(ring: RingDown, low_hz: float, high_hz: float) -> ModeFit | None:
         base = _base(time, float(np.exp(place[0])), float(np.exp(place[1])))[seen]
         return np.asarray((scaled - base @ _solved(base, scaled)).ravel())
 
-    steps = max(8, math.ceil(math.log(high_hz / low_hz) / threshold.GRID_STEP))
-    trials = [
-        np.log([f, z]) for f in np.geomspace(low_hz, high_hz, steps) for z in threshold.DAMPINGS
-    ]
-    begin = min(trials, key=lambda place: float(np.sum(left(place) ** 2)))
+    begin = np.log(_nearest(time[seen], trend[seen], scaled, low_hz, high_hz))
     ends = (
         np.log([low_hz, threshold.DAMPING_ENDS[0]]),
         np.log([high_hz, threshold.DAMPING_ENDS[1]]),
@@ -142,6 +138,34 @@ def _is_mode(fit: ModeFit, low_hz: float, high_hz: float) -> bool:
     clear = float(fit.amplitude[0]) > threshold.CLEAR * float(fit.noise[0])
     rings = fit.damping < threshold.RINGS
     return inside and clear and rings and float(fit.explained[0]) > threshold.EXPLAINED
+
+
+def _nearest(
+    time: FloatArray, trend: FloatArray, signals: FloatArray, low_hz: float, high_hz: float
+) -> tuple[float, float]:
+    """Of frequencies and damping ratios on a grid, those that explain most of the signals [n, k].
+
+    The parabola is projected out of signals and sinusoids alike, so that two unknowns are left,
+    whose normal equations are solved for all of the grid at once.
+    """
+    steps = max(8, math.ceil(math.log(high_hz / low_hz) / threshold.GRID_STEP))
+    frequencies, dampings = (
+        each.ravel()
+        for each in np.meshgrid(np.geomspace(low_hz, high_hz, steps), threshold.DAMPINGS)
+    )
+    flat = np.linalg.qr(trend)[0]
+    fall = np.exp(-np.outer(_TURN * frequencies * dampings, time))
+    angle = np.outer(_TURN * frequencies * np.sqrt(1.0 - dampings**2), time)
+    real, imaginary = fall * np.cos(angle), fall * np.sin(angle)
+    real -= (real @ flat) @ flat.T
+    imaginary -= (imaginary @ flat) @ flat.T
+    one, two = real @ signals, imaginary @ signals
+    rr, ii = np.sum(real**2, axis=1), np.sum(imaginary**2, axis=1)
+    ri = np.sum(real * imaginary, axis=1)
+    power = ii * np.sum(one**2, axis=1) - 2 * ri * np.sum(one * two, axis=1)
+    power += rr * np.sum(two**2, axis=1)
+    best = int(np.argmax(power / np.maximum(rr * ii - ri**2, 1e-12 * rr * ii)))
+    return float(frequencies[best]), float(dampings[best])
 
 
 def mode_of(fits: list[ModeFit]) -> Mode:
@@ -209,7 +233,7 @@ def _thinned(ring: RingDown, high_hz: float) -> RingDown:
         return ring
     whole = ring.signals[: count * step].reshape(count, step, -1)
     valid = ring.valid[: count * step].reshape(count, step)
-    return RingDown(whole.mean(axis=1), valid.all(axis=1), ring.sample_rate_hz / step)
+    return RingDown(whole.mean(axis=1), np.asarray(valid.all(axis=1)), ring.sample_rate_hz / step)
 
 
 def _trend(time: FloatArray) -> FloatArray:

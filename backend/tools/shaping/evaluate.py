@@ -11,6 +11,7 @@ import numpy.typing as npt
 from scipy.stats import t as student
 
 from backend.analysis.signals import shaper as shapers
+from backend.analysis.signals.arrays import FloatArray
 from backend.analysis.signals.ring_down import (
     CommonMode,
     Mode,
@@ -39,7 +40,7 @@ from backend.tools.shaping.settings import ShapingSettings
 from backend.tools.thresholds import shaping_evaluate as threshold
 from backend.tools.tool import Arrays, Interval, Meta
 
-FloatArray = npt.NDArray[np.float64]
+_Traces = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
 _TURN = 2 * np.pi
 _POINTS = 300
 SIGNALS: tuple[Signal, ...] = ("position_error", "speed", "torque")
@@ -85,23 +86,25 @@ def reevaluate(arrays: Arrays, meta: Meta) -> ShapingResult:
         raise ValueError("not the raw data of command shaping")
     rate = float(str(meta["sample_rate_hz"]))
 
+    def pair(name: str, number: int) -> Recording:
+        def column(key: str) -> FloatArray:
+            return np.asarray(arrays[f"{name}_{key}"][number], np.float64)
+
+        return Recording(
+            rate, column("position_rad"), column("velocity_rad_s"), column("torque_nm"),
+            column("sent"), column("offset"), np.asarray(arrays[f"{name}_valid"][number], np.bool_),
+        )  # fmt: skip
+
     def pairs(name: str) -> tuple[Recording, ...]:
-        columns = ("position_rad", "velocity_rad_s", "torque_nm", "sent", "offset")
         count = len(arrays[f"{name}_valid"]) if f"{name}_valid" in arrays else 0
-        return tuple(
-            Recording(
-                rate,
-                *(np.asarray(arrays[f"{name}_{each}"][i], np.float64) for each in columns),
-                np.asarray(arrays[f"{name}_valid"][i], np.bool_),
-            )
-            for i in range(count)
-        )
+        return tuple(pair(name, number) for number in range(count))
 
     kind = next((each for each in shapers.KINDS if each == meta.get("kind")), None)
     own_filter = DriveFilter.model_validate(own)
     rated = float(str(meta["rated_torque_nm"]))
     moves = Moves(rate, rated, pairs("free"), pairs("shaped"), kind, own_filter)
-    return evaluate(moves, ShapingSettings.model_validate(given))
+    asked = ShapingSettings.model_validate(given)
+    return evaluate(moves, asked, see(moves, asked))
 
 
 @dataclass(frozen=True)
@@ -113,8 +116,9 @@ class Seen:
     mode: Mode
 
 
-def see(moves: Moves, settings: ShapingSettings, demand: FloatArray) -> Seen | None:
+def see(moves: Moves, settings: ShapingSettings) -> Seen | None:
     """The mode of the ring-downs of the unshaped moves; None where they show none."""
+    demand = demand_of(settings, moves.rate)
     ways = _ways(moves, moves.free, settings, demand, 0)
     low, high = settings.lowest_hz, settings.highest_hz
     if settings.frequency_hz is not None:
@@ -210,14 +214,14 @@ def _ways(
     return found
 
 
-def evaluate(moves: Moves, settings: ShapingSettings) -> ShapingResult:
-    """Mode, shapers, comparison and what follows of them."""
+def evaluate(moves: Moves, settings: ShapingSettings, seen: Seen | None) -> ShapingResult:
+    """Shapers for the mode that was seen, comparison and what follows of them."""
     demand = demand_of(settings, moves.rate)
-    seen = see(moves, settings, demand)
     made, band = designs(seen, settings)
     chosen = None if band is None else choose(made, band, settings)
     free = _ways(moves, moves.free, settings, demand, 0)
-    comparison, traces = None, ((), (), ())
+    comparison: ShapingComparison | None = None
+    traces: _Traces = ((), (), ())
     lost = 2 * len(moves.free) - len(free)
     if seen is not None and chosen is not None and moves.kind == chosen.kind:
         extra = extra_samples(chosen, moves.rate)
@@ -258,9 +262,6 @@ def _described(shaper: Shaper, band: Band, left: float) -> DesignedShaper:
             shaper, centre, damping, left * (1.0 + threshold.ROUNDING)
         ),
     )  # fmt: skip
-
-
-_Traces = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
 
 
 def _compared(

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.signals.shaper import Shaper, shaped
+from backend.analysis.signals.shaper import shaped
 from backend.drive.drive import Drive
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts
 from backend.tools.measuring.recording import (
@@ -74,8 +74,11 @@ async def run(run: Run, settings: ShapingSettings) -> ShapingResult:
         filter=_filter_of(drive),
     )  # fmt: skip
     run.progress(0.45, text("shaping.evaluating"))
-    chosen = await asyncio.to_thread(_chosen, moves, settings, demand)
-    if chosen is not None and settings.verify:
+    seen = await asyncio.to_thread(see, moves, settings)
+    made, band = designs(seen, settings)
+    # What the motor does not show cannot be compared: nothing moves for it.
+    if seen is not None and band is not None and settings.verify:
+        chosen = choose(made, band, settings)
         try:
             values = shaped(demand, chosen, rate)
             pairs = await _played(
@@ -89,14 +92,7 @@ async def run(run: Run, settings: ShapingSettings) -> ShapingResult:
     _keep(run, moves, settings)
     run.progress(0.94, text("shaping.evaluating"))
     await go_back(axis, session, home, settings.envelope, facts)
-    return await asyncio.to_thread(evaluate, moves, settings)
-
-
-def _chosen(moves: Moves, settings: ShapingSettings, demand: FloatArray) -> Shaper | None:
-    """The shaper that is played; None where the motor shows no mode to compare."""
-    seen = see(moves, settings, demand)
-    made, band = designs(seen, settings)
-    return None if seen is None or band is None else choose(made, band, settings)
+    return await asyncio.to_thread(evaluate, moves, settings, seen)
 
 
 def _keep(run: Run, moves: Moves, settings: ShapingSettings) -> None:

@@ -252,7 +252,7 @@ def _cells(shaper: DesignedShaper, result: ShapingResult) -> tuple[Cell, ...]:
         Note(name, values={"shaper": shaper.kind.upper()}),
         " / ".join(f"{100.0 * each.share:.2f}" for each in shaper.impulses),
         " / ".join(f"{1e3 * each.time_s:.1f}" for each in shaper.impulses),
-        f"{least:.2g}–{most:.2g}",
+        f"{least:.1f}–{most:.1f}",
         f"{low:.3g}–{high:.3g}",
     )
 

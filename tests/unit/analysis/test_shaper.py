@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 import pytest
-from scipy.signal import StateSpace, lsim
+from scipy.signal import lsim
 
+from backend.analysis.signals.arrays import FloatArray
 from backend.analysis.signals.shaper import (
     KINDS,
     Band,
@@ -20,8 +20,6 @@ from backend.analysis.signals.shaper import (
     tolerated,
 )
 
-FloatArray = npt.NDArray[np.float64]
-
 
 def after(setpoints: FloatArray, rate: float, frequency_hz: float, damping: float) -> FloatArray:
     """Amplitude [n] at which a load on a spring oscillates about its setpoint.
@@ -30,10 +28,11 @@ def after(setpoints: FloatArray, rate: float, frequency_hz: float, damping: floa
     """
     omega = 2 * math.pi * frequency_hz
     # Of the deviation e = x - u: e'' + 2 zeta omega e' + omega^2 e = -u''.
-    system = StateSpace(
-        [[0.0, 1.0], [-(omega**2), -2 * damping * omega]], [[0.0], [-1.0]], [[1.0, 0.0]], [[0.0]]
-    )
-    pull = np.gradient(np.gradient(setpoints, 1 / rate), 1 / rate)
+    system = (
+        np.array([[0.0, 1.0], [-(omega**2), -2 * damping * omega]]), np.array([[0.0], [-1.0]]),
+        np.array([[1.0, 0.0]]), np.array([[0.0]]),
+    )  # fmt: skip
+    pull = np.asarray(np.gradient(np.gradient(setpoints, 1 / rate), 1 / rate), np.float64)
     _, _, states = lsim(system, pull, np.arange(setpoints.size) / rate)
     about, speed = states.T
     turned = (speed + damping * omega * about) / (omega * math.sqrt(1 - damping**2))

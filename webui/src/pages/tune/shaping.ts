@@ -100,7 +100,7 @@ interface ShownTable {
 
 /** The shapers with their impulses, and what the drive's own filter would take. */
 export function shapingTables(result: ShapingResult, text: Text): ShownTable[] {
-  const { shapers, drive_values: values = [] } = result
+  const { shapers, drive_values: values } = result
   const list = (numbers: number[], decimals: number) =>
     numbers.map((each) => each.toFixed(decimals)).join(' / ')
   const found: ShownTable[] = []
@@ -120,7 +120,7 @@ export function shapingTables(result: ShapingResult, text: Text): ShownTable[] {
           each.impulses.map((one) => 1000 * one.time_s),
           1,
         ),
-        each.residual_percent.map((one) => String(Number(one.toPrecision(2)))).join('–'),
+        each.residual_percent.map((one) => one.toFixed(1)).join('–'),
         each.tolerated_hz.map((one) => engineering(one)).join('–'),
       ]),
     })
