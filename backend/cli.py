@@ -111,6 +111,11 @@ COMMANDS = {
         "Watch what the axis does when you trigger a safety function by hand: torque, stop and "
         "speed. It records and does not certify. The axis moves.",
     ),
+    "shaping": (
+        "tools:shaping",
+        "Frequency and damping of the slow vibration after a move, input shapers for it, and the "
+        "same move with one of them. The axis moves.",
+    ),
     "cycle": (
         "tools:cycle",
         "Torque, speed, heat and braking energy of the machine's own cycle, from reading the drive "

@@ -339,6 +339,21 @@ class GainSpec(Frozen):
     notes: str = ""
 
 
+class SlowVibrationSpec(Frozen):
+    """The drive's own filter of the position command against one slow vibration.
+
+    ``frequency`` takes the frequency of the vibration, ``period`` its period: the time of a moving
+    average. ``also`` are raw values that belong to it. ``unstated`` are parameters of the filter
+    whose unit or meaning the manual does not print, so that no value can be named for them.
+    """
+
+    frequency: str | None = None
+    period: str | None = None
+    also: dict[str, int] = Field(default_factory=dict)
+    unstated: tuple[str, ...] = ()
+    source: str
+
+
 class Signal(Frozen):
     """A quantity that the scope, the axis and the tools know by role, and where it lives."""
 
@@ -584,6 +599,7 @@ class Profile(Frozen):
     notch: NotchSpec | None = None
     stiffness: tuple[StiffnessTable, ...] = ()
     gains: GainSpec | None = None
+    slow_vibration: SlowVibrationSpec | None = None
     quirks: tuple[Quirk, ...] = ()
     notes: tuple[Note, ...] = ()
     functions: Functions = Functions()

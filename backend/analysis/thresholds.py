@@ -1147,3 +1147,48 @@ class transient_removal:
     """[ratio] Origin: 06d2dd3d with benchmarks/analysis_speed."""
     STEADY = 0.97
     """[ratio] Origin: 06d2dd3d with benchmarks/analysis_speed."""
+
+
+class ring_down:
+    """`signals/ring_down.py`."""
+
+    FEWEST_PERIODS = 3
+    """[count] The sinusoid goes through so many periods within what was recorded, so that the
+    parabola cannot stand for it. Origin: docs/slow-vibration.md."""
+    FEWEST_SAMPLES = 40
+    """[count] Fewer samples show no mode. Origin: docs/slow-vibration.md."""
+    GRID_STEP = 0.03
+    """[ratio] Frequencies are tried first in these steps; the search refines the best of them.
+    Origin: docs/slow-vibration.md."""
+    DAMPINGS = (0.003, 0.02, 0.08, 0.2)
+    """[ratio] Damping ratios that are tried first. Origin: docs/slow-vibration.md."""
+    DAMPING_ENDS = (0.0005, 0.4)
+    """[ratio] Damping ratios between which a mode is looked for: a faster decay is no vibration.
+    Origin: docs/slow-vibration.md."""
+    OVERSAMPLING = 8
+    """[ratio] Samples per period of the highest frequency that are kept for the fit. Origin:
+    docs/slow-vibration.md."""
+    CORRELATED_MOST = 0.98
+    """[ratio] Correlation of neighbouring residuals beyond which samples do not count for less.
+    Origin: docs/slow-vibration.md."""
+    SMOOTHED = 0.1
+    """[ratio] Mean over this share of a period, against the noise of one sample. Origin:
+    docs/slow-vibration.md."""
+    EDGE = 0.02
+    """[ratio] A frequency this near to the end of what was looked at is none that was found.
+    Origin: docs/slow-vibration.md."""
+    CLEAR = 3.0
+    """[ratio] The vibration begins at so many times what else is in the signal. Origin:
+    docs/slow-vibration.md."""
+    RINGS = 0.25
+    """[ratio] A mode with more damping than this is gone within a period and is no vibration: it
+    falls by 80 % in one. Origin: docs/slow-vibration.md."""
+    EXPLAINED = 0.5
+    """[ratio] A ring-down is this share the mode at least, by power. Origin:
+    docs/slow-vibration.md."""
+    AGREEING = 0.75
+    """[ratio] So many of the moves show the mode, or it is not seen. Origin:
+    docs/slow-vibration.md."""
+    SCATTER = 0.15
+    """[ratio] Deviation of the frequencies between moves beyond which they are not one mode.
+    Origin: docs/slow-vibration.md."""

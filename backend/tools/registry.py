@@ -11,6 +11,7 @@ from backend.tools.health.run import TOOL as HEALTH
 from backend.tools.inertia.run import TOOL as INERTIA
 from backend.tools.load_side.run import TOOL as LOAD_SIDE
 from backend.tools.safety_check.run import TOOL as SAFETY_CHECK
+from backend.tools.shaping.run import TOOL as SHAPING
 from backend.tools.step.run import TOOL as STEP
 from backend.tools.sweep.run import TOOL as SWEEP
 from backend.tools.tool import AnyTool
@@ -25,6 +26,7 @@ TOOLS: tuple[AnyTool, ...] = (
     BRAKE_TEST,
     HEALTH,
     SAFETY_CHECK,
+    SHAPING,
     CYCLE,
     AUTOTUNE,
 )

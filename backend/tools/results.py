@@ -18,6 +18,7 @@ from backend.tools.health.result import HealthResult
 from backend.tools.inertia.result import InertiaAnswer
 from backend.tools.load_side.result import LoadSideResult
 from backend.tools.safety_check.result import SafetyResult
+from backend.tools.shaping.result import ShapingResult
 from backend.tools.step.result import StepAnswer
 from backend.tools.sweep.result import SweepAnswer
 
@@ -30,6 +31,7 @@ ToolOutcome: TypeAlias = Annotated[
     | HealthResult
     | FirstPowerResult
     | SafetyResult
+    | ShapingResult
     | CycleResult
     | SweepAnswer
     | AutotuneAnswer,

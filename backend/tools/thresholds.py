@@ -955,6 +955,46 @@ class notch_trials:
     """[s] Origin: 76c87fed with docs/tuning-accuracy.md."""
 
 
+class shaping_evaluate:
+    """`shaping/evaluate.py`."""
+
+    LEAD_S = 0.1
+    """[s] Standstill before the first move of a pair. Origin: docs/slow-vibration.md."""
+    SKIP_S = 0.1
+    """[s] After the end of the setpoints an axis still catches up with them; so long it is not
+    judged. Origin: docs/slow-vibration.md."""
+    NEAR = 0.3
+    """[ratio] A mode whose frequency is stated is looked for this far on both sides. Origin:
+    docs/slow-vibration.md."""
+    ROUNDING = 0.02
+    """[ratio] An EI shaper leaves its whole tolerance at its centre; so much more is none. Origin:
+    docs/slow-vibration.md."""
+    SEEN = 0.9
+    """[ratio] Share of the samples of a ring-down that must have come. Origin:
+    docs/slow-vibration.md."""
+    SETTLED = 0.1
+    """[ratio] Settled is when so much of the unshaped vibration is left. Origin:
+    docs/slow-vibration.md."""
+    NOISES = 4.0
+    """[ratio] A settling window is so many times the noise at least. Origin:
+    docs/slow-vibration.md."""
+    HALVED = 0.5
+    """[ratio] A shaper is verified where residual or settling time is at most this share. Origin:
+    issue 24."""
+    PERIODS = 3.0
+    """[count] Periods that a ring-down holds at least. Origin: docs/slow-vibration.md."""
+
+
+class shaping_run:
+    """`shaping/run.py`."""
+
+    BETWEEN_S = 0.2
+    """[s] Standstill between two pairs of moves. Origin: docs/slow-vibration.md."""
+    LONGEST_PERIODS = 1.1
+    """[count] The longest shaper takes one period of the mode, more where it is damped. Origin:
+    docs/slow-vibration.md."""
+
+
 class step_evaluate:
     """`step/evaluate.py`."""
 

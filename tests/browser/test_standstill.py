@@ -112,7 +112,9 @@ def test_stop_says_of_each_axis_what_was_measured(phone: Page, pulled: Bench) ->
     report = page.locator(".stop-report")
     # Y stands. X turns, and nothing here can brake it: the speed, and what to do, are said.
     expect(report).to_contain_text("Stopped: Y")
-    expect(report).to_contain_text(re.compile(r"X (is still moving at|has no power and coasts,) \d+"))
+    expect(report).to_contain_text(
+        re.compile(r"X (is still moving at|has no power and coasts,) \d+")
+    )
     expect(report).to_contain_text(re.compile("emergency stop|Keep clear"))
     assert page.evaluate(SIDEWAYS) == 0
     assert page.evaluate(TOO_SMALL) == []

@@ -81,7 +81,7 @@ async def try_setting(
 async def keep_setting(
     bench: TheBench, request: TrialRequest, connection: Connection = None
 ) -> DoctorTrial:
-    """Use a setting that has just reached Operational, until the drive is connected anew.
+    """Use a setting that has just reached Operational, until the drive is connected again.
 
     It is stored nowhere: to keep it longer, write it into the profile.
     """

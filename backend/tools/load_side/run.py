@@ -159,7 +159,7 @@ async def run(run: Run, settings: LoadSideSettings) -> LoadSideResult:
 
     Raises:
         NotAllowed: the drive has no second position, it does not come with every cycle or does not
-            follow the motor, or the envelope or a fault ended a motion; says why.
+            follow the motor, or the envelope or a fault ended a motion; states why.
         OutOfRange: the limits leave nothing to measure; nothing has moved but a short first move.
     """
     axis, session, envelope = run.axis, run.session, settings.envelope
@@ -210,7 +210,9 @@ def _sides(recordings: Sequence[Recording], parts: Sequence[IntArray]) -> Sides:
     """Both recordings, one behind the other; the load's counter goes on between them."""
     counts = [recording.also for recording in recordings]
     assert all(each is not None for each in counts), "asked for with the move"
-    load = unwrapped(np.concatenate([each[:, 0] for each in counts if each is not None]))
+    load = np.asarray(
+        unwrapped(np.concatenate([each[:, 0] for each in counts if each is not None])), np.float64
+    )
     sizes = [recording.position_rad.size for recording in recordings]
     part = np.concatenate([p[:n] for p, n in zip(parts, sizes, strict=True)])
     return Sides(

@@ -30,6 +30,7 @@ TITLES = {
     "brake-test": ("Brake test", "抱闸测试"),
     "health": ("Health check", "健康检查"),
     "safety-check": ("Safety acceptance record", "安全验收记录"),
+    "shaping": ("Command shaping", "指令整形"),
     "cycle": ("Load of the machine's cycle", "机器循环负载"),
 }
 

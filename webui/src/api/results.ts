@@ -8,6 +8,7 @@ import type {
   JobInfo,
   LoadSideResult,
   SafetyResult,
+  ShapingResult,
   StepAnswer,
 } from './schema'
 
@@ -21,6 +22,7 @@ type ToolOutcome =
   | InertiaAnswer
   | LoadSideResult
   | SafetyResult
+  | ShapingResult
   | StepAnswer
 
 /** The result of a tool, or null where it is something else. */
@@ -60,6 +62,12 @@ export function asSafetyCheck(result: unknown): SafetyResult | null {
 export function asFirstPower(result: unknown): FirstPowerResult | null {
   const found = outcome(result)
   return found?.tool === 'first-power' ? found : null
+}
+
+/** Slow vibration and its shapers, or null where it is something else. */
+export function asShaping(result: unknown): ShapingResult | null {
+  const found = outcome(result)
+  return found?.tool === 'shaping' ? found : null
 }
 
 /** The load of a cycle, or null where it is something else. */

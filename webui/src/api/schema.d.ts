@@ -1370,6 +1370,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/jobs/shaping": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Shaping
+         * @description Frequency and damping of the slow vibration after a move, input shapers for it, and the same move with one of them. The axis moves.
+         */
+        post: operations["start_shaping"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/jobs/small_move": {
         parameters: {
             query?: never;
@@ -5042,6 +5062,40 @@ export interface components {
             revision: number | null;
         };
         /**
+         * DesignedShaper
+         * @description A shaper and its prediction: what is left, of the unshaped vibration at the same time.
+         */
+        DesignedShaper: {
+            /**
+             * Delay S
+             * @description by so much a shaped move ends later
+             */
+            delay_s: number;
+            /** Impulses */
+            impulses: components["schemas"]["ShaperImpulse"][];
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "zv" | "zvd" | "ei";
+            /**
+             * Residual Percent
+             * @description least and most that is left over the range of the mode
+             */
+            residual_percent: [
+                number,
+                number
+            ];
+            /**
+             * Tolerated Hz
+             * @description frequencies between which at most the tolerance is left
+             */
+            tolerated_hz: [
+                number,
+                number
+            ];
+        };
+        /**
          * DetectedInfo
          * @description Median motion on lines that were left empty, as a share of that on the lines around.
          */
@@ -7686,7 +7740,7 @@ export interface components {
              * Result
              * @description of a tool: its result, which its field tool names
              */
-            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["LoadSideResult"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | components["schemas"]["PlainResult"] | null;
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["LoadSideResult"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["ShapingResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | components["schemas"]["PlainResult"] | null;
             /**
              * Started
              * Format: date-time
@@ -8421,7 +8475,7 @@ export interface components {
              * Result
              * @description of a tool: its result, which its field tool names
              */
-            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["LoadSideResult"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | {
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["LoadSideResult"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["ShapingResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | {
                 [key: string]: unknown;
             };
             /** Settings */
@@ -11216,6 +11270,344 @@ export interface components {
             password: string;
         };
         /**
+         * ShaperImpulse
+         * @description One impulse of a shaper.
+         */
+        ShaperImpulse: {
+            /** Share */
+            share: number;
+            /** Time S */
+            time_s: number;
+        };
+        /**
+         * ShapingComparison
+         * @description The same move without and with the shaper.
+         *
+         *     Settling counts from the end of the unshaped setpoints in both, so that it contains the delay
+         *     of the shaper; null: not settled at the end of the recording.
+         */
+        ShapingComparison: {
+            /** Moves */
+            moves: number;
+            /** Ratio */
+            ratio: number;
+            /** Residuals */
+            residuals: components["schemas"]["ShapingResidual"][];
+            /**
+             * Settling Ratio
+             * @description at most this, where the unshaped move did not settle
+             */
+            settling_ratio: number | null;
+            /** Settling Shaped S */
+            settling_shaped_s: number | null;
+            /**
+             * Settling Unit
+             * @enum {string}
+             */
+            settling_unit: "rev" | "rpm" | "%";
+            /** Settling Unshaped S */
+            settling_unshaped_s: number | null;
+            /** Settling Window */
+            settling_window: number;
+            /** Shaped */
+            shaped: number;
+            /** Shaped Ci95 */
+            shaped_ci95: [
+                number | null,
+                number | null
+            ];
+            /**
+             * Unit
+             * @enum {string}
+             */
+            unit: "rev" | "rpm" | "%";
+            /** Unshaped */
+            unshaped: number;
+            /** Unshaped Ci95 */
+            unshaped_ci95: [
+                number | null,
+                number | null
+            ];
+            /**
+             * Watched S
+             * @description from the end of the unshaped setpoints on
+             */
+            watched_s: number;
+        };
+        /**
+         * ShapingDriveValue
+         * @description A parameter of the drive's own filter, and the value that it would take.
+         */
+        ShapingDriveValue: {
+            /** Name */
+            name: string;
+            /** Parameter */
+            parameter: string;
+            /** Raw */
+            raw: number;
+            /** Unit */
+            unit: string;
+            /** Value */
+            value: number;
+        };
+        /**
+         * ShapingFinding
+         * @description What limits the answer, or where the shaper belongs.
+         */
+        ShapingFinding: {
+            /**
+             * Code
+             * @enum {string}
+             */
+            code: "motor_side" | "not_excited" | "long_periods" | "wide_mode" | "beyond_prediction" | "not_settled" | "samples_lost" | "drive_filter" | "drive_filter_range" | "drive_unstated" | "in_controller";
+            /**
+             * Parameter
+             * @default
+             */
+            parameter: string;
+            /**
+             * Unit
+             * @default
+             */
+            unit: string;
+            /** Value */
+            value?: number | null;
+        };
+        /**
+         * ShapingMode
+         * @description The mode; ``range_hz`` and ``range_damping`` contain the interval and every ring-down.
+         */
+        ShapingMode: {
+            /** Damping */
+            damping: number;
+            /** Damping Ci95 */
+            damping_ci95: [
+                number | null,
+                number | null
+            ];
+            /**
+             * Explained
+             * @description share of the signal that this one mode is, 0 to 1
+             */
+            explained: number;
+            /** Frequency Ci95 Hz */
+            frequency_ci95_hz: [
+                number | null,
+                number | null
+            ];
+            /** Frequency Hz */
+            frequency_hz: number;
+            /** Range Damping */
+            range_damping: [
+                number,
+                number
+            ];
+            /** Range Hz */
+            range_hz: [
+                number,
+                number
+            ];
+            /** Ring Downs */
+            ring_downs: number;
+        };
+        /**
+         * ShapingResidual
+         * @description Half of peak to peak in the period after the shaped move, of one signal.
+         */
+        ShapingResidual: {
+            /** Shaped */
+            shaped: number;
+            /**
+             * Signal
+             * @enum {string}
+             */
+            signal: "position_error" | "speed" | "torque";
+            /**
+             * Unit
+             * @enum {string}
+             */
+            unit: "rev" | "rpm" | "%";
+            /** Unshaped */
+            unshaped: number;
+        };
+        /**
+         * ShapingResult
+         * @description ``signal`` is the one that shows the mode best; traces are of it, about what creeps.
+         */
+        ShapingResult: {
+            /** Chosen */
+            chosen: ("zv" | "zvd" | "ei") | null;
+            comparison: components["schemas"]["ShapingComparison"] | null;
+            /**
+             * Drive Values
+             * @default []
+             */
+            drive_values: components["schemas"]["ShapingDriveValue"][];
+            /**
+             * Findings
+             * @default []
+             */
+            findings: components["schemas"]["ShapingFinding"][];
+            /**
+             * Measurements
+             * @description names of the stored raw data
+             * @default []
+             */
+            measurements: string[];
+            mode: components["schemas"]["ShapingMode"] | null;
+            /** Shapers */
+            shapers: components["schemas"]["DesignedShaper"][];
+            /** Signal */
+            signal: ("position_error" | "speed" | "torque") | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            tool: "shaping";
+            /**
+             * Trace S
+             * @description from the end of the unshaped move
+             * @default []
+             */
+            trace_s: number[];
+            /**
+             * Trace Shaped
+             * @default []
+             */
+            trace_shaped: number[];
+            /**
+             * Trace Unshaped
+             * @default []
+             */
+            trace_unshaped: number[];
+            /** Unit */
+            unit: ("rev" | "rpm" | "%") | null;
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            verdict: "verified" | "improved" | "no_better" | "designed" | "stated" | "not_seen";
+        };
+        /**
+         * ShapingSettings
+         * @description A move out and back, repeated, without a shaper and then with one.
+         */
+        ShapingSettings: {
+            /**
+             * Acceleration
+             * @description acceleration of the move, in rpm/s
+             * @default 6000
+             */
+            acceleration: number;
+            /**
+             * Consent
+             * @description the user agreed that nothing in the drive ends a speed when this computer falls silent; needed where the drive has no watchdog (DS_C)
+             * @default false
+             */
+            consent: boolean;
+            /**
+             * Cycle Ms
+             * @description cycle of the exchange that is started where none runs, and ended afterwards
+             * @default 1
+             */
+            cycle_ms: number;
+            /**
+             * Damping
+             * @description damping ratio of that mode; only where the motor does not show it
+             */
+            damping?: number | null;
+            /**
+             * Frequency Hz
+             * @description frequency of the mode in Hz where it is known, such as the anti-resonance of a response; looked for within 30 %
+             */
+            frequency_hz?: number | null;
+            /**
+             * Highest Hz
+             * @description highest frequency that is looked for, in Hz
+             * @default 30
+             */
+            highest_hz: number;
+            /**
+             * Hold S
+             * @description time at each end, in which the vibration decays, in s
+             * @default 2
+             */
+            hold_s: number;
+            /**
+             * Lowest Hz
+             * @description lowest frequency that is looked for, in Hz
+             * @default 2
+             */
+            lowest_hz: number;
+            /**
+             * Rated Torque Nm
+             * @description overrides what the drive says
+             */
+            rated_torque_nm?: number | null;
+            /**
+             * Repetitions
+             * @description moves out and back of each kind
+             * @default 2
+             */
+            repetitions: number;
+            /**
+             * Shaper
+             * @description the shaper that is played; auto: the shortest that suffices
+             * @default auto
+             */
+            shaper: "auto" | ("zv" | "zvd" | "ei");
+            /**
+             * Size
+             * @description way of the move, in revolutions
+             * @default 1
+             */
+            size: number;
+            /**
+             * Speed
+             * @description speed of the move, in rpm
+             * @default 600
+             */
+            speed: number;
+            /**
+             * Speed Limit
+             * @description highest speed, in rpm
+             */
+            speed_limit: number;
+            /**
+             * Time Limit S
+             * @description longest time of a motion, in s
+             * @default 60
+             */
+            time_limit_s: number;
+            /**
+             * Tolerance Percent
+             * @description vibration that may be left, in % of the unshaped
+             * @default 5
+             */
+            tolerance_percent: number;
+            /**
+             * Torque Limit
+             * @description highest torque, in % of rated
+             */
+            torque_limit: number;
+            /**
+             * Travel Limit
+             * @description longest way from the start, in revolutions
+             */
+            travel_limit: number;
+            /**
+             * Verify
+             * @description play the shaped move, too, and compare
+             * @default true
+             */
+            verify: boolean;
+            /**
+             * Window Rev
+             * @description settling window of the position in revolutions; without it settling is when a tenth of the vibration is left
+             */
+            window_rev?: number | null;
+        };
+        /**
          * Signature
          * @description Who signed the record, when. ``intact``: the signed contents have the same checksum now.
          */
@@ -12553,6 +12945,7 @@ export type CycleSettings = components['schemas']['CycleSettings'];
 export type CyclicInfo = components['schemas']['CyclicInfo'];
 export type CyclicRequest = components['schemas']['CyclicRequest'];
 export type DescribedDevice = components['schemas']['DescribedDevice'];
+export type DesignedShaper = components['schemas']['DesignedShaper'];
 export type DetectedInfo = components['schemas']['DetectedInfo'];
 export type Diff = components['schemas']['Diff'];
 export type DiffRow = components['schemas']['DiffRow'];
@@ -12792,6 +13185,14 @@ export type SerialPort = components['schemas']['SerialPort'];
 export type Session = components['schemas']['Session'];
 export type SessionInfo = components['schemas']['SessionInfo'];
 export type SetUp = components['schemas']['SetUp'];
+export type ShaperImpulse = components['schemas']['ShaperImpulse'];
+export type ShapingComparison = components['schemas']['ShapingComparison'];
+export type ShapingDriveValue = components['schemas']['ShapingDriveValue'];
+export type ShapingFinding = components['schemas']['ShapingFinding'];
+export type ShapingMode = components['schemas']['ShapingMode'];
+export type ShapingResidual = components['schemas']['ShapingResidual'];
+export type ShapingResult = components['schemas']['ShapingResult'];
+export type ShapingSettings = components['schemas']['ShapingSettings'];
 export type Signature = components['schemas']['Signature'];
 export type SignatureRequest = components['schemas']['SignatureRequest'];
 export type SmallMoveRequest = components['schemas']['SmallMoveRequest'];
@@ -24015,6 +24416,149 @@ export interface operations {
         requestBody: {
             content: {
                 "application/json": components["schemas"]["SequenceRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_shaping: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ShapingSettings"];
             };
         };
         responses: {

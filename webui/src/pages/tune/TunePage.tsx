@@ -28,6 +28,7 @@ import { type Known, later, nextStep, type StepName, STEPS, stepsDone, tunedAt }
 import { PathNav } from './PathNav'
 import { PreChecks } from './PreChecks'
 import { SafetyPanel } from './SafetyPanel'
+import { ShapingPanel } from './ShapingPanel'
 import { ReportPanel, useReports } from './ReportPanel'
 import { present, type Section, useSections } from './sections'
 import { StepPanel } from './StepPanel'
@@ -63,6 +64,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
   const firstJob = useToolJob(drive, 'first-power').job
   const healthJob = useToolJob(drive, 'health').job
   const safetyJob = useToolJob(drive, 'safety-check').job
+  const shapingJob = useToolJob(drive, 'shaping').job
   const cycleJob = useToolJob(drive, 'cycle').job
   useJobEnd(inertiaJob?.id ?? null, () => void measured.refresh())
   useJobEnd(frictionJob?.id ?? null, () => void measured.refresh())
@@ -70,6 +72,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
   useJobEnd(brakeJob?.id ?? null, () => void measured.refresh())
   useJobEnd(firstJob?.id ?? null, () => void measured.refresh())
   useJobEnd(cycleJob?.id ?? null, () => void measured.refresh())
+  useJobEnd(shapingJob?.id ?? null, () => void measured.refresh())
   useJobEnd(stepJob?.id ?? null, () => void measured.refresh())
   useJobEnd(tuneJob?.id ?? null, () => {
     void measured.refresh()
@@ -123,6 +126,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
     [healthJob, 'more'],
     [safetyJob, 'more'],
     [cycleJob, 'more'],
+    [shapingJob, 'more'],
   ]
   const now: Section[] = possible
     ? present(done, {
@@ -246,6 +250,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
           <CyclePanel drive={drive} open={open} />
           {possible && (
             <>
+              <ShapingPanel {...measure} />
               <FrictionPanel {...measure} />
               <LoadSidePanel {...measure} />
               <BrakePanel {...measure} />

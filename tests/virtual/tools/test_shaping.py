@@ -1,0 +1,231 @@
+"""Command shaping on virtual axes whose mechanics the analysis does not assume.
+
+The analysis knows one linear mode of the closed loop. The axes have friction at the motor,
+backlash, a second mode and encoder noise, and each drive closes its loops by its own law. What the
+load does is read from the virtual mechanics, which the tool does not see.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from backend.axis.axis import Axis
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
+from backend.tools.shaping.result import ShapingResult
+from backend.tools.shaping.run import TOOL
+from backend.tools.shaping.settings import ShapingSettings
+from backend.tools.sweep import profile_speed
+from backend.tools.tool import Run
+from drivers.cia402 import State
+from drivers.errors import NotAllowed, OutOfRange
+from drivers.virtual.firmware.factory import make_device
+from drivers.virtual.mechanics import MechanicsSpec
+from profiles.loader import load_profile
+from tests.virtual.tools.direct import STATION, DirectBench, DirectLink, direct
+from tests.virtual.tools.rig import At, settings_of, silent
+
+FloatArray = npt.NDArray[np.float64]
+
+ASKED = ShapingSettings(
+    travel_limit=2.0, speed_limit=900.0, torque_limit=200.0, time_limit_s=60.0, size=1.0,
+    speed=600.0, acceleration=6000.0, hold_s=1.5,
+)  # fmt: skip
+
+
+def arm(
+    frequency_hz: float, *, damping: float = 0.01, load: float = 1e-4, coulomb: float = 0.01,
+    backlash: float = 0.0, second_hz: float | None = None,
+) -> MechanicsSpec:  # fmt: skip
+    """A motor with a soft load: it oscillates at this frequency while the motor is held."""
+    stiffness = load * (2 * math.pi * frequency_hz) ** 2
+    loads: list[dict[str, float]] = []
+    if second_hz is not None:
+        first = 5e-5 * (2 * math.pi * second_hz) ** 2
+        loads.append(
+            {"inertia_kgm2": 5e-5, "stiffness_nm_per_rad": first, "damping_nms_per_rad": 2e-3}
+        )
+    loads.append({
+        "inertia_kgm2": load, "stiffness_nm_per_rad": stiffness, "backlash_rad": backlash,
+        "damping_nms_per_rad": 2 * damping * math.sqrt(stiffness * load),
+    })  # fmt: skip
+    return MechanicsSpec.model_validate({
+        "motor": {"inertia_kgm2": 5e-5, "rated_torque_nm": 1.27, "rated_speed_rpm": 3000},
+        "friction": {"viscous_nms": 2e-4, "coulomb_nm": coulomb},
+        "encoder": {"noise_counts": 4.0}, "load": loads,
+    })  # fmt: skip
+
+
+class Load:
+    """Cycle by cycle the position setpoint, and the speed of the last inertia in rad/s.
+
+    The speed is read from the mechanics, of which the tool sees the motor alone.
+    """
+
+    def __init__(self, bench: DirectBench) -> None:
+        self._link = bench.link
+        self.targets: list[int] = []
+        self.speeds: list[float] = []
+        bench.link.late = self._look
+
+    def _look(self) -> int:
+        servo: Any = self._link.device
+        loop = self._link._loop
+        assert loop is not None
+        self.targets.append(loop.outputs[self._link._written[0x607A]])
+        self.speeds.append(float(servo.axis._x[-1]))
+        return 0
+
+    def ends(self) -> list[int]:
+        """Cycles at which a move has ended, after which the setpoint stands for more than 1 s."""
+        moving = np.flatnonzero(np.diff(self.targets))
+        last = moving[np.append(np.diff(moving) > 1000, [False])]
+        return [int(each) + 1 for each in last]
+
+    def left(self, end: int) -> float:
+        """Half of peak to peak of the speed from 0.1 to 0.4 s after a move."""
+        return 0.5 * float(np.ptp(self.speeds[end + 100 : end + 400]))
+
+
+async def shape(
+    bench: DirectBench, asked: ShapingSettings = ASKED, keep: Any = None, progress: Any = None
+) -> ShapingResult:
+    """As a job does it, and as the result is stored."""
+    run = Run(bench.axis, bench.session, progress or silent(), keep)
+    async with profile_speed.prepared(bench.axis, bench.session, asked.envelope, True):
+        found = await TOOL.run(run, asked)
+    return ShapingResult.model_validate(found.model_dump(mode="json"))
+
+
+def zero_crossings_hz(speed: FloatArray) -> float:
+    """Frequency of what is left of a signal, by its mean spacing of rising crossings at 1 kHz."""
+    about = speed - np.mean(speed)
+    rising = np.flatnonzero((about[:-1] < 0.0) & (about[1:] >= 0.0)).astype(float)
+    exact = rising + about[rising.astype(int)] / (
+        about[rising.astype(int)] - about[rising.astype(int) + 1]
+    )
+    return 1000.0 / float(np.mean(np.diff(exact)))
+
+
+ROUGH = {"coulomb": 0.03, "backlash": 0.002, "second_hz": 60.0}
+
+
+@pytest.mark.parametrize(
+    ("drive", "frequency_hz", "acceleration_rpm_s"),
+    [("m6l", 8.0, 6000.0), ("mms7", 6.0, 6000.0), ("ep3e", 8.0, 6000.0), ("r6l", 14.0, 16800.0)],
+)
+async def test_a_shaper_halves_the_vibration_or_the_settling_time(
+    drive: str, frequency_hz: float, acceleration_rpm_s: float
+) -> None:
+    asked = ASKED.model_copy(update={"acceleration": acceleration_rpm_s})
+    kept: dict[str, Any] = {}
+
+    def keep(name: str, arrays: dict[str, Any], meta: dict[str, object]) -> None:
+        kept.update(name=name, arrays=arrays, meta=meta)
+
+    async with direct(arm(frequency_hz, **ROUGH), drive=drive) as bench:
+        before = await settings_of(bench.axis.drive)
+        home = await bench.axis.position_raw()
+        load = Load(bench)
+        marks: list[int] = []
+        progress = At("with the shaper", lambda: marks.append(len(load.speeds)))
+        found = await shape(bench, asked, keep, progress.progress)
+        units = await bench.axis.units()
+        away = units.position(await bench.axis.position_raw() - home)
+        after = await settings_of(bench.axis.drive)
+        state = await bench.axis.state()
+    assert found.verdict == "verified"
+    assert found.comparison is not None
+    assert found.mode is not None
+    assert min(found.comparison.ratio, found.comparison.settling_ratio or 1.0) <= 0.5
+    # The mechanics themselves: the load oscillates less, too, and at the frequency that was found.
+    ends = load.ends()
+    free, calm = [each for each in ends if each < marks[0]], [e for e in ends if e > marks[0]]
+    assert min(len(free), len(calm)) >= 3
+    truth = zero_crossings_hz(np.asarray(load.speeds)[free[0] + 100 : free[0] + 700])
+    assert found.mode.frequency_hz == pytest.approx(truth, rel=0.04)
+    left = [np.mean([load.left(each) for each in some]) for some in (calm, free)]
+    assert left[0] <= 0.5 * left[1]
+    assert abs(away) < 0.05
+    assert after == before
+    assert state is not State.OPERATION_ENABLED
+    assert TOOL.reevaluate(kept["arrays"], kept["meta"]) == found
+
+
+async def test_a_stiff_axis_shows_no_vibration_and_is_not_moved_again() -> None:
+    async with direct(arm(400.0)) as bench:
+        load = Load(bench)
+        found = await shape(bench)
+    assert found.verdict == "not_seen"
+    assert (found.mode, found.comparison, found.shapers) == (None, None, ())
+    assert "not_excited" in {each.code for each in found.findings}
+    # Two moves out and back.
+    assert len(load.ends()) == 4
+
+
+async def test_a_stated_mode_that_the_motor_does_not_show_is_designed_for_and_not_tried() -> None:
+    asked = ASKED.model_copy(update={"frequency_hz": 7.0, "damping": 0.02})
+    async with direct(arm(400.0), drive="m6l") as bench:
+        found = await shape(bench, asked)
+    assert found.verdict == "stated"
+    assert found.comparison is None
+    zv = next(each for each in found.shapers if each.kind == "zv")
+    assert zv.delay_s == pytest.approx(0.5 / (7.0 * math.sqrt(1 - 0.02**2)))
+    # P09.26 in 0.1 Hz (000:3448); nothing is printed of what P09.27 means.
+    values = {each.parameter: (each.raw, each.value, each.unit) for each in found.drive_values}
+    assert values == {"P09.25": (0, 0.0, ""), "P09.26": (70, pytest.approx(7.0), "Hz")}
+    unstated = [each.parameter for each in found.findings if each.code == "drive_unstated"]
+    assert unstated == ["P09.27"]
+
+
+@pytest.mark.parametrize("ending", ["cancelled", "fault"])
+async def test_everything_is_as_before_however_it_ends(ending: str) -> None:
+    async with direct(arm(8.0)) as bench:
+        before = await settings_of(bench.axis.drive, "6060:00")
+
+        def end() -> None:
+            if ending == "fault":
+                bench.link.device.inject("over_temperature")  # type: ignore[attr-defined]
+            else:
+                running.cancel()
+
+        at = At("without a shaper", end, 0.1)
+        running = asyncio.ensure_future(shape(bench, progress=at.progress))
+        with pytest.raises((asyncio.CancelledError, NotAllowed)):
+            await running
+        assert at.done
+        assert await settings_of(bench.axis.drive, "6060:00") == before
+        assert await bench.axis.state() is not State.OPERATION_ENABLED
+
+
+@pytest.mark.parametrize(
+    ("changed", "code"),
+    [
+        ({"size": 2.5}, "shaping.move-beyond-envelope"),
+        ({"speed": 1000.0}, "shaping.move-beyond-envelope"),
+        ({"time_limit_s": 3.0}, "shaping.takes-too-long"),
+    ],
+)
+async def test_a_move_beyond_the_envelope_is_refused_before_anything_moves(
+    changed: dict[str, float], code: str
+) -> None:
+    async with direct(arm(8.0)) as bench:
+        with pytest.raises(OutOfRange) as refused:
+            await shape(bench, ASKED.model_copy(update=changed))
+        assert bench.link.highest["torque"] == 0.0
+    assert refused.value.code == code
+
+
+async def test_a_drive_without_cyclic_positions_is_refused_with_the_reason() -> None:
+    profile = load_profile("ds_c")
+    link = DirectLink(make_device("ds_c", arm(8.0)), profile)
+    axis = Axis(Drive("x", "X", profile, [Port(link, STATION, profile.link("canopen"))]))
+    with pytest.raises(NotAllowed) as refused:
+        await TOOL.run(Run(axis, object(), silent()), ASKED)  # type: ignore[arg-type]
+    assert refused.value.code == "shaping.no-cyclic-position"
