@@ -112,7 +112,7 @@ def fit_mode(ring: RingDown, low_hz: float, high_hz: float) -> ModeFit | None:
     explained = 1.0 - np.divide(
         np.mean(rest**2, axis=0), scale**2, out=np.ones(scale.size), where=moving
     )
-    std = _deviations(found.jac, found.fun, np.count_nonzero(moving))
+    std = _deviations(np.asarray(found.jac), found.fun, int(np.count_nonzero(moving)))
     return ModeFit(
         frequency, damping, frequency * float(std[0]), damping * float(std[1]), explained,
         np.hypot(solved[0], solved[1]), noise,
