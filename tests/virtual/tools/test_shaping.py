@@ -118,7 +118,13 @@ ROUGH = {"coulomb": 0.03, "backlash": 0.002, "second_hz": 60.0}
 
 @pytest.mark.parametrize(
     ("drive", "frequency_hz", "acceleration_rpm_s"),
-    [("m6l", 8.0, 6000.0), ("mms7", 6.0, 6000.0), ("ep3e", 8.0, 6000.0), ("r6l", 14.0, 16800.0)],
+    [
+        ("m6l", 8.0, 6000.0),
+        ("mms7", 6.0, 6000.0),
+        ("mms7", 15.0, 12000.0),
+        ("ep3e", 8.0, 6000.0),
+        ("r6l", 8.0, 6000.0),
+    ],
 )
 async def test_a_shaper_halves_the_vibration_or_the_settling_time(
     drive: str, frequency_hz: float, acceleration_rpm_s: float
