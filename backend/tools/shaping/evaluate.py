@@ -11,6 +11,7 @@ import numpy.typing as npt
 from scipy.stats import t as student
 
 from backend.analysis.signals import shaper as shapers
+from backend.analysis.signals.arrays import FloatArray
 from backend.analysis.signals.ring_down import (
     CommonMode,
     Mode,
@@ -39,7 +40,6 @@ from backend.tools.shaping.settings import ShapingSettings
 from backend.tools.thresholds import shaping_evaluate as threshold
 from backend.tools.tool import Arrays, Interval, Meta
 
-FloatArray = npt.NDArray[np.float64]
 _Traces = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
 _TURN = 2 * np.pi
 _POINTS = 300
@@ -87,7 +87,7 @@ def reevaluate(arrays: Arrays, meta: Meta) -> ShapingResult:
     rate = float(str(meta["sample_rate_hz"]))
 
     def pair(name: str, number: int) -> Recording:
-        def column(key: str) -> FloatArray:
+        def column(key: str) -> npt.NDArray[np.float64]:
             return np.asarray(arrays[f"{name}_{key}"][number], np.float64)
 
         return Recording(

@@ -85,7 +85,7 @@ class Load:
     def ends(self) -> list[int]:
         """Cycles at which a move has ended, after which the setpoint stands for more than 1 s."""
         moving = np.flatnonzero(np.diff(self.targets))
-        last = moving[np.append(np.diff(moving) > 1000, [False])]
+        last = moving[np.diff(moving, append=len(self.targets)) > 1000]
         return [int(each) + 1 for each in last]
 
     def left(self, end: int) -> float:
@@ -118,7 +118,13 @@ ROUGH = {"coulomb": 0.03, "backlash": 0.002, "second_hz": 60.0}
 
 @pytest.mark.parametrize(
     ("drive", "frequency_hz", "acceleration_rpm_s"),
-    [("m6l", 8.0, 6000.0), ("mms7", 6.0, 6000.0), ("ep3e", 8.0, 6000.0), ("r6l", 14.0, 16800.0)],
+    [
+        ("m6l", 8.0, 6000.0),
+        ("mms7", 6.0, 6000.0),
+        ("mms7", 15.0, 12000.0),
+        ("ep3e", 8.0, 6000.0),
+        ("r6l", 8.0, 6000.0),
+    ],
 )
 async def test_a_shaper_halves_the_vibration_or_the_settling_time(
     drive: str, frequency_hz: float, acceleration_rpm_s: float
@@ -145,11 +151,12 @@ async def test_a_shaper_halves_the_vibration_or_the_settling_time(
     assert found.mode is not None
     assert min(found.comparison.ratio, found.comparison.settling_ratio or 1.0) <= 0.5
     # The mechanics themselves: the load oscillates less, too, and at the frequency that was found.
+    # Four periods of an oscillation that friction ends and backlash slows tell it to some percent.
     ends = load.ends()
     free, calm = [each for each in ends if each < marks[0]], [e for e in ends if e > marks[0]]
     assert min(len(free), len(calm)) >= 3
     truth = zero_crossings_hz(np.asarray(load.speeds)[free[0] + 100 : free[0] + 700])
-    assert found.mode.frequency_hz == pytest.approx(truth, rel=0.04)
+    assert found.mode.frequency_hz == pytest.approx(truth, rel=0.05)
     left = [np.mean([load.left(each) for each in some]) for some in (calm, free)]
     assert left[0] <= 0.5 * left[1]
     assert abs(away) < 0.05
