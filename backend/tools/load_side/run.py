@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.mechanics.load_side import GROUP, unwrapped
+from backend.analysis.mechanics.load_side_samples import GROUP, unwrapped
 from backend.axis.axis import Axis, Envelope
 from backend.axis.cyclic import CyclicSession
 from backend.drive.optional import existing
