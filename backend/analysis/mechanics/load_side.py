@@ -118,7 +118,7 @@ def load_side(sides: TwoSides, motor_inertia_kgm2: float | None) -> LoadSide:
     twist = value(lambda fit: fit.twist)
     angle, columns = curve_of(sides, shape)
     sizes = tuple(
-        (order, value(partial(_Fit.amplitude, number=n)))
+        (order, value(partial(_Fit.amplitude, number=n), floor))
         for n, order in enumerate(shape.orders)
     )  # fmt: skip
     return LoadSide(
