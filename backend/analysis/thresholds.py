@@ -13,7 +13,7 @@ from __future__ import annotations
 
 
 class load_side:
-    """`mechanics/load_side.py`."""
+    """`mechanics/load_side.py` and `mechanics/load_side_samples.py`."""
 
     # WINDOW_S, THINNED_HZ: Length of the low-pass window that all signals pass, and how many
     # samples a second are kept after it.

@@ -18,34 +18,21 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
+from backend.analysis.mechanics.load_side_samples import (
+    BoolArray,
+    IntArray,
+    Table,
+    TwoSides,
+    curve_of,
+    shape_of,
+    table_of,
+)
 from backend.analysis.signals.arrays import FloatArray
 from backend.analysis.thresholds import load_side as threshold
 
-BoolArray = npt.NDArray[np.bool_]
-IntArray = npt.NDArray[np.int64]
 _TURN = 2 * np.pi
-GROUP = 100
-"""Parts from this number on are groups of reciprocating moves."""
-
-
-@dataclass(frozen=True)
-class TwoSides:
-    """Samples [n] of both sides: rad of the motor, counts of the load, Nm of the motor.
-
-    ``part``: 0 counts for nothing; ±j a slow pass forwards or backwards; 100 + j the j-th group of
-    reciprocating moves. ``ratio``: motor revolutions of one load revolution.
-    """
-
-    rate_hz: float
-    angle_rad: FloatArray
-    load_counts: FloatArray
-    torque_nm: FloatArray
-    valid: BoolArray
-    part: IntArray
-    ratio: float
 
 
 @dataclass(frozen=True)
@@ -83,55 +70,6 @@ class LoadSide:
 
 
 @dataclass(frozen=True)
-class _Table:
-    """Filtered and thinned samples [m]. ``fixed`` are the columns that no flank changes: motor
-    angle, errors over the angle, an offset for each direction of the slow passes, one for the
-    moves, and the speed. ``places`` are waves over the motor's revolution, for its torque."""
-
-    counts: FloatArray
-    fixed: FloatArray
-    moves: BoolArray
-    group: IntArray
-    alpha: FloatArray
-    motor_alpha: FloatArray
-    omega: FloatArray
-    torque: FloatArray
-    places: FloatArray
-
-    def rows(self, kept: BoolArray) -> _Table:
-        """Some of the samples."""
-        return _Table(**{name: value[kept] for name, value in vars(self).items()})
-
-    @property
-    def sign(self) -> FloatArray:
-        """Direction of each sample."""
-        return np.sign(self.omega)
-
-
-@dataclass(frozen=True)
-class _Shape:
-    """The errors over the angle: orders per load revolution, and Chebyshev polynomials from the
-    second on, where a part of one is covered."""
-
-    orders: tuple[float, ...]
-    powers: int
-    ratio: float
-    centre_rad: float
-    span_rad: float
-
-    def columns(self, angle_rad: FloatArray) -> FloatArray:
-        """[n, 2·orders + powers]"""
-        load = angle_rad / self.ratio
-        waves = [f(order * load) for order in self.orders for f in (np.cos, np.sin)]
-        place = 2.0 * (angle_rad - self.centre_rad) / self.span_rad
-        bent = [
-            np.cos((2 + power) * np.arccos(np.clip(place, -1.0, 1.0)))
-            for power in range(self.powers)
-        ]
-        return np.column_stack([*waves, *bent, np.empty((angle_rad.size, 0))])
-
-
-@dataclass(frozen=True)
 class _Fit:
     """In rad of the motor: half the gap, J/k, F/k, errors over the angle, lost motion."""
 
@@ -152,14 +90,15 @@ def load_side(sides: TwoSides, motor_inertia_kgm2: float | None) -> LoadSide:
     """The figures of these samples.
 
     Raises:
-        ValueError: "few": too few samples; "still": the load's counts do not follow the motor.
+        FewSamples: too few are left.
+        LoadStands: the counts of the load do not follow the motor.
     """
-    shape = _shape(sides)
-    table = _table(sides, shape, np.zeros(sides.angle_rad.size))
+    shape = shape_of(sides)
+    table = table_of(sides, shape, np.zeros(sides.angle_rad.size))
     first = _fit(table, _flanks(table))
     # The error over the angle is in the second derivative of the counts, too: taken out, once.
     shown = shape.columns(sides.angle_rad) @ first.errors
-    table = _table(sides, shape, first.counts_per_rad * shown)
+    table = table_of(sides, shape, first.counts_per_rad * shown)
     flanks = _flanks(table)
     kept = _in_contact(table, flanks)
     table, flanks = table.rows(kept), flanks[kept]
@@ -177,9 +116,9 @@ def load_side(sides: TwoSides, motor_inertia_kgm2: float | None) -> LoadSide:
     if not pulled and whole.half_gap is not None and all(fit.half_gap is not None for fit in again):
         gap = value(lambda fit: 2.0 * (fit.half_gap or 0.0), floor)
     twist = value(lambda fit: fit.twist)
-    angle, columns = _curve(sides, shape)
+    angle, columns = curve_of(sides, shape)
     sizes = tuple(
-        (order, value(partial(_Fit.amplitude, number=n)))
+        (order, value(partial(_Fit.amplitude, number=n), floor))
         for n, order in enumerate(shape.orders)
     )  # fmt: skip
     return LoadSide(
@@ -197,95 +136,10 @@ def load_side(sides: TwoSides, motor_inertia_kgm2: float | None) -> LoadSide:
     )  # fmt: skip
 
 
-# --- samples ---------------------------------------------------------------------------------
-
-
-def _shape(sides: TwoSides) -> _Shape:
-    """Which errors the slow passes can show: those of a load revolution where they cover one, of
-    a motor revolution where they cover that and it is another."""
-    slow = sides.angle_rad[(sides.part != 0) & (np.abs(sides.part) < GROUP)]
-    if slow.size < threshold.FEWEST:
-        raise ValueError("few")
-    span, centre = float(np.ptp(slow)), float(0.5 * (np.min(slow) + np.max(slow)))
-    if span == 0.0:
-        raise ValueError("still")
-    whole = span >= threshold.COVERED * _TURN * sides.ratio
-    found = set(range(1, threshold.ORDERS + 1)) if whole else set()
-    orders = [float(order) for order in found]
-    if span >= threshold.COVERED * _TURN:
-        own = [k * sides.ratio for k in range(1, threshold.ORDERS + 1)]
-        orders += [each for each in own if all(abs(each - o) > threshold.APART for o in orders)]
-    return _Shape(
-        tuple(sorted(orders)), 0 if whole else threshold.POWERS, sides.ratio, centre, span
-    )
-
-
-def _table(sides: TwoSides, shape: _Shape, error_counts: FloatArray) -> _Table:
-    """Filtered and thinned; ``error_counts`` [n] are taken out before the load is accelerated."""
-    rate, part = sides.rate_hz, sides.part
-    slow = (part != 0) & (np.abs(part) < GROUP)
-    scale, _ = np.polyfit(sides.angle_rad[slow], sides.load_counts[slow], 1)
-    if abs(scale) * np.ptp(sides.angle_rad[slow]) < threshold.MOVED:
-        raise ValueError("still")
-    n = 2 * round(0.5 * threshold.WINDOW_S * rate) + 1
-    window = np.hanning(n + 2)[1:-1]
-    window /= np.sum(window)
-
-    def low(column: FloatArray) -> FloatArray:
-        ends = column[0], column[-1]
-        padded = np.concatenate([np.full(n // 2, ends[0]), column, np.full(n // 2, ends[1])])
-        return np.asarray(scipy.signal.oaconvolve(padded, window, mode="valid"))
-
-    angle = low(sides.angle_rad - shape.centre_rad)
-    counts = low(sides.load_counts - sides.load_counts[0])
-    load = counts - low(error_counts)
-    omega = np.gradient(angle) * rate
-    alpha = np.gradient(np.gradient(load / scale)) * rate**2
-    motor_alpha = np.gradient(omega) * rate
-    waves = [low(column) for column in shape.columns(sides.angle_rad).T]
-    places = [
-        low(f(k * sides.angle_rad))
-        for k in range(1, threshold.ORDERS + 1)
-        for f in (np.cos, np.sin)
-    ]
-    moves = part >= GROUP
-    offsets = [(slow & (part > 0)), (slow & (part < 0)), moves]
-    fixed = np.column_stack([angle, *waves, omega, *(np.asarray(o, np.float64) for o in offsets)])
-    whole = np.convolve(~sides.valid, np.ones(n), mode="same") < 0.5
-    settled = _settled(sides, scale, low, moves)
-    thin = np.zeros(part.size, dtype=np.bool_)
-    thin[:: max(1, round(rate / threshold.THINNED_HZ))] = True
-    kept = whole & thin & (part != 0) & (slow | settled)
-    group = np.where(moves, part, 0)
-    numbers = np.unique(group[kept & moves])
-    if numbers.size < threshold.GROUPS or np.count_nonzero(kept & slow) < threshold.FEWEST:
-        raise ValueError("few")
-    at = np.flatnonzero(kept & slow)
-    piece = np.arange(at.size) * 2 * numbers.size // at.size
-    group[at] = numbers[piece % numbers.size]
-    return _Table(
-        counts=counts[kept], fixed=fixed[kept], moves=moves[kept], group=group[kept],
-        alpha=alpha[kept], motor_alpha=motor_alpha[kept], omega=omega[kept],
-        torque=low(sides.torque_nm)[kept], places=np.column_stack(places)[kept],
-    )  # fmt: skip
-
-
-def _settled(
-    sides: TwoSides, scale: float, low: Callable[[FloatArray], FloatArray], moves: BoolArray
-) -> BoolArray:  # fmt: skip
-    """Samples [n] of the moves in whose window the load neither crosses the gap nor bounces."""
-    twist = (sides.load_counts - sides.load_counts[0]) / scale
-    twist -= sides.angle_rad - sides.angle_rad[0]
-    twist -= np.median(twist)
-    spread = np.sqrt(np.maximum(low(twist**2) - low(twist) ** 2, 0.0))
-    least = float(np.quantile(spread[moves], threshold.QUIETEST)) if np.any(moves) else 0.0
-    return spread <= threshold.RESTLESS * max(least, threshold.COUNTS / abs(scale))
-
-
 # --- flanks ----------------------------------------------------------------------------------
 
 
-def _flanks(table: _Table) -> FloatArray:
+def _flanks(table: Table) -> FloatArray:
     """On which flank each sample of the moves lies, ±1 [m], 0 where that is not certain."""
     largest = float(np.quantile(np.abs(table.alpha[table.moves]), threshold.LARGE))
     thin = np.zeros(table.counts.size, dtype=np.bool_)
@@ -307,7 +161,7 @@ def _flanks(table: _Table) -> FloatArray:
     return _of(table, *best, largest)
 
 
-def _of(table: _Table, friction: float, pull: float, largest: float) -> FloatArray:
+def _of(table: Table, friction: float, pull: float, largest: float) -> FloatArray:
     """Flanks with F/J and pull/J in rad/s²."""
     if np.isinf(friction):
         return np.where(table.moves, table.sign, 0.0)
@@ -316,7 +170,7 @@ def _of(table: _Table, friction: float, pull: float, largest: float) -> FloatArr
     return np.where(certain, np.sign(force), 0.0)
 
 
-def _pulls(table: _Table, largest: float) -> list[float]:
+def _pulls(table: Table, largest: float) -> list[float]:
     """Candidates of pull/J: none, or what the motor's torque shows of one."""
     at = table.moves
     columns = np.column_stack([table.alpha[at], table.sign[at], np.ones(np.count_nonzero(at))])
@@ -328,14 +182,14 @@ def _pulls(table: _Table, largest: float) -> list[float]:
     return [float(ratio * factor) for factor in threshold.PULLS]
 
 
-def _pulled(table: _Table) -> bool:
+def _pulled(table: Table) -> bool:
     """Whether a pull takes so much of what accelerates the load that flanks hardly change."""
     largest = float(np.quantile(np.abs(table.alpha[table.moves]), threshold.LARGE))
     return abs(_pulls(table, largest)[0]) > threshold.PULLED * largest
 
 
 def _agrees(
-    table: _Table, fit: _Fit, flanks: FloatArray, pull: float, largest: float
+    table: Table, fit: _Fit, flanks: FloatArray, pull: float, largest: float
 ) -> bool:  # fmt: skip
     """Whether the friction that was found puts the load on the flanks that were assumed."""
     gap = abs(fit.half_gap or 0.0)
@@ -348,7 +202,7 @@ def _agrees(
     return bool(same.size) and float(np.mean(same)) >= threshold.SAME
 
 
-def _in_contact(table: _Table, flanks: FloatArray) -> BoolArray:
+def _in_contact(table: Table, flanks: FloatArray) -> BoolArray:
     """Samples that lie where the fit says: not those that bounce, or cross the gap."""
     kept = np.ones(table.counts.size, dtype=np.bool_)
     for _ in range(threshold.TRIMMED):
@@ -365,7 +219,7 @@ def _in_contact(table: _Table, flanks: FloatArray) -> BoolArray:
 # --- regression ------------------------------------------------------------------------------
 
 
-def _design(table: _Table, flanks: FloatArray) -> tuple[FloatArray, BoolArray]:
+def _design(table: Table, flanks: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Columns [m, c + 3], flank, acceleration and direction last, and the samples that count."""
     on = table.moves
     own = np.column_stack([flanks, np.where(on, table.alpha, 0.0), np.where(on, table.sign, 0.0)])
@@ -378,7 +232,7 @@ def _solved(columns: FloatArray, wanted: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.lstsq(columns / size, wanted, rcond=None)[0] / size)
 
 
-def _fit(table: _Table, flanks: FloatArray) -> _Fit:
+def _fit(table: Table, flanks: FloatArray) -> _Fit:
     columns, used = _design(table, flanks)
     columns, wanted = columns[used], table.counts[used]
     side, others = columns[:, -3], np.delete(columns, -3, axis=1)
@@ -400,14 +254,14 @@ def _fit(table: _Table, flanks: FloatArray) -> _Fit:
     )  # fmt: skip
 
 
-def _residual(table: _Table, flanks: FloatArray, kept: BoolArray) -> FloatArray:
+def _residual(table: Table, flanks: FloatArray, kept: BoolArray) -> FloatArray:
     columns, used = _design(table, flanks)
     used = used & kept
     return np.asarray(table.counts - columns @ _solved(columns[used], table.counts[used]))
 
 
 def _load_inertia(
-    table: _Table, groups: IntArray, motor_inertia_kgm2: float | None
+    table: Table, groups: IntArray, motor_inertia_kgm2: float | None
 ) -> Value | None:  # fmt: skip
     """What the torque beyond the motor's own acceleration accelerates, in kg·m²."""
     if motor_inertia_kgm2 is None:
@@ -433,21 +287,3 @@ def _jackknife(again: Sequence[float]) -> float:
     n = values.size
     deviation = np.sqrt((n - 1) / n * np.sum((values - np.mean(values)) ** 2))
     return float(scipy.special.stdtrit(n - 1, 0.975) * deviation)
-
-
-def _curve(sides: TwoSides, shape: _Shape) -> tuple[FloatArray, FloatArray]:
-    """Angles over a load revolution, or over what was covered, and the columns there."""
-    if shape.powers == 0:
-        angle = np.arange(threshold.BINS) * _TURN * sides.ratio / threshold.BINS
-    else:
-        share = np.linspace(-0.5, 0.5, threshold.BINS)
-        angle = shape.centre_rad + share * shape.span_rad
-    return angle, shape.columns(angle)
-
-
-def unwrapped(counts: FloatArray, bits: int = 32) -> FloatArray:
-    """Counts [n] of a counter that wraps around, without its leaps."""
-    turn = 2.0**bits
-    steps = np.diff(counts)
-    steps -= turn * np.round(steps / turn)
-    return np.concatenate([counts[:1], counts[0] + np.cumsum(steps)]).astype(np.float64)

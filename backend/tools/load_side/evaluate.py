@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.mechanics.load_side import LoadSide, TwoSides, Value, load_side
+from backend.analysis.mechanics.load_side import LoadSide, Value, load_side
+from backend.analysis.mechanics.load_side_samples import FewSamples, LoadStands, TwoSides
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.load_side.result import ErrorOrder, Estimate, Finding, LoadSideResult
 from backend.tools.load_side.settings import LoadSideSettings
@@ -54,9 +55,10 @@ def evaluate(data: Sides, settings: LoadSideSettings, facts: AxisFacts) -> LoadS
     )  # fmt: skip
     try:
         found = load_side(sides, usable)
-    except ValueError as error:
-        still = str(error) == "still"
-        raise NotAllowed("load-side.load-stands" if still else "load-side.few-samples") from error
+    except LoadStands as error:
+        raise NotAllowed("load-side.load-stands") from error
+    except FewSamples as error:
+        raise NotAllowed("load-side.few-samples") from error
     ratio = settings.gear_ratio
     degrees = 360.0 / _TURN / ratio
     stiffness, least = _stiffness(found, usable or 0.0)

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.mechanics.load_side import GROUP, unwrapped
+from backend.analysis.mechanics.load_side_samples import GROUP, unwrapped
 from backend.axis.axis import Axis, Envelope
 from backend.axis.cyclic import CyclicSession
 from backend.drive.optional import existing
@@ -210,9 +210,8 @@ def _sides(recordings: Sequence[Recording], parts: Sequence[IntArray]) -> Sides:
     """Both recordings, one behind the other; the load's counter goes on between them."""
     counts = [recording.also for recording in recordings]
     assert all(each is not None for each in counts), "asked for with the move"
-    load = np.asarray(
-        unwrapped(np.concatenate([each[:, 0] for each in counts if each is not None])), np.float64
-    )
+    shown = np.concatenate([each[:, 0] for each in counts if each is not None])
+    load = np.asarray(unwrapped(shown), np.float64)
     sizes = [recording.position_rad.size for recording in recordings]
     part = np.concatenate([p[:n] for p, n in zip(parts, sizes, strict=True)])
     return Sides(
