@@ -242,7 +242,7 @@ def test_a_setting_is_tried_kept_and_undone(station: Station) -> None:
     assert slave(station, "register", address=0x0980) == 0x0300
     station.ok(station.http.delete("/buses/cyclic", params={"url": SEGMENT}))
 
-    rows = station.ok(station.http.get("/audit", params={"limit": 100}))["entries"]
+    rows = station.ok(station.http.get("/audit", params={"limit": 100}))["events"]
     told = [(row["action"], row["target"]) for row in rows if "doctor" in row["target"]]
     assert ("changed", "/buses/doctor/kept") in told
     assert ("deleted", "/buses/doctor/kept") in told
