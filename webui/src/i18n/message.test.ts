@@ -41,7 +41,7 @@ describe('a message of the server', () => {
     const found = { code: 'modbus.found', params: { count: 12345 } }
     expect(words('en', found)).toBe('12345 found')
     expect(words('en', { code: 'link.no-network-interface', params: { value: 'eth0 x' } })).toBe(
-      "'eth0 x' is no network interface",
+      "'eth0 x' is not a network interface",
     )
   })
   it('is strung together with others as each language does', () => {
