@@ -16,8 +16,12 @@ from profiles.schema import PdoSet, Profile
 MOST = 4
 """Trials of one station: each takes the drive to Operational again."""
 
-_ACTIVATES = (0x0300, 0x0000, 0x0700, 0x0330)
-"""Values of 0980h that drives in use want: SYNC0, no clock, SYNC0 and SYNC1, SYNC0 on its pin."""
+_ACTIVATES = (0x0300, 0x0700, 0x0330)
+"""Values of 0980h that drives in use want: SYNC0, SYNC0 and SYNC1, SYNC0 on its pin.
+
+Not 0000h: the bring-up takes a profile that names no mode with a clock to 0300h, so a trial of it
+would change nothing.
+"""
 
 _LONGER = (2, 4)
 
@@ -106,7 +110,7 @@ def _other_clock(_cause: Cause, profile: Profile) -> Iterator[Trial]:
     rules = _rules(profile)
     used = rules.clock_mode
     before = 0x0300 if used is None else used.assign_activate
-    others = [mode for mode in rules.clock_modes if mode is not used]
+    others = [m for m in rules.clock_modes if m is not used and m.assign_activate]
     known = {before, *(mode.assign_activate for mode in others)}
     shape = used or ClockMode(name="doctor")
     others += [

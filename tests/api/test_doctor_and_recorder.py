@@ -209,10 +209,10 @@ def test_a_setting_is_tried_kept_and_undone(station: Station) -> None:
         assert seen["causes"][0]["code"] == "clock_mode_wrong"
         assert seen["kept"] is None
         offered = {(each["setting"], each["after"]): each for each in seen["trials"]}
-        # Without an ESI file AssignActivate is 0300h; 0000h is no distributed clock.
-        trial = offered["bring_up.clock_modes", "0000h"]
+        # Without an ESI file AssignActivate is 0300h; 0330h puts SYNC0 on its pin as well.
+        trial = offered["bring_up.clock_modes", "0330h"]
         assert trial["before"] == "0300h"
-        body = {"url": SEGMENT, "station": 1, "setting": trial["setting"], "after": "0000h"}
+        body = {"url": SEGMENT, "station": 1, "setting": trial["setting"], "after": "0330h"}
         result = station.done(station.http.post("/buses/doctor/trials", json=body))
         assert not result["reached"]
         assert result["refusal"]["code"].startswith("ethercat.")
@@ -231,7 +231,7 @@ def test_a_setting_is_tried_kept_and_undone(station: Station) -> None:
     bus = station.ok(station.http.post("/buses/cyclic", json={"url": SEGMENT, "cycle_us": 2000}))
     assert bus["cyclic"]["running"]
     # Register 0980h has the AssignActivate with which the exchange was started (ETG.1000.4).
-    assert slave(station, "register", address=0x0980) == 0x0000, "the kept setting counts"
+    assert slave(station, "register", address=0x0980) == 0x0330, "the kept setting counts"
     running = station.http.delete("/buses/doctor/kept", params={"url": SEGMENT, "station": 1})
     assert running.status_code == 409
     station.ok(station.http.delete("/buses/cyclic", params={"url": SEGMENT}))
@@ -242,7 +242,7 @@ def test_a_setting_is_tried_kept_and_undone(station: Station) -> None:
     assert slave(station, "register", address=0x0980) == 0x0300
     station.ok(station.http.delete("/buses/cyclic", params={"url": SEGMENT}))
 
-    rows = station.ok(station.http.get("/audit", params={"limit": 100}))["entries"]
+    rows = station.ok(station.http.get("/audit", params={"limit": 100}))["events"]
     told = [(row["action"], row["target"]) for row in rows if "doctor" in row["target"]]
     assert ("changed", "/buses/doctor/kept") in told
     assert ("deleted", "/buses/doctor/kept") in told

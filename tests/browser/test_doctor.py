@@ -128,7 +128,7 @@ def test_a_setting_is_tried_kept_and_undone(laptop: Page, station: Station) -> N
     try:
         card = _card(laptop, SEGMENT, "Why not in Operational?")
         trials = card.get_by_role("region", name="Settings to try")
-        attempt = trials.get_by_role("button", name="Try bring_up.clock_modes = 0000h")
+        attempt = trials.get_by_role("button", name="Try bring_up.clock_modes = 0330h")
         attempt.click(timeout=SLOW_MS)
         expect(trials).to_contain_text("does not reach Operational:", timeout=SLOW_MS)
         expect(trials).to_contain_text("The setting is undone.")
@@ -138,7 +138,7 @@ def test_a_setting_is_tried_kept_and_undone(laptop: Page, station: Station) -> N
     attempt.click(timeout=SLOW_MS)
     expect(trials).to_contain_text("the drive reaches Operational.", timeout=SLOW_MS)
     trials.get_by_role("button", name="Keep").click()
-    kept = "Until the drive is connected anew: bring_up.clock_modes is 0000h instead of 0300h."
+    kept = "Until the drive is connected anew: bring_up.clock_modes is 0330h instead of 0300h."
     expect(trials).to_contain_text(kept, timeout=SLOW_MS)
     expect(attempt).to_have_count(0)
     trials.get_by_role("button", name="Undo").click()
@@ -152,7 +152,7 @@ def test_settings_to_try_on_a_phone_in_chinese(phone: Page, station: Station) ->
     try:
         card = _card(phone, SEGMENT, "为何未进入 Operational？")
         trials = card.get_by_role("region", name="可尝试的设置")
-        attempt = trials.get_by_role("button", name="尝试 bring_up.clock_modes = 0000h")
+        attempt = trials.get_by_role("button", name="尝试 bring_up.clock_modes = 0330h")
         attempt.click(timeout=SLOW_MS)
         expect(trials).to_contain_text("驱动器未进入 Operational：", timeout=SLOW_MS)
         wide = phone.evaluate("document.documentElement.scrollWidth - window.innerWidth")

@@ -18,7 +18,7 @@ from tests.support.memory_link import MemoryLink
 
 URL = "ethercat://virtual0"
 CLOCK = "bring_up.clock_modes"
-WRONG, RIGHT = "0000h", "0700h"
+WRONG, RIGHT = "0330h", "0700h"
 ENABLED, DISABLED = (0x0637).to_bytes(2, "little"), (0x0650).to_bytes(2, "little")
 
 

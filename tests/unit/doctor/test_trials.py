@@ -11,6 +11,7 @@ from drivers.doctor.diagnosis import Cause, Fact
 from drivers.doctor.examined import Examination
 from drivers.doctor.trials import MOST, trials
 from drivers.errors import DriveError, NotAllowed
+from drivers.ethercat.exchange.bring_up import station_bring_up
 from profiles.bring_up import BringUp, ClockMode, InitCommand, SyncSignal, WatchdogRegisters
 from profiles.schema import PdoSet, PdoSpec, Profile
 from tests.wire.ethercat_host.servo_device import servo_profile
@@ -31,12 +32,25 @@ def of(code: str, known: Profile, *facts: Fact) -> list[tuple[str, str, str]]:
 
 def test_the_operation_modes_of_the_file_come_before_those_of_others() -> None:
     found = of("clock_mode_wrong", profile(clock_modes=MODES))
-    assert [after for _, _, after in found] == ["0700h", "0300h", "0000h"]
+    assert [after for _, _, after in found] == ["0700h", "0300h"]
     first = trials([Cause("clock_mode_wrong", 3, ())], profile(clock_modes=MODES))[0]
     assert first.profile.bring_up is not None
     assert first.profile.bring_up.clock_mode == MODES[1]
     # Without a file the master's own 0300h is in use.
-    assert of("clock_needed", servo_profile())[0][2] == "0000h"
+    assert of("clock_needed", servo_profile())[0][2] == "0700h"
+
+
+def test_a_setting_that_changes_nothing_is_not_tried() -> None:
+    """Every trial of a clock must reach the registers as another value than before."""
+    off = ClockMode(name="C", assign_activate=0)
+    for known in (servo_profile(), profile(clock_modes=(*MODES, off)), profile(clock_modes=(off,))):
+        before = station_bring_up(known, 1_000_000).activate
+        found = trials([Cause("clock_mode_wrong", 3, ())], known)
+        assert found
+        for trial in found:
+            after = station_bring_up(trial.profile, 1_000_000).activate
+            assert after != before
+            assert trial.after == f"{after:04X}h"
 
 
 def test_the_refused_command_alone_is_left_out() -> None:
@@ -125,7 +139,7 @@ async def test_trials_end_with_the_one_that_works_and_leave_the_profile_as_it_wa
     bus.attach(1, known)
     found = await tried(bus, 1, known, [Cause("clock_mode_wrong", 3, ())])  # type: ignore[arg-type]
     assert [(each["after"], each["reached"]) for each in found] == [
-        ("0300h", False), ("0000h", False), ("0700h", True),
+        ("0300h", False), ("0700h", True),
     ]  # fmt: skip
     assert bus.attached[-1] is known
     assert not bus.running
