@@ -87,7 +87,7 @@ def reevaluate(arrays: Arrays, meta: Meta) -> ShapingResult:
     rate = float(str(meta["sample_rate_hz"]))
 
     def pair(name: str, number: int) -> Recording:
-        def column(key: str) -> FloatArray:
+        def column(key: str) -> npt.NDArray[np.float64]:
             return np.asarray(arrays[f"{name}_{key}"][number], np.float64)
 
         return Recording(

@@ -6,8 +6,8 @@ import asyncio
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from backend.analysis.signals.arrays import FloatArray
 from backend.analysis.signals.shaper import shaped
 from backend.drive.drive import Drive
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts
@@ -44,8 +44,6 @@ from drivers.cia402 import Mode
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from drivers.texts.message import Text, text
 from profiles.schema import Parameter
-
-FloatArray = npt.NDArray[np.float64]
 
 
 async def run(run: Run, settings: ShapingSettings) -> ShapingResult:
