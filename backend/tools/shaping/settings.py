@@ -6,10 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from backend.analysis.signals.shaper import Kind
 from backend.tools.tool import Option, ToolSettings
 
-Choice = Literal["auto"] | Kind
+Choice = Literal["auto", "zv", "zvd", "ei"]
 
 
 class ShapingSettings(ToolSettings):

@@ -11554,8 +11554,9 @@ export interface components {
              * Shaper
              * @description the shaper that is played; auto: the shortest that suffices
              * @default auto
+             * @enum {string}
              */
-            shaper: "auto" | ("zv" | "zvd" | "ei");
+            shaper: "auto" | "zv" | "zvd" | "ei";
             /**
              * Size
              * @description way of the move, in revolutions
