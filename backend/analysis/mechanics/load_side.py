@@ -278,7 +278,7 @@ def _load_inertia(
     everything = np.ones(table.counts.size, dtype=np.bool_)
     again = [found(table.group != group) for group in groups]
     inertia = found(everything)
-    return Value(inertia, float(np.hypot(_jackknife(again), threshold.SHARE * inertia)))
+    return Value(inertia, float(np.hypot(_jackknife(again), threshold.SHARE_OF_INERTIA * inertia)))
 
 
 def _jackknife(again: Sequence[float]) -> float:
