@@ -324,7 +324,7 @@ export interface paths {
         get?: never;
         /**
          * Keep Setting
-         * @description Use a setting that has just reached Operational, until the drive is connected anew.
+         * @description Use a setting that has just reached Operational, until the drive is connected again.
          *
          *     It is stored nowhere: to keep it longer, write it into the profile.
          */
