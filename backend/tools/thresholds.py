@@ -980,7 +980,7 @@ class shaping_evaluate:
     docs/slow-vibration.md."""
     HALVED = 0.5
     """[ratio] A shaper is verified where residual or settling time is at most this share. Origin:
-    issue 24."""
+    docs/slow-vibration.md."""
     PERIODS = 3.0
     """[count] Periods that a ring-down holds at least. Origin: docs/slow-vibration.md."""
 
