@@ -133,7 +133,13 @@ async def test_a_drive_without_a_second_position_is_refused_before_anything_move
 async def test_a_load_that_came_off_is_named() -> None:
     spec = axis(gap=0.0, counts_per_rev=16)
     loose = spec.model_copy(
-        update={"load": (spec.load[0].model_copy(update={"stiffness_nm_per_rad": 1e-6}),)}
+        update={
+            "load": (
+                spec.load[0].model_copy(
+                    update={"stiffness_nm_per_rad": 1e-6, "damping_nms_per_rad": 0.0}
+                ),
+            )
+        }
     )
     async with direct(loose, CYCLE_S, drive=DRIVE) as bench:
         with pytest.raises(NotAllowed) as refused:
