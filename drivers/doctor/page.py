@@ -33,7 +33,7 @@ is then set in the profile by hand. It opens the bus itself, so no server may ho
 
 On the page *Connect*, *Settings to try* below the causes does the same for a connected drive,
 while no exchange runs and no drive of the bus is enabled. A setting that reached Operational can
-be kept until the drive is connected anew, and undone. No parameter of the drive is written.
+be kept until the drive is connected again, and undone. No parameter of the drive is written.
 
 The frames of the last minute are behind *Frames of the last minute* on the same page, and by
 `servodeck bus record BUS_URL --out FILE.pcapng`; every support bundle has them.

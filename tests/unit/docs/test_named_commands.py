@@ -33,7 +33,7 @@ def wrong(call: str) -> str | None:
             chosen = [command.commands[one] for one in inner if one in command.commands]
             for each in chosen or command.commands.values():
                 known |= {opt for one in each.params for opt in options_of(one)}
-        for option in re.findall(r"(?<![\w-])--[a-z][a-z-]*", call):
+        for option in re.findall(r"(?<![\w-])--[a-z][a-z0-9-]*", call):
             if option not in known and "|" not in words[0]:
                 return f"{name} has no option {option}"
     return None
