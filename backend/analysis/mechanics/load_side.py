@@ -47,18 +47,19 @@ class Value:
 class LoadSide:
     """What both encoders show, in rad of the motor shaft.
 
-    ``backlash_rad`` is None where friction or a pull keeps the load on its flank in every move;
-    the lost motion bounds it then. ``twist_s2`` is J/k, None where it is no larger than its
-    uncertainty; ``most_twist_s2`` is what it does not exceed. Both are None where the load is
-    ``pulled`` too much. ``load_inertia_kgm2`` needs the motor's own inertia. ``orders`` holds the
-    transmission error per revolution of the load.
+    ``backlash_rad`` is None where no assignment of the samples to two flanks agrees with the data,
+    as where friction or a pull keeps the load on its flank in every move; the lost motion bounds it
+    then. ``twist_s2`` is J/k, None where it is no larger than its uncertainty; ``most_twist_s2`` is
+    what it does not exceed. Both are None where ``backlash_rad`` is, as they rest on the same
+    flanks, and where the load is ``pulled`` too much. ``load_inertia_kgm2`` needs the motor's own
+    inertia. ``orders`` holds the transmission error per revolution of the load.
     """
 
     counts_per_rev: float
     lost_motion_rad: Value
     backlash_rad: Value | None
     twist_s2: Value | None
-    most_twist_s2: float
+    most_twist_s2: float | None
     load_inertia_kgm2: Value | None
     orders: tuple[tuple[float, Value], ...]
     error_span_rad: Value
@@ -125,8 +126,8 @@ def load_side(sides: TwoSides, motor_inertia_kgm2: float | None) -> LoadSide:
         counts_per_rev=whole.counts_per_rad * _TURN,
         lost_motion_rad=value(lambda fit: fit.lost, floor),
         backlash_rad=gap,
-        twist_s2=twist if twist.value > threshold.SEEN * twist.half and not pulled else None,
-        most_twist_s2=max(twist.value + twist.half, 0.0),
+        twist_s2=twist if gap is not None and twist.value > threshold.SEEN * twist.half else None,
+        most_twist_s2=None if gap is None else max(twist.value + twist.half, 0.0),
         load_inertia_kgm2=_load_inertia(table, groups, motor_inertia_kgm2),
         orders=sizes,
         error_span_rad=value(lambda fit: float(np.ptp(columns @ fit.errors)), floor),
@@ -155,6 +156,9 @@ def _flanks(table: Table) -> FloatArray:
             seen.add(flanks.tobytes())
             fit = _fit(some, flanks)
             if fit.half_gap is None or fit.square >= least:
+                continue
+            # Flanks that would overlap are no answer, however well they fit.
+            if 2.0 * fit.half_gap < -threshold.COUNTS / abs(fit.counts_per_rad):
                 continue
             if _agrees(some, fit, flanks, pull, largest):
                 best, least = (float(friction), pull), fit.square
@@ -278,7 +282,9 @@ def _load_inertia(
     everything = np.ones(table.counts.size, dtype=np.bool_)
     again = [found(table.group != group) for group in groups]
     inertia = found(everything)
-    return Value(inertia, float(np.hypot(_jackknife(again), threshold.SHARE_OF_INERTIA * inertia)))
+    # The torque accelerates both: what is uncertain of their sum is uncertain of the load alone.
+    floor = threshold.SHARE_OF_INERTIA * (inertia + motor_inertia_kgm2)
+    return Value(inertia, float(np.hypot(_jackknife(again), floor)))
 
 
 def _jackknife(again: Sequence[float]) -> float:

@@ -136,7 +136,7 @@ def _stiffness(found: LoadSide, motor_kgm2: float) -> tuple[Estimate | None, flo
     if not low or low <= 0.0 or high is None:
         return None, None
     if found.twist_s2 is None:
-        return None, low / found.most_twist_s2 if found.most_twist_s2 > 0.0 else None
+        return None, low / found.most_twist_s2 if found.most_twist_s2 else None
     twist = found.twist_s2
     off = math.hypot((high - low) / 2.0 / inertia.value, twist.half / twist.value)
     value = inertia.value / twist.value
@@ -186,9 +186,9 @@ def _findings(
         findings.append(Finding(code="setpoints_held"))
     elif found.pulled:
         findings.append(Finding(code="pull_large"))
-    elif stiffness is None and found.twist_s2 is None:
+    elif stiffness is None and gap is not None and found.twist_s2 is None:
         findings.append(Finding(code="stiffness_not_seen"))
-    elif stiffness is None:
+    elif stiffness is None and gap is not None:
         findings.append(Finding(code="load_light"))
     if not found.whole_revolution:
         findings.append(Finding(code="revolution_not_covered"))

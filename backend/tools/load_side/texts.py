@@ -47,10 +47,11 @@ TEXTS: dict[str, tuple[str, str]] = {
         "未见间隙；负载侧间隙不超过 {value}{unit}。",
     ),
     "finding.flank_kept": (
-        "Backlash cannot be known: friction or a pull keeps the load on one flank. Lost motion is "
-        "{value}{unit} at most. Permit more speed and torque, or balance the load.",
-        "无法得知间隙：摩擦或恒定拉力使负载始终贴在一侧齿面。失动量至多 {value}{unit}。"
-        "请允许更高的速度和转矩，或平衡负载。",
+        "Backlash and stiffness cannot be known: it is not certain on which flank the load lies, "
+        "as where friction or a pull keeps it on one. Lost motion is {value}{unit} at most. "
+        "Permit more speed and torque, or balance the load.",
+        "无法得知间隙和刚度：无法确定负载贴在哪一侧齿面，例如摩擦或恒定拉力使其始终贴在一侧。"
+        "失动量至多 {value}{unit}。请允许更高的速度和转矩，或平衡负载。",
     ),
     "finding.stiffness_not_seen": (
         "The coupling is too stiff for a value: no twist shows above its uncertainty.",

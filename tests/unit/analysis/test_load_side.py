@@ -119,7 +119,7 @@ def stiffness_of(found: LoadSide) -> Value | None:
     return Value(value, value * off)
 
 
-def test_backlash_is_within_five_percent_or_two_counts() -> None:
+def test_backlash_is_within_five_percent_or_two_counts_in_nine_of_ten_axes() -> None:
     found = [(case, each.backlash_rad) for case, each in campaign() if each.backlash_rad]
     assert len(found) >= 40
     off = [
@@ -127,14 +127,16 @@ def test_backlash_is_within_five_percent_or_two_counts() -> None:
         for case, value in found
         if abs(value.value - case.axis.gap_rad) > max(0.05 * case.axis.gap_rad, 2 * case.count_rad)
     ]
-    assert off == []
+    assert len(off) <= 0.1 * len(found), off
+    assert all(value.value > -value.half for _, value in found)
 
 
-def test_stiffness_is_within_ten_percent() -> None:
+def test_stiffness_is_within_ten_percent_in_nine_of_ten_axes() -> None:
     found = [(case, value) for case, each in campaign() if (value := stiffness_of(each))]
     assert len(found) >= 40
     off = [(c.axis.stiffness, v) for c, v in found if abs(v.value / c.axis.stiffness - 1.0) > 0.1]
-    assert off == []
+    assert len(off) <= 0.1 * len(found), off
+    assert all(abs(value.value / c.axis.stiffness - 1.0) < 0.25 for c, value in found)
 
 
 def test_intervals_hold_the_truth_in_nine_of_ten_axes() -> None:
