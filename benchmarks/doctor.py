@@ -15,7 +15,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from backend.commands.doctor import examined
+from backend.station.doctor import examined
 from benchmarks.doctor_canopen import CASES as CAN_CASES
 from benchmarks.doctor_canopen import CanCase, causes_of
 from drivers.errors import DriveError
@@ -147,7 +147,7 @@ async def first_cause(namespace: Namespace, case: Case) -> str:
             result = await examined(link, 1)
         finally:
             await link.close()
-    return str(result["causes"][0]["code"]) if result["causes"] else ""
+    return result.causes[0].code if result.causes else ""
 
 
 async def table(namespace: Namespace, cases: tuple[Case, ...] = CASES) -> list[tuple[Case, str]]:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import can
 
-from backend.commands.doctor import examined
+from backend.station.doctor import examined
 from drivers.canopen.link import CanopenLink
 from drivers.canopen.slcan import ERROR_ACKNOWLEDGE, ERROR_PROTOCOL
 from drivers.link import Address, LinkEvent
@@ -330,4 +330,4 @@ async def causes_of(case: CanCase) -> list[str]:
                 result = await examined(link, NODE)
             finally:
                 await link.close()
-    return [str(cause["code"]) for cause in result["causes"]]
+    return [cause.code for cause in result.causes]

@@ -32,6 +32,8 @@ rated_speed_rpm = 3000
 [axis.mechanics.friction]
 viscous_nms = 2e-4
 coulomb_nm = 0.03
+[axis.mechanics.load_encoder]
+counts_per_rev = 131072
 """
 
 

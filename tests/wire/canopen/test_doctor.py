@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pytest
 
-from backend.commands.doctor import examined
+from backend.station.doctor import examined
 from benchmarks.doctor_canopen import CASES, NODE, CanCase, causes_of
 from drivers.canopen.link import CanopenLink
 from tests.wire.canopen.conftest import Bench
@@ -38,8 +38,8 @@ async def test_a_healthy_node_reaches_operational_and_is_put_back(
     link.attach(NODE, small_profile())
     before = link.quality(NODE).details["boots"]
     result = await examined(link, NODE)
-    assert result["reached"], result
-    assert result["causes"] == []
+    assert result.reached, result
+    assert result.causes == ()
     assert bench.node.state == 127, "pre-operational again (CiA 301 clause 7.3.2.2.4)"
     assert bench.device.value(0x6040) == 0, "nothing was enabled"
     assert link.quality(NODE).details["boots"] == before
@@ -76,6 +76,6 @@ async def test_the_bus_alone_is_examined_where_nobody_answers(bench: Bench) -> N
         result = await examined(link, 0)
     finally:
         await link.close()
-    assert [cause["code"] for cause in result["causes"]] == ["can_node_silent"]
-    facts = {fact["name"]: fact["actual"] for fact in result["causes"][0]["facts"]}
+    assert [cause.code for cause in result.causes] == ["can_node_silent"]
+    facts = {fact.name: fact.actual for fact in result.causes[0].facts}
     assert facts["other_nodes"] == 0
