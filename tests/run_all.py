@@ -125,12 +125,13 @@ MATRIX = [Check("matrix", [sys.executable, "tests/matrix.py", REPORTS])]
 class Runner:
     """Runs checks one by one, and remembers which failed."""
 
-    def __init__(self, out: IO[str], before: Sequence[str] = ()) -> None:
+    def __init__(self, out: IO[str], before: Sequence[str] = (), behind: int = 0) -> None:
         self.failed: list[str] = []
         self.again: list[Check] = []
         """What failed in suites, to be run once more when nothing else runs."""
         self._out = out
         self._before = before
+        self._behind = behind
         self._environment = os.environ | {
             "PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}",
             "PYTHONUNBUFFERED": "1",
@@ -161,8 +162,9 @@ class Runner:
         whole = [*self._before, *command]
         with subprocess.Popen(
             whole, cwd=folder, env=self._environment, stdout=self._out, stderr=subprocess.STDOUT,
-            process_group=0,
+            start_new_session=True,
         ) as process, _ended_with_this(process):  # fmt: skip
+            _yield_to_others(process.pid, self._behind)
             try:
                 return process.wait(LIMIT_S)
             except subprocess.TimeoutExpired:
@@ -179,7 +181,7 @@ _running: set[int] = set()
 def _ended_with_this(process: subprocess.Popen[bytes]) -> Iterator[None]:
     """Whatever a check has started in its group ends with it.
 
-    A group, not a session: Linux shares the processor between sessions before priorities count.
+    Each is a session of its own: Linux gives every session the same share of the processors.
     """
     _running.add(process.pid)
     try:
@@ -187,6 +189,14 @@ def _ended_with_this(process: subprocess.Popen[bytes]) -> Iterator[None]:
     finally:
         _running.discard(process.pid)
         _end(process.pid)
+
+
+def _yield_to_others(session: int, nice: int) -> None:
+    """Lower the share of a whole session, as priorities count within one only (sched(7))."""
+    if nice:
+        # Not every kernel groups by session.
+        with suppress(OSError):
+            Path(f"/proc/{session}/autogroup").write_text(str(nice), "ascii")
 
 
 def _end(group: int) -> None:
@@ -248,7 +258,7 @@ def run_suites(runner: Runner) -> list[str]:
         tempfile.TemporaryFile("w+", encoding="utf-8") as seen,
         ThreadPoolExecutor() as pool,
     ):
-        parallel, pages = Runner(idle, AT_IDLE), Runner(seen, BEHIND)
+        parallel, pages = Runner(idle, AT_IDLE, 19), Runner(seen, BEHIND, 10)
         # This leaves nothing of two processors: a suite at idle priority would not advance.
         runner.run(TIMED)
         lanes = [pool.submit(pages.run, PAGES), pool.submit(parallel.run, PARALLEL)]
