@@ -185,7 +185,7 @@ def read_table(text: str) -> dict[tuple[Row, str], str]:
 def overstated(cells: Mapping[tuple[Row, str], str], ran: Mapping[str, Ran]) -> list[str]:
     """What the table says and the tests have not shown.
 
-    A test that was skipped here has stated the reason; that is no reason to doubt where it ran.
+    A test that was skipped here has stated the reason; the figures of where it ran still count.
     """
     found = []
     for (row, system), said in cells.items():

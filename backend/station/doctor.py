@@ -128,6 +128,7 @@ class Doctor:
 
         Raises:
             NotAllowed: it was not offered, no drive is connected there, or a drive is enabled.
+            DriveError: another drive of the bus does not answer whether it is enabled.
             Busy: a drive of the bus moves, or its exchange runs or is being changed.
         """
         link, place = self._link(url), (url, station)
@@ -139,7 +140,7 @@ class Doctor:
             raise NotAllowed("station.trial-not-offered", station=station, setting=setting)
         self._reached.pop(place, None)
         with self._bench.exchanges.reserved(url):
-            await self._require_disabled(url)
+            await self._require_disabled(url, connected)
             result = await tried(link, station, profile, trial)
         if result.reached:
             self._reached[place] = profile, trial
@@ -192,13 +193,20 @@ class Doctor:
         self._link(url).attach(station, profile)
         connected.drive.profile = profile
 
-    async def _require_disabled(self, url: str) -> None:
-        """No drive of the bus has power on its motor: the start of an exchange resets them all."""
+    async def _require_disabled(self, url: str, tried: ConnectedDrive) -> None:
+        """No drive of the bus has power on its motor: the start of an exchange resets them all.
+
+        Raises:
+            NotAllowed: one has. DriveError: a drive other than the one ``tried`` does not answer,
+                so that its state is not known.
+        """
         for connected in self._on(url):
             try:
                 state = await connected.axis.state()
             except DriveError:
-                continue  # the station in question may not answer
+                if connected is not tried:
+                    raise
+                continue
             if state in _ENABLED:
                 raise NotAllowed("station.enabled-drive", drive=connected.drive.name)
 

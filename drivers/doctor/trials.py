@@ -17,7 +17,7 @@ MOST = 4
 """Trials of one station: each takes the drive to Operational again."""
 
 _ACTIVATES = (0x0300, 0x0700, 0x0330)
-"""Values of 0980h that drives in use want: SYNC0, SYNC0 and SYNC1, SYNC0 on its pin.
+"""Values of 0980h that drives in use need: SYNC0, SYNC0 and SYNC1, SYNC0 on its pin.
 
 Not 0000h: the bring-up takes a profile that names no mode with a clock to 0300h, so a trial of it
 would change nothing.

@@ -243,10 +243,10 @@ def test_a_setting_is_tried_kept_and_undone(station: Station) -> None:
     station.ok(station.http.delete("/buses/cyclic", params={"url": SEGMENT}))
 
     rows = station.ok(station.http.get("/audit", params={"limit": 100}))["events"]
-    told = [(row["action"], row["target"]) for row in rows if "doctor" in row["target"]]
-    assert ("changed", "/buses/doctor/kept") in told
-    assert ("deleted", "/buses/doctor/kept") in told
-    assert ("made", "/buses/doctor/trials") in told
+    audited = [(row["action"], row["target"]) for row in rows if "doctor" in row["target"]]
+    assert ("changed", "/buses/doctor/kept") in audited
+    assert ("deleted", "/buses/doctor/kept") in audited
+    assert ("made", "/buses/doctor/trials") in audited
 
 
 def test_what_is_not_offered_is_not_tried(station: Station) -> None:

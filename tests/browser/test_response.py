@@ -77,7 +77,7 @@ def test_a_measurement_is_explained(laptop: Page, axis: str) -> None:
     page.get_by_text("What the shape of the curve shows").click()
     expect(page.get_by_text("tighten the coupling, then put a notch")).to_be_visible()
 
-    # Evaluated again from the raw signals, with what it was taken with.
+    # Evaluated again from the raw signals, with the settings of its measurement.
     expect(page.get_by_text("the same result as when it was measured")).to_be_visible()
     page.get_by_text("How it was measured").click()
     expect(page.locator("dl.facts .pair", has_text="torque_percent")).to_contain_text("80")

@@ -97,7 +97,7 @@ def load_side(sides: TwoSides, motor_inertia_kgm2: float | None) -> LoadSide:
     shape = shape_of(sides)
     table = table_of(sides, shape, np.zeros(sides.angle_rad.size))
     first = _fit(table, _flanks(table))
-    # The error over the angle is in the second derivative of the counts, too: taken out, once.
+    # The error over the angle is in the second derivative of the counts, too: subtracted once.
     shown = shape.columns(sides.angle_rad) @ first.errors
     table = table_of(sides, shape, first.counts_per_rad * shown)
     flanks = _flanks(table)

@@ -119,7 +119,7 @@ def shape_of(sides: TwoSides) -> ErrorShape:
 
 
 def table_of(sides: TwoSides, shape: ErrorShape, error_counts: FloatArray) -> Table:
-    """Filtered and thinned; ``error_counts`` [n] are taken out before the load's acceleration.
+    """Filtered and thinned; ``error_counts`` [n] are subtracted before the load's acceleration.
 
     Raises:
         FewSamples: of slow passes or of groups of moves.

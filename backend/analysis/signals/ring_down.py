@@ -69,7 +69,7 @@ class CommonMode:
 
 @dataclass(frozen=True)
 class Parts:
-    """A ring-down taken apart at a given mode: what creeps [n, k], and the sinusoid's amplitude."""
+    """A ring-down split at a given mode: its creep [n, k], and the sinusoid's amplitude."""
 
     creep: FloatArray
     amplitude: FloatArray

@@ -13,6 +13,7 @@ from backend.station.connected_drive import ConnectedDrive
 from drivers.doctor.diagnosis import Cause
 from drivers.doctor.examined import Examination
 from drivers.errors import Busy, DriveError, LinkTimeout, NotAllowed
+from drivers.link import Address
 from profiles.schema import Profile
 from tests.support.memory_link import MemoryLink
 
@@ -33,6 +34,7 @@ class Bus(MemoryLink):
         self.attached: Profile | None = None
         self.running = False
         self.starts = 0
+        self.silent: set[int] = set()
         self.entered, self.gate = asyncio.Event(), asyncio.Event()
         self.gate.set()
 
@@ -40,6 +42,11 @@ class Bus(MemoryLink):
         del station
         assert not self.running, "a profile changes under a running exchange"
         self.attached = profile
+
+    async def read(self, station: int, address: Address) -> bytes:
+        if station in self.silent:
+            raise LinkTimeout("ethercat.drive-not-answer-time")
+        return await super().read(station, address)
 
     async def configure(self, _inputs: object, _outputs: object, _cycle_s: float) -> None:
         self.starts += 1
@@ -141,6 +148,18 @@ async def test_no_trial_beside_an_enabled_axis(bench: Bench, bus: Bus) -> None:
     with pytest.raises(NotAllowed, match="is enabled"):
         await bench.doctor.run(URL, 1, CLOCK, RIGHT)
     assert bus.starts == 0
+
+
+async def test_a_drive_that_does_not_answer_may_be_enabled(bench: Bench, bus: Bus) -> None:
+    await bench.connect(URL, 2, "mms7", "Y")
+    await offer(bench)
+    bus.silent = {2}
+    with pytest.raises(DriveError):
+        await bench.doctor.run(URL, 1, CLOCK, RIGHT)
+    assert bus.starts == 0
+    # The drive on trial itself may be silent: that is what is being looked into.
+    bus.silent = {1}
+    assert (await bench.doctor.run(URL, 1, CLOCK, RIGHT)).reached
 
 
 async def test_a_cancelled_trial_is_undone_and_nothing_moves_meanwhile(

@@ -53,5 +53,5 @@ api-station_station-not-answer = station { $value } of { $url } does not answer
 api-station_training-fault-needs-demo = { $drive }: training faults are for virtual drives
     .remedy = start `servodeck demo` and choose one of its axes
 api-station_try-setting = Try { $setting } = { $after } at station { $station } of { $url }
-api-station_trying-setting = the drive is taken to Operational without being enabled
+api-station_trying-setting = the drive goes to Operational without being enabled
 api-station_wait-for-end = wait until it has ended

@@ -14,7 +14,7 @@ export function flat(settings: Record<string, unknown>): [string, string][] {
   })
 }
 
-/** Where a result comes from: its raw signals evaluated again, and what they were taken with. */
+/** Where a result comes from: its raw signals evaluated again, and the settings of the measurement. */
 export function Origin({ content }: { content: MeasurementContent }) {
   const t = useT()
   const { agrees, differences, info, program, profile_version, settings } = content

@@ -44,7 +44,7 @@ export function PathNav({
                   {i + 1} <span className="path-label">{t(`path.${step}`)}</span>
                 </span>
                 {/* It keeps its place, so that a step that is done or undone moves no other. */}
-                <span style={{ visibility: done[step] ? 'visible' : 'hidden' }}>
+                <span style={{ visibility: done[step] ? 'inherit' : 'hidden' }}>
                   <Icon name="check" size={16} />
                 </span>
               </strong>

@@ -4,6 +4,7 @@ import { api, ask } from '../../api/client'
 import type { ToolInfo } from '../../api/schema'
 import { useLanguage } from '../../i18n'
 import { NumberField } from '../../widgets/NumberField'
+import { unitOf } from './toolUnit'
 
 /** What the form of the limits asks for already. */
 const LIMITS = new Set([
@@ -61,6 +62,17 @@ export function fieldsOf(settings: Record<string, unknown>): Field[] {
 
 export type Values = Record<string, number | boolean | null>
 
+let asked: Promise<ToolInfo[]> | undefined
+
+/** All tools, asked for once; again after a request that failed. */
+function tools(): Promise<ToolInfo[]> {
+  asked ??= ask(api.GET('/api/v1/tools')).catch((error: unknown) => {
+    asked = undefined
+    throw error
+  })
+  return asked
+}
+
 /** A tool as the server describes it, and its texts in the language of the page. */
 export function useTool(kind: string) {
   const [tool, setTool] = useState<ToolInfo | null>(null)
@@ -68,8 +80,8 @@ export function useTool(kind: string) {
   useEffect(() => {
     let current = true
     // Without an answer there is no panel; the page says that the server is silent.
-    ask(api.GET('/api/v1/tools')).then(
-      (tools) => current && setTool(tools.find((each) => each.kind === kind) ?? null),
+    tools().then(
+      (all) => current && setTool(all.find((each) => each.kind === kind) ?? null),
       () => undefined,
     )
     return () => {
@@ -112,7 +124,7 @@ export function ToolForm({
           <NumberField
             key={field.name}
             label={text(`field.${field.name}`)}
-            {...(field.name.endsWith('_rpm') && { unit: 'rpm' })}
+            {...unitOf(field.name, text)}
             {...field.limits}
             value={typeof values[field.name] === 'number' ? (values[field.name] as number) : null}
             onChange={(value) => set(field.name, value)}
