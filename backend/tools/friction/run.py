@@ -20,6 +20,7 @@ from backend.tools.inertia.probe import RoughFit
 from backend.tools.measuring.computing import meanwhile
 from backend.tools.measuring.recording import Recording, cycle_s, require_signals, share
 from backend.tools.moves.go_back import go_back
+from backend.tools.moves.raised_cosine import raised_cosine
 from backend.tools.thresholds import friction_run as threshold
 from backend.tools.tool import Run, Tool
 from drivers.cia402 import Mode
@@ -161,7 +162,7 @@ def speeds_of(stroke: Stroke, rate: float, slow_rps: float) -> tuple[FloatArray,
 
     The axis goes half a stroke back from where it is, and comes back there at the end.
     """
-    half = _positioning(-0.5 * stroke.length_rev, slow_rps, rate)
+    half = raised_cosine(-0.5 * stroke.length_rev, max(stroke.length_rev / slow_rps, 0.4), rate)
     still = np.zeros(round(threshold.DWELL_S * rate))
     n = max(2, round(stroke.ramp_s * rate))
     rise = 0.5 * (1.0 - np.cos(np.pi * (np.arange(n) + 0.5) / n))
@@ -177,12 +178,6 @@ def speeds_of(stroke: Stroke, rate: float, slow_rps: float) -> tuple[FloatArray,
     speed += [-half, still]
     number.append(np.zeros(half.size + still.size))
     return np.concatenate(speed) * 60.0, np.concatenate(number)
-
-
-def _positioning(distance_rev: float, peak_rps: float, rate: float) -> FloatArray:
-    n = round(max(2.0 * abs(distance_rev) / peak_rps, 0.4) * rate)
-    shape = 1.0 - np.cos(_TURN * (np.arange(n) + 0.5) / n)
-    return np.asarray(shape * distance_rev / (n / rate))
 
 
 async def run(run: Run, settings: FrictionSettings) -> FrictionResult:

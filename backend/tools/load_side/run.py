@@ -23,6 +23,7 @@ from backend.tools.load_side.texts import TEXTS, report
 from backend.tools.measuring.computing import meanwhile
 from backend.tools.measuring.recording import Recording, cycle_s, require_signals, share
 from backend.tools.moves.go_back import go_back
+from backend.tools.moves.raised_cosine import raised_cosine
 from backend.tools.thresholds import load_side_run as threshold
 from backend.tools.tool import Run, Tool
 from drivers.cia402 import Mode
@@ -78,8 +79,10 @@ def planned(settings: LoadSideSettings, room: Room, rate: float) -> Plan:
     needed_rps = threshold.PASSES * range_rev / left_s if left_s > 0.0 else np.inf
     slow_rps = max(min(asked / 60.0, fastest_rps), needed_rps)
     if slow_rps > fastest_rps:
+        longest_s = room.time_s - left_s + threshold.PASSES * range_rev / fastest_rps
         raise OutOfRange(
-            "load-side.no-time", value=room.time_s, limit="", range_rev=range_rev,
+            "load-side.no-time", value=round(longest_s, 1), limit=f"{room.time_s:g} s",
+            range_rev=range_rev,
         )  # fmt: skip
     slow_rpm, slow_part = _passes(range_rev, slow_rps, fastest_rps, rate)
     return Plan(slow_rpm, slow_part, moves_rpm, moves_part)
@@ -149,9 +152,8 @@ def _moves(peak_rps: float, quarter_s: float, rate: float) -> tuple[FloatArray, 
 
 
 def _positioning(distance_rev: float, peak_rps: float, rate: float) -> FloatArray:
-    n = round(max(2.0 * abs(distance_rev) / peak_rps, threshold.POSITIONING_S) * rate)
-    shape = 1.0 - np.cos(_TURN * (np.arange(n) + 0.5) / n)
-    return np.asarray(shape * distance_rev / (n / rate))
+    duration_s = max(2.0 * abs(distance_rev) / peak_rps, threshold.POSITIONING_S)
+    return raised_cosine(distance_rev, duration_s, rate)
 
 
 async def run(run: Run, settings: LoadSideSettings) -> LoadSideResult:

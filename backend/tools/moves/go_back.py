@@ -10,12 +10,11 @@ from backend.axis.axis import Axis, Envelope
 from backend.axis.cyclic import CyclicSession
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Play, bus_limits, cycle_s, enabled, play, quiet
+from backend.tools.moves.raised_cosine import raised_cosine
 from backend.tools.thresholds import moves_go_back as threshold
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, exceeded
 from drivers.halt import HaltCause
-
-_TURN = 2 * np.pi
 
 
 async def go_back(
@@ -67,9 +66,7 @@ async def _move(
     # Peak speed of a raised cosine is twice its mean.
     highest_rps = 0.25 * envelope.speed_rpm / 60.0
     duration_s = slower * max(2.0 * abs(distance) / highest_rps, 0.4)
-    n = round(duration_s * rate)
-    turn = (np.arange(n) + 0.5) / n
-    speed_rpm = distance / duration_s * 60.0 * (1.0 - np.cos(_TURN * turn))
+    speed_rpm = 60.0 * raised_cosine(distance, duration_s, rate)
     values = np.array([units.velocity_raw(v) for v in speed_rpm], dtype=np.int64)
     values = np.concatenate([values, np.zeros(round(0.1 * rate), dtype=np.int64)])
     limits = await bus_limits(axis, envelope, goal_raw)
