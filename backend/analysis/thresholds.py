@@ -89,6 +89,8 @@ class load_side:
     SEPARABLE = 0.02
     """[ratio] Share of the flanks' variance that direction and acceleration must leave. Origin:
     28457f47."""
+    CONDITION = 1e10
+    """[ratio] Of normal equations that are solved and refined once. Origin: IEEE 754 double."""
     # TRIMMED, OUTSIDE, MOST_OUTSIDE: So often samples are left out that lie so many deviations off,
     # as they bounce or cross the gap, unless they are more than this share.
     TRIMMED = 2

@@ -2,9 +2,10 @@
 
 The kernel copies every EtherCAT frame of the interface, sent and received, with its time in
 nanoseconds; this process only collects the copies. It runs next to the host process at low
-priority, so that nothing of it comes into the cycle. Lines of JSON come on the control socket:
-``{"note": TEXT, "station": N, "time_ns": T}`` and ``{"file": true, "station": N}``; the answer to
-the latter is a length of 8 bytes, little endian, and the pcapng file.
+priority, so that nothing of it comes into the cycle. It first writes `READY`. Lines of JSON come
+on the control socket: ``{"note": TEXT, "station": N, "time_ns": T}`` and ``{"file": true,
+"station": N}``; the answer to the latter is a length of 8 bytes, little endian, and the pcapng
+file.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from drivers.flight.ring import FrameRing
 
 _ALL, _NICE = 0x0003, 10
 _TIMESTAMP_NS, _RECEIVE_BUFFER = 35, 8 << 20
+READY = b"ready\n"
 _OUTGOING = 4
 """sll_pkttype of packet(7): sent by this computer."""
 _AGAIN_S, _BATCH, _LONGEST = 1.0, 256, 1600
@@ -44,8 +46,12 @@ class Recorder:
         self._sending = threading.Lock()
 
     def run(self) -> None:
-        """Until the control socket closes."""
-        retry_s = 0.0
+        """Until the control socket closes. Says `READY` once the wire is being listened to."""
+        self._wire, retry_s = open_wire(self._interface), time.monotonic() + _AGAIN_S
+        with contextlib.suppress(OSError):
+            self._control.sendall(READY)
+        # Only now: a busy computer would keep the first frames of a bus from being recorded.
+        yield_processor(_NICE)
         while True:
             now = time.monotonic()
             if self._wire is None and now >= retry_s:
@@ -127,7 +133,6 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--control", type=int, required=True, help="descriptor of the socket")
     options = parser.parse_args(argv)
     ignore_interrupt()
-    yield_processor(_NICE)
     Recorder(options.interface, socket.socket(fileno=options.control)).run()
     return 0
 

@@ -12,9 +12,10 @@ import time
 from collections.abc import Sequence
 
 from drivers.errors import LinkLost
+from drivers.flight.process import READY
 
 _LENGTH = struct.Struct("<Q")
-_FILE_S, _END_S = 30.0, 2.0
+_FILE_S, _START_S, _END_S = 30.0, 10.0, 2.0
 
 
 class SegmentRecorder:
@@ -33,7 +34,10 @@ class SegmentRecorder:
         return None if self._process is None else self._process.pid
 
     async def start(self) -> None:
-        """Begin to record; a computer that has no room for the process records nothing."""
+        """Begin to record, before the first frame that follows.
+
+        A computer that has no room for the process, or no time for it, records nothing.
+        """
         ours, theirs = socket.socketpair()
         try:
             with theirs:
@@ -43,8 +47,11 @@ class SegmentRecorder:
                     pass_fds=(theirs.fileno(),), stdin=asyncio.subprocess.DEVNULL,
                 )  # fmt: skip
             self._streams = await asyncio.open_connection(sock=ours)
-        except OSError:
+            async with asyncio.timeout(_START_S):
+                await self._streams[0].readexactly(len(READY))
+        except (OSError, asyncio.IncompleteReadError):
             ours.close()
+            await self.stop()
 
     def note(self, text: str, station: int | None = None) -> None:
         """A remark for the next frame."""

@@ -211,7 +211,9 @@ def _in_contact(table: Table, flanks: FloatArray) -> BoolArray:
     kept = np.ones(table.counts.size, dtype=np.bool_)
     for _ in range(threshold.TRIMMED):
         rest = _residual(table, flanks, kept)
-        spread = scipy.stats.median_abs_deviation(rest[kept & table.moves], scale="normal")
+        moving = rest[kept & table.moves]
+        # Median deviation, as the standard deviation of a normal distribution.
+        spread = 1.4826 * np.median(np.abs(moving - np.median(moving)))
         least = threshold.COUNTS
         off = np.abs(rest) > threshold.OUTSIDE * max(spread, least)
         if np.mean(off[table.moves]) > threshold.MOST_OUTSIDE:
@@ -231,9 +233,16 @@ def _design(table: Table, flanks: FloatArray) -> tuple[FloatArray, BoolArray]:
 
 
 def _solved(columns: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Least squares; by the normal equations, refined once, where their condition allows."""
     size = np.sqrt(np.mean(columns**2, axis=0))
     size[size == 0.0] = 1.0
-    return np.asarray(np.linalg.lstsq(columns / size, wanted, rcond=None)[0] / size)
+    scaled = columns / size
+    normal = scaled.T @ scaled
+    if np.linalg.cond(normal) > threshold.CONDITION:
+        return np.asarray(np.linalg.lstsq(scaled, wanted, rcond=None)[0] / size)
+    found = np.linalg.solve(normal, scaled.T @ wanted)
+    found += np.linalg.solve(normal, scaled.T @ (wanted - scaled @ found))
+    return np.asarray(found / size)
 
 
 def _fit(table: Table, flanks: FloatArray) -> _Fit:

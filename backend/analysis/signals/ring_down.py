@@ -11,8 +11,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.stats import t as student
+import scipy
 
 from backend.analysis.signals.arrays import BoolArray, FloatArray
 from backend.analysis.thresholds import ring_down as threshold
@@ -103,7 +102,9 @@ def fit_mode(ring: RingDown, low_hz: float, high_hz: float) -> ModeFit | None:
         np.log([low_hz, threshold.DAMPING_ENDS[0]]),
         np.log([high_hz, threshold.DAMPING_ENDS[1]]),
     )
-    found = least_squares(left, np.clip(begin, *ends), bounds=ends, x_scale=(0.01, 0.5))
+    found = scipy.optimize.least_squares(
+        left, np.clip(begin, *ends), bounds=ends, x_scale=(0.01, 0.5)
+    )
     frequency, damping = float(np.exp(found.x[0])), float(np.exp(found.x[1]))
     base = _base(time, frequency, damping)
     solved = _solved(base[seen], ring.signals[seen])
@@ -175,7 +176,7 @@ def mode_of(fits: list[ModeFit]) -> Mode:
     fits say of themselves.
     """
     count = len(fits)
-    factor = float(student.ppf(0.975, count - 1)) if count > 1 else math.inf
+    factor = float(scipy.special.stdtrit(count - 1, 0.975)) if count > 1 else math.inf
 
     def half(values: FloatArray, stds: FloatArray) -> float:
         scatter = factor * float(np.std(values, ddof=1)) / math.sqrt(count)

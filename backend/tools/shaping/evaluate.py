@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import t as student
+import scipy
 
 from backend.analysis.signals import shaper as shapers
 from backend.analysis.signals.arrays import FloatArray
@@ -337,7 +337,7 @@ def _mean_or_none(values: list[float | None]) -> float | None:
 def _interval(values: FloatArray) -> Interval:
     if values.size < 2:
         return (None, None)
-    factor = float(student.ppf(0.975, values.size - 1))
+    factor = float(scipy.special.stdtrit(values.size - 1, 0.975))
     half = factor * float(np.std(values, ddof=1)) / math.sqrt(values.size)
     return (max(float(np.mean(values)) - half, 0.0), float(np.mean(values)) + half)
 

@@ -12,6 +12,7 @@ from pydantic import TypeAdapter
 from backend.commands.tools import lines_of
 from backend.tools.autotune.result import AutotuneAnswer
 from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, autotune
+from backend.tools.autotune.tool import answer_of as answer_of_autotune
 from backend.tools.inertia.evaluation import InertiaSettings, answer_of
 from backend.tools.inertia.run import TOOL as INERTIA
 from backend.tools.inertia.run import inertia
@@ -115,7 +116,7 @@ async def test_autotune_of_a_family_and_back(drive: str) -> None:
         for key, raw in result.before.items():
             assert await b.axis.drive.raw(key) == raw
         published = TypeAdapter[ToolOutcome](ToolOutcome).validate_json(
-            answer_of(result).model_dump_json()
+            answer_of_autotune(result).model_dump_json()
         )
         assert isinstance(published, AutotuneAnswer)
         assert published.before == result.before
