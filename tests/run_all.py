@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import uuid
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -28,9 +29,8 @@ BIN = Path(sys.executable).parent
 NPM = ["npm"] if shutil.which("npm") else [sys.executable, str(ROOT / "hatch_build.py")]
 
 PYTEST = [sys.executable, "-m", "pytest", "-q", "-rs", "--durations=12"]
-#: Suites with a bus in real time. They wait for most of their time, so that the pages may be tested
-#: next to them, but no more: a master that is kept from its cycle for 30 ms must brake the axis,
-#: and then the test does not see what it wants to see.
+#: Suites with a bus in real time. Nothing runs next to them: a master that is kept from its cycle
+#: for 30 ms must brake the axis, and then the test does not see what it wants to see.
 REAL_TIME = [
     "tests/api/test_ethercat.py", "tests/api/test_ethercat_faults.py",
     "tests/api/test_ethercat_segment.py", "tests/api/test_every_family.py",
@@ -38,7 +38,7 @@ REAL_TIME = [
     "tests/api/test_scope_streams.py", "tests/api/test_scope_soak.py",
     "tests/api/test_stop_floods.py", "tests/api/test_scales_taught.py", "tests/docs",
 ]  # fmt: skip
-#: Suites that compute and keep no time: what the others leave of the machine is enough for them.
+#: Suites that compute and keep no time: what the pages leave of the machine is enough for them.
 PATIENT = [
     "tests/profiles", "tests/unit", "tests/virtual/conformance", "tests/virtual/firmware",
     # Measurements and tunings whose buses follow the frames, however late they come.
@@ -46,12 +46,6 @@ PATIENT = [
     "tests/virtual/tools/test_families.py", "tests/virtual/tools/test_notches.py",
     "tests/virtual/tools/test_play.py", "tests/virtual/tools/test_wrong_situations.py",
 ]  # fmt: skip
-#: Runs only while nothing else wants to (SCHED_IDLE), so that no bus is kept waiting for it.
-AT_IDLE = ["chrt", "--idle", "0"]
-#: Yields to the buses in real time, and still gets what they leave.
-BEHIND = ["nice", "-n", "10"]
-
-
 #: No check takes as long, in s: one that does hangs, and ends with all that it has started.
 LIMIT_S = 2400.0
 #: Of every suite what ran, as JUnit XML.
@@ -114,8 +108,8 @@ TIMED = [
 BUSES = [pytest("EtherCAT tests", *REAL_TIME)]
 PAGES = [pytest("browser tests", "-m", "browser", "tests/browser")]
 PARALLEL = [
-    # Workers write to a pipe: tests of full disks bound the length of files. At idle priority a
-    # test may stand still for minutes, which is no hanging.
+    # Workers write to a pipe: tests of full disks bound the length of files. Next to the pages a
+    # test takes much longer than alone, which is no hanging.
     pytest("patient tests", *TWO, "--timeout=900", *PATIENT),
 ]
 #: Whether the documentation says no more than what has just run.
@@ -125,12 +119,12 @@ MATRIX = [Check("matrix", [sys.executable, "tests/matrix.py", REPORTS])]
 class Runner:
     """Runs checks one by one, and remembers which failed."""
 
-    def __init__(self, out: IO[str], before: Sequence[str] = (), behind: int = 0) -> None:
+    def __init__(self, out: IO[str], behind: int = 0) -> None:
+        """``behind`` is the nice value of what runs, as a whole, next to other checks."""
         self.failed: list[str] = []
         self.again: list[Check] = []
         """What failed in suites, to be run once more when nothing else runs."""
         self._out = out
-        self._before = before
         self._behind = behind
         self._environment = os.environ | {
             "PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}",
@@ -159,11 +153,11 @@ class Runner:
         print(line, file=self._out, flush=True)
 
     def _once(self, command: Sequence[str], folder: Path) -> int:
-        whole = [*self._before, *command]
+        mark = str(uuid.uuid4())
         with subprocess.Popen(
-            whole, cwd=folder, env=self._environment, stdout=self._out, stderr=subprocess.STDOUT,
-            start_new_session=True,
-        ) as process, _ended_with_this(process):  # fmt: skip
+            command, cwd=folder, env=self._environment | {MARK: mark}, stdout=self._out,
+            stderr=subprocess.STDOUT, start_new_session=True,
+        ) as process, _ended_with_this(process.pid, mark):  # fmt: skip
             _yield_to_others(process.pid, self._behind)
             try:
                 return process.wait(LIMIT_S)
@@ -174,21 +168,20 @@ class Runner:
 
 HANGS = 124
 """The exit code of a check that was ended, as of timeout(1)."""
-_running: set[int] = set()
+MARK = "SERVODECK_CHECK"
+"""Environment variable that every process of a check inherits, whatever session it makes."""
+_running: dict[str, int] = {}
 
 
 @contextmanager
-def _ended_with_this(process: subprocess.Popen[bytes]) -> Iterator[None]:
-    """Whatever a check has started in its group ends with it.
-
-    Each is a session of its own: Linux gives every session the same share of the processors.
-    """
-    _running.add(process.pid)
+def _ended_with_this(group: int, mark: str) -> Iterator[None]:
+    """Whatever a check has started ends with it, virtual drives in sessions of their own too."""
+    _running[mark] = group
     try:
         yield
     finally:
-        _running.discard(process.pid)
-        _end(process.pid)
+        del _running[mark]
+        _end(group, mark)
 
 
 def _yield_to_others(session: int, nice: int) -> None:
@@ -199,14 +192,20 @@ def _yield_to_others(session: int, nice: int) -> None:
             Path(f"/proc/{session}/autogroup").write_text(str(nice), "ascii")
 
 
-def _end(group: int) -> None:
+def _end(group: int, mark: str) -> None:
     with suppress(ProcessLookupError):
         os.killpg(group, signal.SIGKILL)
+    wanted = f"{MARK}={mark}".encode()
+    for folder in Path("/proc").glob("[0-9]*"):
+        # Processes of others, and those that end meanwhile.
+        with suppress(OSError):
+            if wanted in (folder / "environ").read_bytes().split(b"\0"):
+                os.kill(int(folder.name), signal.SIGKILL)
 
 
 def _interrupted(number: int, _frame: FrameType | None) -> None:
-    for group in tuple(_running):
-        _end(group)
+    for mark, group in tuple(_running.items()):
+        _end(group, mark)
     os._exit(128 + number)
 
 
@@ -252,30 +251,26 @@ def run_quick(runner: Runner) -> None:
 
 
 def run_suites(runner: Runner) -> list[str]:
-    """Run the timed suite, then the others in three lanes; returns who failed twice."""
+    """Run what keeps time alone, then the pages next to what computes; returns who failed twice."""
+    runner.run([*TIMED, *BUSES])
     with (
-        tempfile.TemporaryFile("w+", encoding="utf-8") as idle,
-        tempfile.TemporaryFile("w+", encoding="utf-8") as seen,
+        tempfile.TemporaryFile("w+", encoding="utf-8") as printed,
         ThreadPoolExecutor() as pool,
     ):
-        parallel, pages = Runner(idle, AT_IDLE, 19), Runner(seen, BEHIND, 10)
-        # This leaves nothing of two processors: a suite at idle priority would not advance.
-        runner.run(TIMED)
-        lanes = [pool.submit(pages.run, PAGES), pool.submit(parallel.run, PARALLEL)]
-        runner.run(BUSES)
-        for lane in lanes:
-            lane.result()
-        for printed in (seen, idle):
-            printed.seek(0)
-            shutil.copyfileobj(printed, sys.stdout)
-    again = [*runner.again, *pages.again, *parallel.again]
+        parallel = Runner(printed, behind=10)
+        lane = pool.submit(parallel.run, PARALLEL)
+        runner.run(PAGES)
+        lane.result()
+        printed.seek(0)
+        shutil.copyfileobj(printed, sys.stdout)
+    again = [*runner.again, *parallel.again]
     if again:
         alone = Runner(sys.stdout)
         print("== once more, alone", flush=True)
         alone.run(again, last=True)
         runner.failed += alone.failed
     runner.run(MATRIX)
-    return runner.failed + pages.failed + parallel.failed
+    return runner.failed + parallel.failed
 
 
 if __name__ == "__main__":

@@ -334,11 +334,11 @@ def _station(
                 rx_errors=port.rx_errors,
                 invalid_frames=port.invalid_frames,
                 forwarded_errors=port.forwarded_errors,
-                findings=[f.text for f in own if f.port == number],
+                findings=[f.text.words(language()) for f in own if f.port == number],
             )
             for number, port in enumerate(seen.ports)
         ],
-        findings=[f.text for f in own if f.port is None],
+        findings=[f.text.words(language()) for f in own if f.port is None],
         notes=list(seen.notes),
         foe=bool(spec and spec.foe),
     )

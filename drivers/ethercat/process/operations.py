@@ -280,7 +280,7 @@ class Operations:
         found = esc.findings(known, upstream)
         return {
             "ports": [asdict(p) for p in known],
-            "findings": [asdict(finding) for finding in found],
+            "findings": [asdict(finding) | {"text": finding.text.to_wire()} for finding in found],
             "stations": [
                 self._found(station)
                 | {

@@ -82,7 +82,11 @@ def survey_from(answer: Message) -> Survey:
     """From the host's answer to "counters"."""
     ports = {item["station"]: _ports(item) for item in answer["ports"]}
     stations = tuple(_station(item, ports.get(item["station"])) for item in answer["stations"])
-    return Survey(stations, tuple(Finding(**item) for item in answer["findings"]))
+    findings = (
+        Finding(item["station"], item["port"], Text.from_wire(item["text"]))
+        for item in answer["findings"]
+    )
+    return Survey(stations, tuple(findings))
 
 
 def exchange_from(status: Message) -> ExchangeFigures | None:

@@ -8,10 +8,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from drivers.texts.message import Text, text
+
 DL_STATUS = 0x0110
 ERROR_COUNTERS = 0x0300
 ERROR_COUNTERS_SIZE = 20
 TIME_DIFFERENCE = 0x092C
+_MOST = 255
+"""Where a counter stops."""
 
 #: A frame goes through the open ports of a slave in this order.
 _PORT_ORDER = (0, 3, 1, 2)
@@ -41,11 +45,11 @@ class PortCounters:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a counter accuses, as text; ``port`` is None for what belongs to no cable."""
+    """What a counter accuses; ``port`` is None for what belongs to no cable."""
 
     station: int
     port: int | None
-    text: str
+    text: Text
 
 
 def decode_time_difference(register: bytes) -> int:
@@ -95,7 +99,7 @@ def parents(stations: Sequence[PortCounters]) -> dict[int, tuple[int, int]]:
 def findings(
     stations: Sequence[PortCounters], upstream: Mapping[int, tuple[int, int]]
 ) -> list[Finding]:
-    """Which cable or connector the counters accuse, as text; empty when nothing is wrong.
+    """Which cable or connector the counters accuse; empty when nothing is wrong.
 
     ``upstream`` is what `parents` reported while every station answered: while a cable is cut its
     ports no longer say what is behind them.
@@ -111,42 +115,32 @@ def findings(
             parent = upstream.get(here.station, (0, 0))[0]
             other = parent if number == 0 else before.get((here.station, number))
             found += _port_findings(here.station, number, port, other)
-        if here.processing_errors:
-            text = (
-                f"station {here.station}: {here.processing_errors} frames that are not EtherCAT;"
-                " something else sends on this segment"
-            )
-            found.append(Finding(here.station, None, text))
-        if here.pdi_errors:
-            text = (
-                f"station {here.station}: {here.pdi_errors} errors between its EtherCAT chip and"
-                " its processor; a fault inside the drive"
-            )
-            found.append(Finding(here.station, None, text))
+        for code, count in (
+            ("ethercat.frames-not-ethercat", here.processing_errors),
+            ("ethercat.errors-inside-drive", here.pdi_errors),
+        ):
+            if count:
+                said = text(code, station=here.station, times=count)
+                found.append(Finding(here.station, None, said))
     return found
 
 
 def _port_findings(station: int, number: int, port: Port, other: int | None) -> list[Finding]:
     cable = _cable(station, number, other)
-    own = max(port.invalid_frames + port.rx_errors - port.forwarded_errors, 0)
-    found = []
-    if port.lost_links:
-        text = f"{cable}: the link was lost {_times(port.lost_links)}; check plug and cable"
-        found.append(Finding(station, number, text))
-    if own:
-        text = f"{cable}: damaged frames arrived {_times(own)}; check cable, screen and earth"
-        found.append(Finding(station, number, text))
-    return found
+    own = min(max(port.invalid_frames + port.rx_errors - port.forwarded_errors, 0), _MOST)
+    counts = (("ethercat.link-lost", port.lost_links), ("ethercat.frames-damaged", own))
+    return [
+        Finding(station, number, text(code, cable=cable, times=count))
+        for code, count in counts
+        if count
+    ]
 
 
-def _times(count: int) -> str:
-    return f"{count} time{'' if count == 1 else 's'}" if count < 255 else "255 times or more"
-
-
-def _cable(station: int, port: int, other: int | None) -> str:
+def _cable(station: int, port: int, other: int | None) -> Text:
     if other is None:
-        return f"station {station}, port {port} (nothing behind it)"
-    if port == 0:
-        before = "the computer" if other == 0 else f"station {other}"
-        return f"cable between {before} and station {station}"
-    return f"cable between station {station} and station {other}"
+        return text("ethercat.port-open", station=station, port=port)
+    if port != 0:
+        return text("ethercat.cable-between", station=station, other=other)
+    if other == 0:
+        return text("ethercat.cable-from-computer", station=station)
+    return text("ethercat.cable-between", station=other, other=station)

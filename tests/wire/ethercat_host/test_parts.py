@@ -188,7 +188,7 @@ def test_counters_name_the_cable() -> None:
     counters[17] = 2  # port 1: lost links
     line = [ports(1, 1), ports(2, 1, counters=bytes(counters)), ports(3)]
     found = esc.findings(line, esc.parents(line))
-    assert [finding.text for finding in found] == [
+    assert [finding.text.words() for finding in found] == [
         "cable between station 1 and station 2: damaged frames arrived 7 times;"
         " check cable, screen and earth",
         "cable between station 2 and station 3: the link was lost 2 times; check plug and cable",

@@ -12,6 +12,8 @@ ethercat_belongs-cyclic-exchange-runs = { NUM($index, format: "04X") }:{ NUM($su
 ethercat_bytes-not-fit-mailbox = { $payload_count_bytes } bytes do not fit the mailbox of { $size_bytes } bytes
 ethercat_bytes-not-switch-off = { $now } of { $bytes } bytes: do not switch off
 ethercat_bytes-outputs-station = { $bytes } bytes of outputs for { $size } of station { $station }
+ethercat_cable-between = cable between station { $station } and station { $other }
+ethercat_cable-from-computer = cable between the computer and station { $station }
 ethercat_came-bytes-type = { $address } came with { $bytes } bytes, its type { $type } has { $size }
     .remedy = the drive's firmware may be of another version: compare with its dictionary
 ethercat_cannot-interface-names-letters = { QUOTED($interface) } cannot be an interface: names have 1 to { $name_limit } letters
@@ -105,6 +107,11 @@ ethercat_eeprom-size-unknown = the EEPROM states a size of { $stated } bytes, wh
 ethercat_eeprom-state = station { $station } is in { $state_name }: its EEPROM is written in INIT or PREOP only
     .remedy = end what uses the drive, and scan
 ethercat_eeprom-written = { $words } of { $count } words written: do not switch off
+ethercat_errors-inside-drive =
+    station { $station }: { $times ->
+        [one] { $times } error
+       *[other] { $times } errors
+    } between its EtherCAT chip and its processor; a fault inside the drive
 ethercat_ethercat-process-cannot-started = the EtherCAT process for { $interface } cannot be started: { $strerror }
     .remedy = check memory, disk and open files of this computer
 ethercat_ethercat-process-ended = the EtherCAT process ended
@@ -134,11 +141,28 @@ ethercat_foe-8010 = the file header is missing
 ethercat_foe-8011 = flash memory error
 ethercat_foe-8012 = the file is not compatible
 ethercat_foe-other = a reason of the maker's own
+ethercat_frames-damaged =
+    { $cable }: damaged frames arrived { $times ->
+        [one] { $times } time
+        [255] 255 times or more
+       *[other] { $times } times
+    }; check cable, screen and earth
+ethercat_frames-not-ethercat =
+    station { $station }: { $times ->
+        [one] { $times } frame that is not EtherCAT
+       *[other] { $times } frames that are not EtherCAT
+    }; something else sends on this segment
 ethercat_going-boot = going to BOOT
 ethercat_interface-gone = the interface { $interface } has disappeared
     .remedy = it is opened again automatically once it is back
 ethercat_interface-not-open = the interface { $interface } is not open
 ethercat_interface-not-opened = the interface { $interface } could not be opened ({ $check })
+ethercat_link-lost =
+    { $cable }: the link was lost { $times ->
+        [one] { $times } time
+        [255] 255 times or more
+       *[other] { $times } times
+    }; check plug and cable
 ethercat_message-bytes-between-our = a message of { $length_bytes } bytes between our processes
 ethercat_more-slaves-segment = more than { $max_stations } slaves on one segment
 ethercat_motion-ended = the motion was ended
@@ -162,6 +186,7 @@ ethercat_op-needs-cyclic-data = OP needs cyclic data
     .remedy = start the cyclic exchange
 ethercat_part-drive-description-itself = a part of the drive's description of itself is missing
     .remedy = read it again; or make the profile from its ESI file
+ethercat_port-open = station { $station }, port { $port } (nothing behind it)
 ethercat_process-closed = closed
 ethercat_process-data-all-drives = the process data of all drives take { $expected_bytes } bytes, { $io_map_bytes } are possible
     .remedy = map fewer signals or use fewer drives at a time
@@ -172,8 +197,8 @@ ethercat_process-data-not-mapped = the process data could not be mapped: { $repo
 ethercat_process-ended = the EtherCAT process was ended
 ethercat_process-not-opened = not opened
 ethercat_process-open = open
-ethercat_process-unreadable = the EtherCAT process sent what cannot be read ({ $cause })
 ethercat_process-starting = starting
+ethercat_process-unreadable = the EtherCAT process sent what cannot be read ({ $cause })
 ethercat_refused-after-bytes = { $cause }, after { $sent_bytes } of { $size_bytes } bytes
 ethercat_request-cannot-carried-out = a request that cannot be carried out ({ QUOTED($cause) })
 ethercat_segment-busy = the segment is busy

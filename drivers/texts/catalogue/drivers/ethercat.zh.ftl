@@ -12,6 +12,8 @@ ethercat_belongs-cyclic-exchange-runs = 循环交换运行时 { NUM($index, form
 ethercat_bytes-not-fit-mailbox = { $payload_count_bytes } 字节超出 { $size_bytes } 字节的邮箱
 ethercat_bytes-not-switch-off = { $bytes } 字节中的 { $now }：请勿断电
 ethercat_bytes-outputs-station = 站 { $station } 的输出为 { $bytes } 字节，应为 { $size }
+ethercat_cable-between = 站 { $station } 与站 { $other } 之间的电缆
+ethercat_cable-from-computer = 计算机与站 { $station } 之间的电缆
 ethercat_came-bytes-type = { $address } 收到 { $bytes } 字节，其类型 { $type } 为 { $size } 字节
     .remedy = 驱动器固件可能为其他版本：请与其对象字典比较
 ethercat_cannot-interface-names-letters = { QUOTED($interface) } 不能是接口：名称为 1 至 { $name_limit } 个字符
@@ -105,6 +107,7 @@ ethercat_eeprom-size-unknown = EEPROM 声明的大小为 { $stated } 字节，�
 ethercat_eeprom-state = 站 { $station } 处于 { $state_name }：EEPROM 只能在 INIT 或 PREOP 中写入
     .remedy = 请结束对该驱动器的使用，然后扫描
 ethercat_eeprom-written = 已写入 { $words } / { $count } 个字：请勿断电
+ethercat_errors-inside-drive = 站 { $station }：其 EtherCAT 芯片与处理器之间有 { $times } 个错误；驱动器内部故障
 ethercat_ethercat-process-cannot-started = 无法启动 { $interface } 的 EtherCAT 进程：{ $strerror }
     .remedy = 请检查本计算机的内存、磁盘和打开的文件
 ethercat_ethercat-process-ended = EtherCAT 进程已结束
@@ -134,11 +137,22 @@ ethercat_foe-8010 = 缺少文件头
 ethercat_foe-8011 = 闪存错误
 ethercat_foe-8012 = 文件不兼容
 ethercat_foe-other = 厂家自定的原因
+ethercat_frames-damaged =
+    { $cable }：收到损坏的帧 { $times ->
+        [255] 255 次或更多
+       *[other] { $times } 次
+    }；请检查电缆、屏蔽和接地
+ethercat_frames-not-ethercat = 站 { $station }：收到 { $times } 个非 EtherCAT 帧；该网段上有其他设备在发送
 ethercat_going-boot = 正在进入 BOOT
 ethercat_interface-gone = 接口 { $interface } 已断开
     .remedy = 恢复后会自动重新打开
 ethercat_interface-not-open = 接口 { $interface } 未打开
 ethercat_interface-not-opened = 无法打开接口 { $interface }（{ $check }）
+ethercat_link-lost =
+    { $cable }：链路中断 { $times ->
+        [255] 255 次或更多
+       *[other] { $times } 次
+    }；请检查插头和电缆
 ethercat_message-bytes-between-our = 进程间的消息有 { $length_bytes } 字节
 ethercat_more-slaves-segment = 一个网段上超过 { $max_stations } 个从站
 ethercat_motion-ended = 运动已结束
@@ -162,6 +176,7 @@ ethercat_op-needs-cyclic-data = OP 需要循环数据
     .remedy = 请启动循环交换
 ethercat_part-drive-description-itself = 驱动器自身描述缺少一部分
     .remedy = 请重新读取；或由其 ESI 文件生成配置文件
+ethercat_port-open = 站 { $station } 的端口 { $port }（其后无设备）
 ethercat_process-closed = 已关闭
 ethercat_process-data-all-drives = 所有驱动器的过程数据共 { $expected_bytes } 字节，最多 { $io_map_bytes } 字节
     .remedy = 请映射较少的信号，或同时使用较少的驱动器
@@ -172,8 +187,8 @@ ethercat_process-data-not-mapped = 无法映射过程数据：{ $reported }
 ethercat_process-ended = EtherCAT 进程已结束
 ethercat_process-not-opened = 未打开
 ethercat_process-open = 已打开
-ethercat_process-unreadable = EtherCAT 进程发送了无法读取的内容（{ $cause }）
 ethercat_process-starting = 正在启动
+ethercat_process-unreadable = EtherCAT 进程发送了无法读取的内容（{ $cause }）
 ethercat_refused-after-bytes = { $cause }，在 { $size_bytes } 字节中的第 { $sent_bytes } 字节之后
 ethercat_request-cannot-carried-out = 请求无法执行（{ QUOTED($cause) }）
 ethercat_segment-busy = 网段正忙
