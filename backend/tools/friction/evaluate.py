@@ -300,8 +300,9 @@ def _ripple(
     k = np.arange(1, orders + 1)
     fits = () if friction is None else (friction.best, *friction.alike)
     both = np.array([
-        [_orders(way, k, rate, inertia, s) for s in [f.slope(way.rpm) for f in fits] or [0.0]]
+        [_acting(amplitude, way.rpm, inertia, s) for s in [f.slope(way.rpm) for f in fits] or [0.0]]
         for way in ways if way is not None
+        for amplitude in [_orders(way, k, rate)]
     ])  # fmt: skip
     forward, backward = both[:, 0]
     # What the loop's delay shifts, it shifts to the other side in the other direction.
@@ -319,13 +320,8 @@ def _ripple(
     return _Ripple(k, mean, np.where(stands_out, deviation, chance), stands_out)
 
 
-def _orders(
-    plateau: _Plateau, k: npt.NDArray[np.int64], rate: float, inertia: float, slope: float
-) -> npt.NDArray[np.complex128]:
-    """Complex amplitudes by least squares, without what the motor's own swinging takes.
-
-    ``slope`` is that of friction over speed, in % per rpm.
-    """
+def _orders(plateau: _Plateau, k: npt.NDArray[np.int64], rate: float) -> npt.NDArray[np.complex128]:
+    """Complex amplitudes of the torque and of the angle [k, 2] by least squares."""
     angle, torque = plateau.angle[plateau.valid], plateau.torque[plateau.valid]
     time = np.flatnonzero(plateau.valid) / rate
     trend = np.column_stack([np.ones(angle.size), time - time.mean()])
@@ -333,10 +329,19 @@ def _orders(
     if np.all(plateau.valid):
         columns = np.hstack([trend, np.cos(turning), -np.sin(turning)])
         both = np.linalg.lstsq(columns, np.column_stack([torque, angle]), rcond=None)[0]
-        amplitude = both[2 : 2 + k.size] + 1j * both[2 + k.size :]
-    else:
-        amplitude = np.column_stack([_pursued(trend, turning, each) for each in (torque, angle)])
-    speed = plateau.rpm / _RPM
+        return np.asarray(both[2 : 2 + k.size] + 1j * both[2 + k.size :])
+    return np.column_stack([_pursued(trend, turning, each) for each in (torque, angle)])
+
+
+def _acting(
+    amplitude: npt.NDArray[np.complex128], rpm: float, inertia: float, slope: float
+) -> npt.NDArray[np.complex128]:
+    """What acts on the motor [k]: the torque of its orders without what its own swinging takes.
+
+    ``slope`` is that of friction over speed, in % per rpm.
+    """
+    k = np.arange(1, amplitude.shape[0] + 1)
+    speed = rpm / _RPM
     swing = 1j * k * speed * amplitude[:, 1]
     found = amplitude[:, 0] - inertia * 1j * k * speed * swing - slope * _RPM * swing
     return np.asarray(found, dtype=np.complex128)

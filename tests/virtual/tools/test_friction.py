@@ -209,7 +209,8 @@ async def test_everything_is_as_before_however_it_ends(ending: str) -> None:
         assert await b.axis.state() is not State.OPERATION_ENABLED
 
 
-async def test_kept_raw_data_give_the_same_map() -> None:
+async def test_kept_raw_data_give_the_same_map_and_lost_samples_do_not_bend_it() -> None:
+    """A busy computer loses samples in runs; the ripple in such a gap is not a straight line."""
     kept: dict[str, object] = {}
     async with direct(RIPPLED) as b:
         found = await _kept(b, kept)
@@ -218,12 +219,6 @@ async def test_kept_raw_data_give_the_same_map() -> None:
     with pytest.raises(ValueError, match="not the raw data"):
         TOOL.reevaluate({}, {})
 
-
-async def test_lost_samples_do_not_bend_the_curve() -> None:
-    """A busy computer loses samples in runs; the ripple in such a gap is not a straight line."""
-    kept: dict[str, object] = {}
-    async with direct(RIPPLED) as b:
-        await _kept(b, kept)
     arrays = dict(kept["arrays"])  # type: ignore[call-overload]
     plateau, valid = arrays["plateau"], arrays["valid"].copy()
     rng = np.random.default_rng(5)
