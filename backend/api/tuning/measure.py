@@ -162,6 +162,7 @@ async def list_tools() -> list[ToolInfo]:
                 for name in ("title", *tool.texts)
             },
             settings=tool.settings.model_json_schema(),
+            motion=tool.motion,
         )
         for tool in TOOLS
     ]  # fmt: skip

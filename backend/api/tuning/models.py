@@ -19,6 +19,7 @@ class ToolInfo(Message):
     kind: str
     texts: dict[str, list[str]] = Field(description="English, Chinese")
     settings: dict[str, object] = Field(description="JSON schema of what starting it takes")
+    motion: bool = Field(description="whether it enables and moves the axis")
 
 
 class ExcitationInfo(Message):

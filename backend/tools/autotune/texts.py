@@ -43,7 +43,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "phase_margin": ("Phase margin", "相位裕度"),
     "gain_margin": ("Gain margin", "增益裕度"),
     "ms": ("Ms", "灵敏度 Ms"),
-    "settling": ("Settling", "整定时间"),
+    "settling": ("Settling", "调节时间"),
     "overshoot": ("Overshoot", "超调"),
     "notches": ("Notches", "陷波"),
     "none": ("none", "无"),

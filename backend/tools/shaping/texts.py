@@ -47,7 +47,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "field.window_rev": (
         "Settling window of the position (rev); a tenth of the vibration where empty",
-        "位置整定窗口（圈）；留空则取振动的十分之一",
+        "位置稳定窗口（圈）；留空则取振动的十分之一",
     ),
     "field.verify": ("Play the shaped move, too, and compare", "同时执行整形后的移动并比较"),
     "shaper.auto": ("the shortest that suffices", "满足要求的最短整形器"),
@@ -57,12 +57,12 @@ TEXTS: dict[str, tuple[str, str]] = {
     "verdict.verified": (
         "The {shaper} shaper was verified: {residual} % of the vibration is left, and settling "
         "takes {after} instead of {before}.",
-        "{shaper} 整形器已验证：残余振动为 {residual} %，整定时间由 {before} 变为 {after}。",
+        "{shaper} 整形器已验证：残余振动为 {residual} %，调节时间由 {before} 变为 {after}。",
     ),
     "verdict.improved": (
         "The {shaper} shaper reduces the vibration to {residual} %, less than half of what was "
         "aimed at; settling takes {after} instead of {before}.",
-        "{shaper} 整形器将振动减至 {residual} %，未达到减半；整定时间由 {before} 变为 {after}。",
+        "{shaper} 整形器将振动减至 {residual} %，未达到减半；调节时间由 {before} 变为 {after}。",
     ),
     "verdict.no_better": (
         "The {shaper} shaper does not reduce the vibration: {residual} % is left. Do not use it.",
@@ -108,7 +108,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "finding.not_settled": (
         "The shaped move, too, is not settled after {value} {unit}.",
-        "整形后的移动在 {value} {unit} 后仍未整定。",
+        "整形后的移动在 {value} {unit} 后仍未稳定。",
     ),
     "finding.samples_lost": (
         "{value} ring-downs lost too many samples and were left out.",
@@ -141,12 +141,12 @@ TEXTS: dict[str, tuple[str, str]] = {
     "unshaped": ("Vibration without shaper", "无整形器的振动"),
     "shaped": ("Vibration with shaper", "有整形器的振动"),
     "ratio": ("Vibration that is left", "残余振动"),
-    "settling_unshaped": ("Settling time without shaper", "无整形器的整定时间"),
+    "settling_unshaped": ("Settling time without shaper", "无整形器的调节时间"),
     "settling_shaped": (
         "Settling time with shaper, its delay included",
-        "有整形器的整定时间（含延迟）",
+        "有整形器的调节时间（含延时）",
     ),
-    "window": ("Settling window", "整定窗口"),
+    "window": ("Settling window", "稳定窗口"),
     "head.shaper": ("Shaper", "整形器"),
     "head.shares": ("Shares (%)", "份额 (%)"),
     "head.times": ("Delays (ms)", "延时 (ms)"),

@@ -12544,6 +12544,11 @@ export interface components {
             /** Kind */
             kind: string;
             /**
+             * Motion
+             * @description whether it enables and moves the axis
+             */
+            motion: boolean;
+            /**
              * Settings
              * @description JSON schema of what starting it takes
              */

@@ -1,5 +1,5 @@
-import { useEffect, useState } from 'react'
-import { api, ask } from '../api/client'
+import { useEffect } from 'react'
+import { askBuses, useCyclicUrl } from '../live/buses'
 import { useAxisState, useDrive, useLink } from '../live/store'
 import { measurable } from '../pages/response/measurable'
 
@@ -8,22 +8,11 @@ export function useCanTune(drive: string | null): boolean {
   const { open } = useLink()
   const summary = useDrive(drive)
   const state = useAxisState(drive)
-  const urls = summary?.ports.map((port) => port.url).join(' ') ?? ''
-  const [url, setUrl] = useState<string | null>(null)
+  const urls = summary?.ports.map((port) => port.url) ?? []
+  const url = useCyclicUrl(urls)
+  const ports = urls.join(' ')
   useEffect(() => {
-    setUrl(null)
-    if (!open || urls === '') return
-    let current = true
-    ask(api.GET('/api/v1/buses')).then(
-      (buses) => {
-        const bus = buses.find((each) => each.cyclic_possible && urls.split(' ').includes(each.url))
-        if (current) setUrl(bus?.url ?? null)
-      },
-      () => {}, // asked again when the connection is back
-    )
-    return () => {
-      current = false
-    }
-  }, [open, urls])
-  return measurable(url, state?.modes ?? []).possible
+    if (open && ports !== '') void askBuses() // asked again when the connection is back
+  }, [open, ports])
+  return measurable(open ? url : null, state?.modes ?? []).possible
 }

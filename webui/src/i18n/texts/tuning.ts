@@ -402,6 +402,18 @@ export const tuning = {
     'The axis makes reciprocating moves within the limits. Inertia, friction and gravity are computed from torque and speed.',
     '轴在限制内往复运动，由转矩和速度求出惯量、摩擦和重力。',
   ],
+  'tool.moves': [
+    'WARNING: the axis is enabled and moves several times, within ±{travel} rev of the present position, with at most {speed} rpm and {torque} % of rated torque. It is disabled afterwards. Keep everyone clear of the machine.',
+    '警告：轴将使能并运动多次，限制在当前位置 ±{travel} 转、{speed} rpm、{torque}% 额定转矩内，之后断使能。请确保无人靠近。',
+  ],
+  'inertia.movesLimited': [
+    'WARNING: the axis is enabled and moves slowly against both stops, over at most {travel} rev each. Then it moves several times between them, with at most {speed} rpm and {torque} % of rated torque. It is disabled afterwards. Keep everyone clear of the machine.',
+    '警告：轴将使能并缓慢触碰两端挡块，每次最多 {travel} 转；随后在两端之间运动多次，最大 {speed} rpm、{torque}% 额定转矩，之后断使能。请确保无人靠近。',
+  ],
+  'inertia.movesTaught': [
+    'WARNING: the axis is enabled and moves several times between the taught ends, with at most {speed} rpm and {torque} % of rated torque. It is disabled afterwards. Keep everyone clear of the machine.',
+    '警告：轴将使能并在示教的两端之间运动多次，最大 {speed} rpm、{torque}% 额定转矩，之后断使能。请确保无人靠近。',
+  ],
   'inertia.scheme': ['How it may travel', '运动方式'],
   'inertia.scheme.free': ['Free, within the travel limit', '自由，在行程限制内'],
   'inertia.scheme.limited': ['Limited: search the ends', '受限：自动搜索两端'],

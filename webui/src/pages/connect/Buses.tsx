@@ -10,7 +10,7 @@ import { CyclicExchange } from './CyclicExchange'
 import { QualityTable } from './QualityTable'
 import { DoctorCard } from './segment/DoctorCard'
 import { SegmentPanel } from './segment/SegmentPanel'
-import { useBuses } from './useBuses'
+import { useBuses } from '../../live/buses'
 
 /** Opened buses and how well they work. */
 export function Buses() {

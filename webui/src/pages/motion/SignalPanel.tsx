@@ -11,7 +11,7 @@ import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
 import { useObstacle } from '../../widgets/useObstacle'
 import { Speed, TorqueLimit, TravelLimit } from './fields'
-import { useBuses } from '../connect/useBuses'
+import { useBuses } from '../../live/buses'
 import { useRemembered } from './remembered'
 import { placeIn, startIn, type TravelUnit } from './travelUnit'
 

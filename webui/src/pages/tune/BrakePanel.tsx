@@ -79,7 +79,14 @@ export function BrakePanel({
       <p>{text('step.support')}</p>
       <p>{text('step.clear')}</p>
       <p>{text('step.state')}</p>
-      <ToolForm fields={fields} values={values} text={text} onChange={setValues} />
+      <ToolForm
+        tool={tool}
+        limits={limits}
+        fields={fields}
+        values={values}
+        text={text}
+        onChange={setValues}
+      />
       <StartButton obstacle={obstacle ?? missing} busy={start.busy} onStart={() => void go()}>
         {text('start')}
       </StartButton>

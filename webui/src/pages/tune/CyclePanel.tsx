@@ -58,6 +58,8 @@ export function CyclePanel({ drive, open }: { drive: string; open: boolean }) {
         </select>
       </label>
       <ToolForm
+        tool={tool}
+        limits={null}
         fields={fields.filter((each) => each.name !== 'duration_s' || recording === '')}
         values={values}
         text={text}

@@ -69,7 +69,14 @@ export function FirstPowerPanel({
       <p className="dim">{text('lead')}</p>
       <p className="note warn">{text('danger')}</p>
       <p className="note warn">{text('warning')}</p>
-      <ToolForm fields={fields} values={values} text={text} onChange={setValues} />
+      <ToolForm
+        tool={tool}
+        limits={null}
+        fields={fields}
+        values={values}
+        text={text}
+        onChange={setValues}
+      />
       <StartButton obstacle={obstacle ?? missing} busy={start.busy} onStart={() => void go()}>
         {text('start')}
       </StartButton>

@@ -16,6 +16,7 @@ import { HealthPermission } from './HealthPermission'
 import { HealthStations } from './HealthStations'
 import { HealthTrend } from './HealthTrend'
 import { Findings, SignBaseline } from './HealthVerdict'
+import { MotionWarning } from './MotionWarning'
 import { complete, fieldsOf, initialValues, ToolForm, useTool, type Values } from './ToolForm'
 import { useHealth } from './useHealth'
 
@@ -62,7 +63,14 @@ export function HealthPanel({
       )}
       <details open={health !== null && !health.baseline}>
         <summary>{t('health.measure')}</summary>
-        <ToolForm fields={fields} values={values} text={text} onChange={setValues} />
+        <ToolForm
+          tool={tool}
+          limits={limits}
+          fields={fields}
+          values={values}
+          text={text}
+          onChange={setValues}
+        />
         <StartButton
           obstacle={obstacle ?? (complete(fields, values) ? null : t('start.incomplete'))}
           busy={start.busy}
@@ -116,6 +124,7 @@ function Repeat({
           torque: settings.torque_limit,
         })}
       </p>
+      <MotionWarning limits={settings} />
       <StartButton obstacle={obstacle} busy={busy} onStart={() => onStart(settings)}>
         {t('health.repeat')}
       </StartButton>

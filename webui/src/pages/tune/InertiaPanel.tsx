@@ -13,10 +13,17 @@ import { fixed } from '../response/bode'
 import type { Limits } from '../response/limits'
 import { asInertia, type Inertia } from '../response/results'
 import { useToolJob } from '../response/useToolJob'
+import { MotionWarning } from './MotionWarning'
 import { SchemeFields, useScheme } from './schemes'
 import { amount, interval } from './steps'
 
-/** Inertia and friction, by moves forth and back. */
+const MOVES = {
+  free: 'tool.moves',
+  limited: 'inertia.movesLimited',
+  taught: 'inertia.movesTaught',
+} as const
+
+/** Inertia and friction, by reciprocating moves. */
 export function InertiaPanel({
   drive,
   state,
@@ -109,6 +116,7 @@ export function InertiaPanel({
           help={t('inertia.motorHelp')}
         />
       </div>
+      {limits && <MotionWarning limits={limits} words={MOVES[scheme.scheme]} />}
       <StartButton
         obstacle={obstacle ?? (complete ? null : t('start.incomplete'))}
         busy={start.busy}

@@ -57,7 +57,14 @@ export function LoadSidePanel({
   return (
     <Panel title={text('title')}>
       <p className="dim">{text('lead')}</p>
-      <ToolForm fields={fields} values={values} text={text} onChange={setValues} />
+      <ToolForm
+        tool={tool}
+        limits={limits}
+        fields={fields}
+        values={values}
+        text={text}
+        onChange={setValues}
+      />
       <StartButton
         obstacle={obstacle ?? (complete(fields, values) ? null : t('start.incomplete'))}
         busy={start.busy}

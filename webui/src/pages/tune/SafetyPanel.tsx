@@ -96,7 +96,14 @@ export function SafetyPanel({
           onChange={(event) => setPerson(event.currentTarget.value)}
         />
       </div>
-      <ToolForm fields={fields} values={values} text={text} onChange={setValues} />
+      <ToolForm
+        tool={tool}
+        limits={limits}
+        fields={fields}
+        values={values}
+        text={text}
+        onChange={setValues}
+      />
       <StartButton obstacle={obstacle ?? missing} busy={start.busy} onStart={() => void go()}>
         {text('start')}
       </StartButton>

@@ -62,7 +62,14 @@ export function ShapingPanel({
           data={SHAPERS.map((each) => ({ value: each, label: text(`shaper.${each}`) }))}
         />
       </div>
-      <ToolForm fields={fields} values={values} text={text} onChange={setValues} />
+      <ToolForm
+        tool={tool}
+        limits={limits}
+        fields={fields}
+        values={values}
+        text={text}
+        onChange={setValues}
+      />
       <StartButton
         obstacle={obstacle ?? (complete(fields, values) ? null : t('start.incomplete'))}
         busy={start.busy}

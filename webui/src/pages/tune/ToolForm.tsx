@@ -4,6 +4,9 @@ import { api, ask } from '../../api/client'
 import type { ToolInfo } from '../../api/schema'
 import { useLanguage } from '../../i18n'
 import { NumberField } from '../../widgets/NumberField'
+import type { Limits } from '../response/limits'
+import { MotionWarning } from './MotionWarning'
+import { warnsOfMotion } from './toolMotion'
 import { unitOf } from './toolUnit'
 
 /** What the form of the limits asks for already. */
@@ -96,13 +99,18 @@ export function useTool(kind: string) {
   return { tool, text }
 }
 
-/** The form of a tool's own settings. */
+/** The form of a tool's own settings, and the warning of its motion within the limits. */
 export function ToolForm({
+  tool,
+  limits,
   fields,
   values,
   text,
   onChange,
 }: {
+  tool: ToolInfo
+  /** null: none are permitted yet, or the tool has its own. */
+  limits: Limits | null
   fields: Field[]
   values: Values
   text: (name: string) => string
@@ -111,29 +119,32 @@ export function ToolForm({
   const set = (name: string, value: number | boolean | null) =>
     onChange({ ...values, [name]: value })
   return (
-    <div className="fields">
-      {fields.map((field) =>
-        field.type === 'boolean' ? (
-          <Checkbox
-            key={field.name}
-            label={text(`field.${field.name}`)}
-            checked={values[field.name] === true}
-            onChange={(event) => set(field.name, event.currentTarget.checked)}
-          />
-        ) : (
-          <NumberField
-            key={field.name}
-            label={text(`field.${field.name}`)}
-            {...unitOf(field.name, text)}
-            {...field.limits}
-            value={typeof values[field.name] === 'number' ? (values[field.name] as number) : null}
-            onChange={(value) => set(field.name, value)}
-            integer={field.type === 'integer'}
-            optional={field.optional}
-          />
-        ),
-      )}
-    </div>
+    <>
+      <div className="fields">
+        {fields.map((field) =>
+          field.type === 'boolean' ? (
+            <Checkbox
+              key={field.name}
+              label={text(`field.${field.name}`)}
+              checked={values[field.name] === true}
+              onChange={(event) => set(field.name, event.currentTarget.checked)}
+            />
+          ) : (
+            <NumberField
+              key={field.name}
+              label={text(`field.${field.name}`)}
+              {...unitOf(field.name, text)}
+              {...field.limits}
+              value={typeof values[field.name] === 'number' ? (values[field.name] as number) : null}
+              onChange={(value) => set(field.name, value)}
+              integer={field.type === 'integer'}
+              optional={field.optional}
+            />
+          ),
+        )}
+      </div>
+      {limits && warnsOfMotion(tool) && <MotionWarning limits={limits} />}
+    </>
   )
 }
 
