@@ -283,9 +283,9 @@ def check(drive: Annotated[str | None, typer.Argument()] = None) -> None:
         )  # fmt: skip
         counts = ", ".join(f"{count} {motion}" for motion, count in motion_counts(profile).items())
         print_text("printed.motion-classes", counts=counts, unclassified=len(unclassified(profile)))
-        for language, overlay in overlays.items():
+        for translated, overlay in overlays.items():
             covered = ", ".join(overlay_coverage(profile, overlay))
-            print_text("printed.overlay", language=language, covered=covered)
+            print_text("printed.overlay", language=translated, covered=covered)
         for finding in findings:
             print(f"  {finding}")
         for line in coverage(profile):
