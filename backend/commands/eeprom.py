@@ -18,7 +18,8 @@ from drivers.ethercat.eeprom.image import Difference, Image, differences
 from drivers.ethercat.eeprom.plan import Plan
 from drivers.ethercat.link import EthercatLink, segment_of
 from drivers.link import Link
-from profiles.importer import import_file
+from drivers.texts.imports import failure_text
+from profiles.importer import ImportFailed, import_file
 from profiles.importer.files import is_xml
 from profiles.schema import Profile
 
@@ -81,7 +82,7 @@ def compare(
         data = file.read_bytes()
         if is_xml(data):
             number = None if product_code is None else int(product_code, 0)
-            profile: Profile = import_file(data, file.name, product_code=number).profile
+            profile = _profile_of(data, file.name, number)
             image = Image(await _contents(url, station, None, server))
             found = against_profile(image, profile)
         else:
@@ -251,6 +252,13 @@ async def _contents(url: str, station: int, size: int | None, server: str | None
         segment = _segment(link)
         await segment.scan(show_progress)
         return (await segment.eeprom.read(station, show_progress, size)).data
+
+
+def _profile_of(data: bytes, name: str, product_code: int | None) -> Profile:
+    try:
+        return import_file(data, name, product_code=product_code).profile
+    except ImportFailed as error:
+        raise NotAllowed(failure_text(error)) from error
 
 
 def _segment(link: Link) -> EthercatLink:

@@ -21,7 +21,8 @@ from backend.commands.session import opened, reporting_errors, show_progress
 from backend.station.description import profile_of_drive
 from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
-from drivers.texts.message import reason_of, text
+from drivers.texts.imports import failure_text, finding_line, summary_text
+from drivers.texts.message import language, reason_of, text
 from profiles import drive_names, load_profile
 from profiles.check import check as check_profile
 from profiles.check import coverage, motion_counts, unclassified
@@ -29,6 +30,7 @@ from profiles.export import show as shown
 from profiles.importer import (
     ImportedProfile,
     ImportFailed,
+    ImportReport,
     export_eds,
     export_esi,
     import_file,
@@ -69,8 +71,15 @@ def _importing() -> Iterator[None]:
     """A description that cannot be used is an error as any other."""
     try:
         yield
-    except (ImportFailed, ValueError) as error:
+    except ImportFailed as error:
+        raise NotAllowed(failure_text(error), remedy="command.see-not-listed") from error
+    except ValueError as error:
         raise NotAllowed(reason_of(error), remedy="command.see-not-listed") from error
+
+
+def _print_findings(report: ImportReport) -> None:
+    for finding in report.findings:
+        print(f"  {finding_line(finding).words(language())}")
 
 
 def _number(option: str, text: str | None) -> int | None:
@@ -122,13 +131,14 @@ def import_description(
         if folder is None:
             _check_name(imported.profile.drive)
         target = write_profile(imported.profile, folder or user_folder())
-    for finding in imported.report.findings:
-        print(f"  {finding}")
+    _print_findings(imported.report)
     print_text(
         "printed.profile-imported",
         title=imported.profile.title,
         count=len(imported.profile.parameters),
-        summary=str(imported.report.summary()),
+        summary=summary_text(
+            (each.outcome for each in imported.report.findings), imported.report.not_listed
+        ),
     )
     for device in imported.others:
         print_text(
@@ -161,8 +171,7 @@ def import_from_drive(
     with _importing():
         imported = asyncio.run(read())
         target = write_profile(imported.profile, user_folder())
-    for finding in imported.report.findings:
-        print(f"  {finding}")
+    _print_findings(imported.report)
     print_text(
         "printed.profile-of-drive-written",
         count=len(imported.profile.parameters),
@@ -274,9 +283,9 @@ def check(drive: Annotated[str | None, typer.Argument()] = None) -> None:
         )  # fmt: skip
         counts = ", ".join(f"{count} {motion}" for motion, count in motion_counts(profile).items())
         print_text("printed.motion-classes", counts=counts, unclassified=len(unclassified(profile)))
-        for language, overlay in overlays.items():
+        for translated, overlay in overlays.items():
             covered = ", ".join(overlay_coverage(profile, overlay))
-            print_text("printed.overlay", language=language, covered=covered)
+            print_text("printed.overlay", language=translated, covered=covered)
         for finding in findings:
             print(f"  {finding}")
         for line in coverage(profile):

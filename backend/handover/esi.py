@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 from backend.parameters.set_file import BadSet
 from drivers.errors import NotAllowed
-from drivers.texts.message import reason_of
+from drivers.texts.imports import failure_text
 from profiles.importer import ImportFailed, ImportReport
 from profiles.importer.esi import esi_devices, open_esi
 from profiles.importer.values import whole_number
@@ -71,7 +71,7 @@ def controller_of(
     try:
         file = open_esi(data, name, report)
     except ImportFailed as error:
-        raise BadSet(reason_of(error), value=name, remedy="handover.choose-esi") from error
+        raise BadSet(failure_text(error), value=name, remedy="handover.choose-esi") from error
     fitting = [
         device
         for device in esi_devices(file)

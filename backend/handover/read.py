@@ -31,6 +31,7 @@ from backend.handover.listed import (
 from backend.parameters.set_file import BadSet
 from drivers.codec import encode, size_of
 from drivers.errors import DriveError
+from drivers.texts.imports import failure_text
 from drivers.texts.message import Text, prose, text
 from profiles.importer import (
     ImportFailed,
@@ -50,7 +51,7 @@ _UPWARD = ("IP", "PS", "SO")
 _COMMANDS = ".//CoE/InitCmds/InitCmd"
 #: What the parsers raise; LookupError is an encoding that is unknown.
 _DAMAGED = (
-    ParseError, ImportFailed, ValueError, LookupError, yaml.YAMLError, csv.Error, RecursionError,
+    ParseError, ValueError, LookupError, yaml.YAMLError, csv.Error, RecursionError,
 )  # fmt: skip
 #: Entries of the objects that say which PDOs and objects the process data hold (ETG.1000.6
 #: clauses 5.6.7.4 and 5.6.7.5): numbers of PDOs, or objects with their lengths.
@@ -86,6 +87,8 @@ def read_list(
         ) from several
     except BadRow as error:
         raise BadSet("handover.damaged", name=name, shorten=error.why) from error
+    except ImportFailed as error:
+        raise BadSet("handover.damaged", name=name, shorten=failure_text(error)) from error
     except _DAMAGED as e:
         raise BadSet("handover.damaged", name=name, shorten=shorten(str(e), 200)) from e
     if not found.writes:
@@ -246,7 +249,7 @@ def _dcf(data: bytes, profile: Profile, name: str) -> ControllerList:
         kind: DataType = parameter.type if parameter else value.type or "UINT32"
         if kind not in INTEGER_RANGE and kind != "REAL32":
             continue
-        raw, _ = default_value(value.text, kind, place.words(), report)
+        raw, _ = default_value(value.text, kind, f"{name}:{value.line}", report, "ParameterValue")
         if raw is None:
             raise BadRow(
                 text("handover.row-no-value", place=place, word=value.text[:40], type=kind)

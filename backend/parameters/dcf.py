@@ -8,7 +8,8 @@ from datetime import datetime
 from backend.drive.readings import Reading
 from backend.parameters.csv_list import ParameterList, first
 from backend.parameters.set_file import BadSet, Row
-from drivers.texts.message import Text, prose, reason_of, text
+from drivers.texts.imports import failure_text, finding_line
+from drivers.texts.message import Text, text
 from profiles.importer import (
     ImportFailed,
     ImportReport,
@@ -56,16 +57,16 @@ def read_dcf(data: bytes, profile: Profile, name: str = "the file") -> Parameter
                 unknown = text("sets.line-no-parameter", title=profile.title, word=key)
                 problems.append(text("sets.line", line=value.line, cause=unknown))
                 continue
-            place = f"line {value.line}"
-            raw, _ = default_value(value.text, parameter.type, place, report)
+            place = f"{name}:{value.line}"
+            raw, _ = default_value(value.text, parameter.type, place, report, "ParameterValue")
             if raw is None:
                 wrong = text("sets.line-wrong-type", key=key, word=value.text[:40])
                 problems.append(text("sets.line", line=value.line, cause=wrong))
             else:
                 readings[key] = Reading(key, raw, parameter.to_value(raw), None)
     except ImportFailed as error:
-        raise BadSet(reason_of(error), remedy="sets.choose-dcf-or-csv") from error
-    problems += [prose(str(finding)) for finding in report.findings]
+        raise BadSet(failure_text(error), remedy="sets.choose-dcf-or-csv") from error
+    problems += [finding_line(finding) for finding in report.findings]
     if not readings:
         raise BadSet(
             "sets.no-value-choose-file",

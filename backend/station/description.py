@@ -13,6 +13,7 @@ from typing import Any
 from drivers.dictionary import Described, ObjectInfo
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address, Found, Link, Progress
+from drivers.texts.imports import message_of_import
 from profiles.importer import (
     ImportedProfile,
     ImportReport,
@@ -68,6 +69,10 @@ async def import_in_process(task: Task, limit_s: float = IMPORT_LIMIT_S) -> dict
         raise BadDescription(
             "station.import-failed-exit-code", returncode=process.returncode, last=last[0]
         ) from None
+    if "refused" in answer:
+        raise BadDescription(
+            "station.file-not-imported", cause=message_of_import(answer["refused"])
+        )
     if "error" in answer:
         raise BadDescription("station.file-not-imported", cause=str(answer["error"]))
     result: dict[str, Any] = answer["ok"]
@@ -87,7 +92,7 @@ async def drive_task(
     """
     if link.traits.description == "stored_eds":
         eds = await _stored_eds(link, found)
-        return FileTask(eds, f"1021h of station {found.station}", user_folder(), name)
+        return FileTask(eds, f"1021h-station{found.station}.eds", user_folder(), name)
     report = ImportReport()
     description = describe_dictionary(
         dictionary_entries(await link.enumerate(found.station, progress)),

@@ -78,16 +78,16 @@ def build_profile(
     units = FileUnits(description.entries)
     for entry in description.entries:
         if entry.key in parameters:
-            report.noted(entry.source, f"{entry.key} comes twice, the first one counts")
+            report.noted(entry.place, "description.object-twice", key=entry.key)
             continue
         parameter = _parameter(entry, _standard(base, entry), units, report)
         if parameter is not None:
             parameters[entry.key] = parameter
     if not parameters:
-        raise ImportFailed(f"{description.file}: no object has a known type")
+        raise ImportFailed("description.no-typed-object", file=description.place)
     for key in _NEEDED:
         if key not in parameters:
-            report.noted(description.file, f"{key} is missing: this may not be a CiA 402 drive")
+            report.noted(description.place, "description.cia402-object-missing", key=key)
     _note_further_axes(description, report)
     link = _link(description, parameters)
     profile = Profile(
@@ -131,11 +131,7 @@ def _note_further_axes(description: Description, report: ImportReport) -> None:
     indexes = {entry.index for entry in description.entries}
     further = [n for n in range(1, 8) if 0x6040 + _AXIS_STEP * n in indexes]
     if further:
-        report.noted(
-            description.file,
-            f"the device has {len(further) + 1} axes; the first one can be moved, the objects of "
-            "the others are listed",
-        )
+        report.noted(description.place, "description.further-axes", axes=len(further) + 1)
 
 
 def _standard(base: Profile, entry: DescribedEntry) -> Parameter | None:
@@ -159,28 +155,39 @@ def _parameter(
     access, pdo = _rights(entry, standard, report)
     also: tuple[str, ...] = ()
     if data_type is None and standard is not None:
-        report.repaired(entry.source, f"{entry.key} has no type, taken from CiA 402")
+        report.repaired(entry.place, "description.type-of-standard", key=entry.key)
         data_type = standard.type
     if data_type is None:
-        report.left_out(entry.source, f"{entry.key} {entry.name!r} has no known type")
+        report.left_out(entry.place, "description.type-unknown", key=entry.key, name=entry.name)
         return None
     if standard is not None and data_type != standard.type:
         if _SAME_WIDTH.get(data_type) == standard.type and _uses_sign(entry):
             report.noted(
-                entry.source,
-                f"{entry.key} is {data_type} with negative values, CiA 402 says {standard.type}: "
-                "the file counts",
+                entry.place,
+                "description.type-signed",
+                key=entry.key,
+                type=data_type,
+                standard=standard.type,
             )
         elif _SAME_WIDTH.get(data_type) == standard.type:
             # A speed of -1 must not appear as 4294967295.
             report.repaired(
-                entry.source,
-                f"{entry.key} is {data_type} in the file, CiA 402 says {standard.type}",
+                entry.place,
+                "description.type-replaced",
+                key=entry.key,
+                type=data_type,
+                standard=standard.type,
             )
             also = (f"type {data_type} in {entry.source}",)
             data_type = standard.type
         else:
-            report.noted(entry.source, f"{entry.key} is {data_type}, CiA 402 says {standard.type}")
+            report.noted(
+                entry.place,
+                "description.type-differs",
+                key=entry.key,
+                type=data_type,
+                standard=standard.type,
+            )
     low, high, default = _limits(entry, data_type, report)
     unit, scale = units.of(entry.key, entry.unit, standard.unit if standard else "")
     return Parameter(
@@ -216,9 +223,9 @@ def _rights(
     if entry.access != "ro" or entry.pdo not in ("rx", "rxtx") or standard is None:
         return entry.access, entry.pdo
     if standard.access == "ro":
-        report.repaired(entry.source, f"{entry.key} is read-only and cannot be an output")
+        report.repaired(entry.place, "description.read-only-output", key=entry.key)
         return "ro", "tx" if entry.pdo == "rxtx" or standard.pdo == "tx" else "none"
-    report.repaired(entry.source, f"{entry.key} can be an output but is marked read-only")
+    report.repaired(entry.place, "description.output-marked-read-only", key=entry.key)
     return "rw", entry.pdo
 
 
@@ -249,15 +256,19 @@ def _limits(
         default = _resigned(default, data_type) if isinstance(default, int) else default
     if low is not None and high is not None and low == high == 0:
         # Many tools write both as 0 where nobody gave any.
-        report.noted(entry.source, f"{entry.key}: limits 0 and 0 are taken as not given")
+        report.noted(entry.place, "description.limits-zero", key=entry.key)
         low = high = None
     if low is not None and high is not None and low > high:
-        report.repaired(entry.source, f"{entry.key}: minimum {low} above maximum {high}, ignored")
+        report.repaired(
+            entry.place, "description.limits-swapped", key=entry.key, minimum=low, maximum=high
+        )
         low = high = None
     if isinstance(default, (int, float)) and (
         (low is not None and default < low) or (high is not None and default > high)
     ):
-        report.noted(entry.source, f"{entry.key}: default {default} is outside its own limits")
+        report.noted(
+            entry.place, "description.default-outside-limits", key=entry.key, default=default
+        )
     return low, high, default
 
 
@@ -328,7 +339,7 @@ def _pdo_spec(
     for pdo in description.pdos:
         entries = tuple(key for key in pdo.entries if key in parameters)
         if len(entries) < len(pdo.entries):
-            report.left_out(pdo.source, f"PDO {pdo.index:04X}h names objects without a type")
+            report.left_out(pdo.source, "description.pdo-objects-untyped", index=pdo.index)
         if (entries or not pdo.fixed) and pdo.index not in {s.index for s in sets}:
             sets.append(
                 PdoSet(

@@ -56,7 +56,7 @@ def read_dcf_values(data: bytes, name: str, report: ImportReport) -> Iterator[Co
         for value in _values(sections, name)
     ]
     if not found:
-        raise ImportFailed(f"{name} sets no values: an EDS describes a drive, a DCF configures it")
+        raise ImportFailed("description.no-values", file=name)
     return iter(found)
 
 

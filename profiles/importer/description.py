@@ -30,6 +30,13 @@ class DescribedEntry:
     enum: dict[int, str] = field(default_factory=dict)
     help: str = ""
     source: str = ""
+    at: str = ""
+    """Where it is, for findings; empty where ``source`` says so."""
+
+    @property
+    def place(self) -> str:
+        """Where findings about it are."""
+        return self.at or self.source
 
     @property
     def key(self) -> str:
@@ -73,3 +80,10 @@ class Description:
     bring_up: BringUp | None = None
     baudrates: tuple[int, ...] = ()
     """Bit rates of a CANopen drive in bit/s."""
+    at: str = ""
+    """Name of the file or drive, for findings; empty where ``file`` is it."""
+
+    @property
+    def place(self) -> str:
+        """Where findings about the whole are."""
+        return self.at or self.file

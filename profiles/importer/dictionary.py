@@ -61,7 +61,7 @@ def describe_dictionary(
     for entry in entries:
         place = f"{entry.index:04X}:{entry.subindex:02X}"
         if (entry.index, entry.subindex) in seen:
-            report.noted(place, "the drive lists it twice")
+            report.noted(place, "description.listed-twice")
             continue
         seen.add((entry.index, entry.subindex))
         if not 0x1000 <= entry.index <= 0xFFFF or not 0 <= entry.subindex <= 255:
@@ -69,11 +69,11 @@ def describe_dictionary(
         if entry.subindex == 0 and entry.members > 1:
             continue  # only counts the others
         if len(found) >= MAX_ENTRIES:
-            report.left_out(place, "the drive lists more entries than any drive has")
+            report.left_out(place, "description.too-many-entries", entries=MAX_ENTRIES)
             break
         found.append(_described(entry, file, report))
     if not found:
-        raise ImportFailed(f"{name} lists no objects: it may not offer the SDO information service")
+        raise ImportFailed("description.no-objects-listed", name=name)
     return Description(
         file=file,
         link=link,
@@ -83,6 +83,7 @@ def describe_dictionary(
         product_code=product_code,
         revision=revision,
         entries=tuple(found),
+        at=tidy(name),
     )
 
 
@@ -92,9 +93,7 @@ def _described(entry: DictionaryEntry, file: str, report: ImportReport) -> Descr
     if data_type is None:
         data_type = named_type("", entry.bit_length)
         if data_type is not None:
-            report.repaired(
-                place, f"data type {entry.type_code:#06x} is unknown, taken by its length"
-            )
+            report.repaired(place, "description.type-by-length", type=entry.type_code)
     readable, writable = bool(entry.access & 0x07), bool(entry.access & 0x38)
     access: Access = "rw" if readable and writable else "wo" if writable else "ro"
     rx, tx = bool(entry.access & 0x40), bool(entry.access & 0x80)
@@ -118,6 +117,7 @@ def _described(entry: DictionaryEntry, file: str, report: ImportReport) -> Descr
         max_raw=value(entry.maximum),
         unit=(unit_of_code(f"{entry.unit:#x}") if entry.unit else "") or unit,
         source=f"{file}:{place}",
+        at=place,
     )
 
 

@@ -44,12 +44,10 @@ def read_eds(data: bytes, name: str, report: ImportReport) -> Description:
     sections = read_sections(decode_text(data, name, report), name, report)
     device = sections.get("deviceinfo", Section(0))
     if "deviceinfo" not in sections:
-        report.noted(name, "there is no [DeviceInfo] section: the drive is not identified")
+        report.noted(name, "description.no-device-info")
     entries = _Entries(sections, name, report).read()
     if not entries:
-        raise ImportFailed(
-            f"{name} describes no objects: it is not an EDS or DCF file, or it is damaged"
-        )
+        raise ImportFailed("description.no-eds-objects", file=name)
     return Description(
         file=name,
         link="canopen",
@@ -140,9 +138,7 @@ class _Entries:
             elif _MODULE.match(title):
                 modules += 1
         if modules:
-            self._report.left_out(
-                self._name, f"{modules} sections of pluggable modules: a drive has none"
-            )
+            self._report.left_out(self._name, "description.module-sections", sections=modules)
 
     def read(self) -> list[DescribedEntry]:
         entries: list[DescribedEntry] = []
@@ -150,16 +146,12 @@ class _Entries:
             if index < 0x1000:
                 continue  # definitions of types, used below
             if len(entries) > MAX_ENTRIES:
-                self._report.left_out(self._name, f"objects from {index:04X}h on: too many")
+                self._report.left_out(self._name, "description.too-many-objects", index=index)
                 break
             entries += self._object(index)
         self._compare_with_lists({e.index for e in entries})
         if self._configured:
-            self._report.noted(
-                self._name,
-                f"{self._configured} values configured for one machine are not taken as defaults; "
-                "load the file as a parameter set for them",
-            )
+            self._report.noted(self._name, "description.configured-values", values=self._configured)
         return entries
 
     def _object(self, index: int) -> list[DescribedEntry]:
@@ -167,9 +159,7 @@ class _Entries:
         members = self._members.get(index, {})
         if parent is None:
             line = min(s.line for s in members.values())
-            self._report.repaired(
-                f"{self._name}:{line}", f"{index:04X}h has subindices but no section of its own"
-            )
+            self._report.repaired(f"{self._name}:{line}", "description.no-own-section", index=index)
             parent = Section(line)
         place = f"{self._name}:{parent.line} [{index:04X}]"
         compact = parse_number(parent.word("compactsubobj"), place, self._report)
@@ -180,7 +170,10 @@ class _Entries:
         count = parse_number(parent.word("subnumber"), place, self._report)
         if count is not None and count != len(members):
             self._report.noted(
-                place, f"{int(count)} subindices are announced and {len(members)} given"
+                place,
+                "description.subindices-differ",
+                announced=int(count),
+                given=len(members),
             )
         title = tidy(parent.get("parametername"))
         return [
@@ -216,7 +209,7 @@ class _Entries:
         data_type = self._type(section, parent, place)
         access_text = section.word("accesstype", "access") or parent.word("accesstype")
         if not access_text:
-            self._report.repaired(place, "no access is given, taken as read-only")
+            self._report.repaired(place, "description.no-access")
             access_text = "ro"
         access = parse_access(access_text, place, self._report)
         own = tidy(section.get("denotation") or section.get("parametername"))
@@ -230,8 +223,8 @@ class _Entries:
                 section.get("defaultvalue"), data_type, place, self._report
             )
             self._configured += bool(section.get("parametervalue"))
-            low = self._limit(section, "lowlimit", data_type, place)
-            high = self._limit(section, "highlimit", data_type, place)
+            low = self._limit(section, "LowLimit", data_type, place)
+            high = self._limit(section, "HighLimit", data_type, place)
         entry = DescribedEntry(
             index=index,
             subindex=subindex,
@@ -252,7 +245,7 @@ class _Entries:
     def _limit(
         self, section: Section, key: str, data_type: DataType, place: str
     ) -> int | float | None:
-        text = section.get(key)
+        text = section.get(key.lower())
         if re.search(r"node[-_ ]?id", text, re.I):
             return None
         number = parse_number(text, f"{place} {key}", self._report)
@@ -264,7 +257,7 @@ class _Entries:
             return "OCTETS"  # a DOMAIN needs no data type
         text = text or parent.word("datatype")
         if named := named_type(text, None):
-            self._report.repaired(place, f"data type {text[:30]} is written by its name")
+            self._report.repaired(place, "description.type-by-name", type=text[:30])
             return named
         number = parse_number(text, place, self._report)
         if number is None:
@@ -274,7 +267,7 @@ class _Entries:
         if found is None:
             found = self._deftype(code, place)
         if found == "OCTETS" and code in (0x10, 0x11, 0x12, 0x13, 0x14, 0x16, 0x18, 0x19, 0x1A):
-            self._report.noted(place, f"data type {code:#04x} is shown as bytes")
+            self._report.noted(place, "description.type-as-bytes", type=code)
         return found
 
     def _deftype(self, code: int, place: str) -> DataType | None:
@@ -284,9 +277,9 @@ class _Entries:
             base = parse_number(member.word("datatype"), place, self._report)
             known = None if base is None else TYPE_BY_CODE.get(int(base))
             if known is not None:
-                self._report.noted(place, f"data type {code:#06x} is defined by the file itself")
+                self._report.noted(place, "description.type-of-file", type=code)
                 return known
-        self._report.left_out(place, f"data type {code:#06x} is unknown")
+        self._report.left_out(place, "description.type-code-unknown", type=code)
         return None
 
     def _compare_with_lists(self, present: set[int]) -> None:
@@ -304,10 +297,12 @@ class _Entries:
             ]
             announced = parse_number(section.get("supportedobjects"), place, self._report)
             if announced is not None and announced != len(listed):
-                self._report.noted(place, f"{announced:g} objects announced, {len(listed)} listed")
+                self._report.noted(
+                    place, "description.objects-differ", announced=announced, listed=len(listed)
+                )
             for index in sorted(set(listed) - present):
                 if 0x1000 <= index <= 0xFFFF:
-                    self._report.noted(place, f"{index:04X}h is listed but not described")
+                    self._report.noted(place, "description.listed-not-described", index=index)
 
 
 def _mapping(section: Section, parent: Section, access_text: str) -> PdoMapping:

@@ -62,7 +62,9 @@ def _layout(
             continue
         # Where the file gives 0 next to entries, it is a template that nobody filled in.
         if count and entry.subindex > count:
-            report.noted(place, f"entry {entry.subindex} is behind the {count:g} that are in use")
+            report.noted(
+                place, "description.mapping-behind-count", subindex=entry.subindex, count=count
+            )
             continue
         key = f"{value >> 16 & 0xFFFF:04X}:{value >> 8 & 0xFF:02X}"
         bits = value & 0xFF
@@ -71,7 +73,7 @@ def _layout(
         elif bits:
             layout.append((None, bits))
             if value >> 16 & 0xFFFF >= 0x20:  # below are dummies that only fill space
-                report.left_out(place, f"{key} is mapped but not described")
+                report.left_out(place, "description.mapped-not-described", key=key)
     return layout
 
 

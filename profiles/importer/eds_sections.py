@@ -47,20 +47,20 @@ def read_sections(text: str, name: str, report: ImportReport) -> dict[str, Secti
         if line[0] == "[":
             title = line[1:].partition("]")[0].strip().lower()
             if "]" not in line:
-                report.repaired(place, f"the section heading {line[:40]!r} is not closed")
+                report.repaired(place, "description.heading-not-closed", heading=line[:40])
             if title in sections:
-                report.noted(place, f"section [{title[:40]}] comes a second time")
+                report.noted(place, "description.section-twice", section=title[:40])
             current = sections.setdefault(title, Section(number))
             continue
         key, equals, value = line.partition("=")
         if not equals:
-            report.left_out(place, f"{line[:60]!r} is neither a section nor a value")
+            report.left_out(place, "description.no-section-no-value", line=line[:60])
         elif current is None:
-            report.left_out(place, f"{key.strip()[:40]!r} stands before the first section")
+            report.left_out(place, "description.before-first-section", key=key.strip()[:40])
         else:
             key = key.strip().lower().replace(" ", "")
             if key in current.values and current.values[key] != value.strip():
-                report.noted(place, f"{key[:40]} is given twice, the first one counts")
+                report.noted(place, "description.key-twice", key=key[:40])
             current.values.setdefault(key, value.strip())
     return sections
 

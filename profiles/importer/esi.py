@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, ParseError
+from xml.parsers.expat import ErrorString
 
 from defusedxml.common import DefusedXmlException
 from defusedxml.ElementTree import fromstring
@@ -81,14 +82,14 @@ def read_device(file: EsiFile, device: int = 0) -> Description:
     """
     name = file.name
     if not 0 <= device < len(file.devices):
-        raise ImportFailed(f"{name} has {len(file.devices)} devices, there is no number {device}")
+        raise ImportFailed(
+            "description.no-device-number", file=name, devices=len(file.devices), number=device
+        )
     element = file.devices[device]
     choice = _choice(file, device)
     entries, pdos = _contents(file, element)
     if not entries:
-        raise ImportFailed(
-            f"{name} describes no objects of {choice.name}: take the dictionary of the drive itself"
-        )
+        raise ImportFailed("description.no-esi-objects", file=name, device=choice.name)
     mailbox = child(child(element, "Mailbox"), "CoE")
     vendor = child(file.root, "Vendor")
     return Description(
@@ -141,42 +142,42 @@ def open_esi(data: bytes, name: str, report: ImportReport) -> EsiFile:
             root = _parsed(text)
         except ParseError:
             root = _parsed(mended(text))
-            report.repaired(name, "it is not well-formed XML: what stands around it, or in it "
-                            "without being allowed there, was taken out")  # fmt: skip
+            report.repaired(name, "description.xml-repaired")
     except ParseError as error:
-        raise ImportFailed(f"{name} is not well-formed XML: {error}") from error
-    except (DefusedXmlException, ValueError) as error:
+        line, column = error.position
         raise ImportFailed(
-            f"{name} holds a DTD or entities, which are not read: {error}"
+            "description.no-xml",
+            file=name,
+            line=line,
+            column=column,
+            detail=ErrorString(error.code),
         ) from error
+    except (DefusedXmlException, ValueError) as error:
+        raise ImportFailed("description.dtd", file=name, detail=str(error)) from error
     simplify_tags(root)
     root.tag = _ROOTS.get(root.tag.lower(), root.tag)
     if root.tag == "EtherCATInfoList":
-        report.noted(name, "a list of descriptions, as a master prints it: the first is read")
+        report.noted(name, "description.list-of-descriptions")
         inner = child(root, "EtherCATInfo")
         if inner is not None:
             root = inner
             root.tag = "EtherCATInfo"
     if root.tag == "EtherCATConfig":
-        raise ImportFailed(
-            f"{name} is a network configuration (ENI), not a device description (ESI)"
-        )
+        raise ImportFailed("description.network-configuration", file=name)
     if root.tag in ("EtherCATDict", "EtherCATModule"):
-        raise ImportFailed(
-            f"{name} is a part of an ESI file ({root.tag}): choose the file with <EtherCATInfo>"
-        )
+        raise ImportFailed("description.part-of-esi", file=name, root=root.tag)
     if root.tag != "EtherCATInfo":
-        raise ImportFailed(f"{name} is not an ESI file: its root is <{root.tag[:40]}>")
+        raise ImportFailed("description.no-esi", file=name, root=root.tag[:40])
     devices = children(child(child(root, "Descriptions"), "Devices"), "Device")
     if not devices:
-        raise ImportFailed(f"{name} describes no device")
+        raise ImportFailed("description.no-devices", file=name)
     return EsiFile(name, report, root, devices)
 
 
 def _choice(file: EsiFile, number: int) -> EsiDevice:
     element = file.devices[number]
     kind = child(element, "Type")
-    place = f"{file.name}: device {number}"
+    place = f"{file.name}: Device {number}"
     vendor = child(file.root, "Vendor")
     name = name_of(element) or text_of(kind)
     return EsiDevice(
@@ -210,9 +211,7 @@ def _contents(file: EsiFile, element: Element) -> tuple[list[DescribedEntry], li
     """Dictionary and PDOs of a device and of the modules that it has as delivered."""
     parts = parts_of(file.root, element)
     for part in parts[1:]:
-        file.report.noted(
-            file.name, f"a device of modules: {name_of(part.element)!r} is taken as delivered"
-        )
+        file.report.noted(file.name, "description.module", module=tidy(name_of(part.element)))
     entries: list[DescribedEntry] = []
     seen: set[str] = set()
     described = False
@@ -222,7 +221,7 @@ def _contents(file: EsiFile, element: Element) -> tuple[list[DescribedEntry], li
             reader = DictionaryReader(file.name, file.report, dictionary, part.index_shift)
             for entry in reader.entries():
                 if entry.key in seen:
-                    file.report.noted(file.name, f"{entry.key} comes twice, the first one counts")
+                    file.report.noted(file.name, "description.object-twice", key=entry.key)
                 elif len(entries) < MAX_ENTRIES:
                     seen.add(entry.key)
                     entries.append(entry)
@@ -231,12 +230,10 @@ def _contents(file: EsiFile, element: Element) -> tuple[list[DescribedEntry], li
             text_of(child(profile, "DictionaryFile")) for profile in children(element, "Profile")
         ]
         named = tidy(", ".join(filter(None, elsewhere)), 80)
-        file.report.noted(
-            file.name,
-            f"its objects are in another file, {named}: only what the PDOs name"
-            if named
-            else "there is no object dictionary: only what the PDOs name",
-        )
+        if named:
+            file.report.noted(file.name, "description.objects-elsewhere", files=named)
+        else:
+            file.report.noted(file.name, "description.no-dictionary")
     pdos = []
     for part in parts:
         pdo_reader = PdoReader(file.name, file.report, entries, seen, part)

@@ -92,13 +92,21 @@ class _Reader:
             subindex = whole_number(text_of(child(item, "SubIndex")) or "0", place, self._report)
             data = self._hex(text_of(child(item, "Data")), place)
             if index is None or subindex is None or data is None or not 0x1000 <= index <= 0xFFFF:
-                self._report.left_out(place, f"a command to {text_of(child(item, 'Index'))[:12]!r}")
+                self._report.left_out(
+                    place, "description.command-invalid", index=text_of(child(item, "Index"))[:12]
+                )
                 continue
             for transition in children(item, "Transition"):
                 # TwinCAT shows commands of the file as <PS>, and some tools write them so.
                 letters = text_of(transition).upper().strip("<>")
                 if _TRANSITION.fullmatch(letters) is None or not 0 <= subindex <= 255:
-                    self._report.left_out(place, f"{index:04X}h on transition {letters[:12]!r}")
+                    self._report.left_out(
+                        place,
+                        "description.transition-unknown",
+                        index=index,
+                        subindex=subindex,
+                        transition=letters[:12],
+                    )
                     continue
                 found.append(
                     InitCommand(
@@ -112,7 +120,9 @@ class _Reader:
                     )
                 )
         if len(found) > _MOST_COMMANDS:
-            self._report.left_out(self._file, f"init commands behind the first {_MOST_COMMANDS}")
+            self._report.left_out(
+                self._file, "description.too-many-commands", commands=_MOST_COMMANDS
+            )
         return tuple(found[:_MOST_COMMANDS])
 
     def _managers(self) -> tuple[SyncManagerRule, ...]:
@@ -121,7 +131,12 @@ class _Reader:
             name = text_of(item).lower().replace(" ", "")
             kind = _KINDS.get(name) or (_BY_NUMBER[number] if number < len(_BY_NUMBER) else None)
             if kind is None:
-                self._report.left_out(self._file, f"sync manager {number} {name[:20]!r}")
+                self._report.left_out(
+                    self._file,
+                    "description.sync-manager-unknown",
+                    number=number,
+                    name=name[:20],
+                )
                 continue
             place = f"{self._file}: Sm {number}"
             found.append(
@@ -144,11 +159,11 @@ class _Reader:
         word = text_of(child(mode, "AssignActivate")) or "0"
         if re.fullmatch(r"0\d{3}", word):
             # Register bits: nobody writes them in decimal with a leading zero.
-            self._report.repaired(place, f"AssignActivate {word} was read as hexadecimal")
+            self._report.repaired(place, "description.hexadecimal", value=word)
             word = f"#x{word}"
         activate = whole_number(word, place, self._report)
         if activate is None or not 0 <= activate <= 0xFFFF:
-            self._report.left_out(place, "AssignActivate is no number of 16 bits")
+            self._report.left_out(place, "description.assign-activate")
             activate = 0
         pdos = []
         for manager in children(mode, "Sm"):
@@ -223,7 +238,7 @@ class _Reader:
         try:
             data = bytes.fromhex(bare)
         except ValueError:
-            self._report.left_out(place, f"{bare[:20]!r} is not hexadecimal data")
+            self._report.left_out(place, "description.not-hexadecimal", value=bare[:20])
             return None
         return data[:_MOST_BYTES].hex().upper()
 

@@ -47,20 +47,21 @@ class DictionaryReader:
         if self._preop_only and 2 * len(self._preop_only) < writable:
             first = ", ".join(self._preop_only[:5])
             more = len(self._preop_only) - 5
-            self._report.noted(
-                self._file,
-                f"may be written in PreOP or SafeOP only: {first}"
-                + (f" and {more} more" if more > 0 else ""),
-            )
+            if more > 0:
+                self._report.noted(
+                    self._file, "description.written-before-op-more", objects=first, more=more
+                )
+            else:
+                self._report.noted(self._file, "description.written-before-op", objects=first)
         return found
 
     def _object(self, element: Element) -> list[DescribedEntry]:
         index_text = text_of(child(element, "Index"))
-        place = f"{self._file}: object {index_text[:12]}"
+        place = f"{self._file}: Object {index_text[:12]}"
         index = whole_number(index_text, place, self._report)
         if index is None or not 0x1000 <= index <= 0xFFFF:
             if index is None:
-                self._report.left_out(place, "an object without a usable index")
+                self._report.left_out(place, "description.object-no-index")
             return []
         if self._shift and flag_of(child(element, "Index"), "DependOnSlot"):
             index += self._shift
@@ -75,9 +76,7 @@ class DictionaryReader:
             member = Member(0, title, type_name, bits, child(element, "Flags"))
             return [self._entry(index, member, "", info, element, place)]
         if not members:
-            self._report.repaired(
-                place, f"its data type {type_name[:30]!r} is not described, taken from the values"
-            )
+            self._report.repaired(place, "description.type-not-described", type=type_name[:30])
             members = [
                 Member(n, tidy(name_of(item)), "", None, child(element, "Flags"))
                 for n, item in enumerate(infos)
@@ -114,10 +113,11 @@ class DictionaryReader:
         default: Raw | None = None
         low = high = None
         if data_type is not None:
-            default = self._value(info, ("DefaultValue", "DefaultData", "DefaultString"), data_type,
-                                  "default", place)  # fmt: skip
-            low = self._number(info, ("MinValue", "MinData"), data_type, "minimum", place)
-            high = self._number(info, ("MaxValue", "MaxData"), data_type, "maximum", place)
+            default = self._value(
+                info, ("DefaultValue", "DefaultData", "DefaultString"), data_type, place
+            )
+            low = self._number(info, ("MinValue", "MinData"), data_type, place)
+            high = self._number(info, ("MaxValue", "MaxData"), data_type, place)
         return DescribedEntry(
             index=index,
             subindex=member.subindex,
@@ -132,7 +132,7 @@ class DictionaryReader:
             group=tidy(text_of(child(element, "Group")), 60),
             enum=self._types.enumeration(member.type),
             help=tidy(text_of(child(element, "Comment")), 500),
-            source=f"{self._file}: object {index:04X}h",
+            source=f"{self._file}: {index:04X}h",
         )
 
     def _value(
@@ -140,11 +140,10 @@ class DictionaryReader:
         info: Element | None,
         tags: tuple[str, ...],
         data_type: DataType,
-        what: str,
         place: str,
     ) -> Raw | None:
         if data_type != "STRING":
-            return self._number(info, tags, data_type, what, place)
+            return self._number(info, tags, data_type, place)
         return tidy(text_of(child(info, "DefaultString"))) or None
 
     def _number(
@@ -152,18 +151,18 @@ class DictionaryReader:
         info: Element | None,
         tags: tuple[str, ...],
         data_type: DataType,
-        what: str,
         place: str,
     ) -> int | float | None:
         for tag in tags:
             text = text_of(child(info, tag))
             if not text:
                 continue
+            number: int | float | None
             if tag.endswith("Data"):
-                return fit(_hex_data(text, place, self._report), data_type, what, place,
-                           self._report)  # fmt: skip
-            number = parse_number(text, f"{place} {what}", self._report)
-            return fit(number, data_type, what, place, self._report)
+                number = _hex_data(text, f"{place} {tag}", self._report)
+            else:
+                number = parse_number(text, f"{place} {tag}", self._report)
+            return fit(number, data_type, tag, place, self._report)
         return None
 
 
@@ -176,7 +175,7 @@ def _hex_data(text: str, place: str, report: ImportReport) -> int | None:
     try:
         return int.from_bytes(bytes.fromhex(bare), "little") if len(bare) <= 16 else None
     except ValueError:
-        report.left_out(place, f"{bare[:20]!r} is not hexadecimal data")
+        report.left_out(place, "description.not-hexadecimal", value=bare[:20])
         return None
 
 

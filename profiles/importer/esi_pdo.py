@@ -46,7 +46,7 @@ class PdoReader:
         place = f"{self._file}: {'RxPdo' if direction == 'rx' else 'TxPdo'}"
         index = whole_number(text_of(child(pdo, "Index")), place, self._report)
         if index is None:
-            self._report.left_out(place, "a PDO without an index")
+            self._report.left_out(place, "description.pdo-no-index")
             return []
         if flag_of(child(pdo, "Index"), "DependOnSlot"):
             index += self._part_of_device.pdo_shift
@@ -92,13 +92,15 @@ class PdoReader:
             return (None, bits) if bits and bits <= _MOST_BITS else None
         subindex = whole_number(text_of(child(item, "SubIndex")), where, self._report) or 0
         if not 0x1000 <= object_index <= 0xFFFF or not 0 <= subindex <= 255:
-            self._report.left_out(where, f"entry {object_index:#x}:{subindex}")
+            self._report.left_out(
+                where, "description.pdo-entry-invalid", index=object_index, subindex=subindex
+            )
             return None
         key = f"{object_index:04X}:{subindex:02X}"
         if key not in self._seen and len(self._entries) < MAX_ENTRIES:
             kind = named_type(text_of(child(item, "DataType")), bits) or named_type("", bits)
             if kind is None:
-                self._report.left_out(where, f"{key} has no known type")
+                self._report.left_out(where, "description.mapped-type-unknown", key=key)
                 return (None, bits) if bits and bits <= _MOST_BITS else None
             access: Access = "rw" if direction == "rx" else "ro"
             name = tidy(name_of(item)) or f"Object {key}"

@@ -49,7 +49,9 @@ class EsiTypes:
         for member in members:
             if member.subindex in seen:
                 self._report.noted(
-                    f"{self._file}: {name}", f"subindex {member.subindex} is there twice"
+                    f"{self._file}: {name[:30]}",
+                    "description.subindex-twice",
+                    subindex=member.subindex,
                 )
             elif 0 <= member.subindex <= 255:
                 seen.add(member.subindex)
@@ -65,7 +67,11 @@ class EsiTypes:
             first, count, base = array
             if first + count - 1 > _LONGEST_ARRAY:
                 self._report.left_out(
-                    place, f"{count} elements from {first} on: subindices end at {_LONGEST_ARRAY}"
+                    place,
+                    "description.array-too-long",
+                    elements=count,
+                    first=first,
+                    last=_LONGEST_ARRAY,
                 )
             return [
                 Member(first + n, f"{first + n}", base, None, flags)

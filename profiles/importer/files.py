@@ -75,25 +75,19 @@ def import_file(
     return build_profile(read_eds(data, name, report), report, drive=drive)
 
 
-#: How files begin that are handed in for a description, and what they are.
+#: How files begin that are handed in for a description, and what is said of them.
 _OTHER_FILES = (
-    (rb"PK\x03\x04|\x1f\x8b|Rar!|7z\xbc\xaf", "an archive", "unpack it and choose the file in it"),
-    (rb"%PDF", "a PDF document", "ask the maker for the ESI or EDS file"),
-    (
-        rb"(?is)\s*(<!doctype html|<html)", "a web page",
-        "the download did not give the file: log in there, or ask the maker",
-    ),
-    (
-        rb"(?s).{0,600}<ISO15745ProfileContainer", "an XDD or XDC file (CiA 311)",
-        "choose the EDS file, which makers of such drives offer as well",
-    ),
-)  # fmt: skip
+    (rb"PK\x03\x04|\x1f\x8b|Rar!|7z\xbc\xaf", "description.archive"),
+    (rb"%PDF", "description.pdf"),
+    (rb"(?is)\s*(<!doctype html|<html)", "description.web-page"),
+    (rb"(?s).{0,600}<ISO15745ProfileContainer", "description.xdd"),
+)
 
 
 def _refuse_what_is_known(data: bytes, name: str) -> None:
-    for begins, what, remedy in _OTHER_FILES:
+    for begins, code in _OTHER_FILES:
         if re.match(begins, data[:1000].lstrip(b"\xef\xbb\xbf")):
-            raise ImportFailed(f"{name} is {what}, not an ESI, EDS or DCF file: {remedy}")
+            raise ImportFailed(code, file=name)
 
 
 def is_xml(data: bytes) -> bool:
@@ -114,21 +108,27 @@ def _choose(
     of_product = [d for d in devices if product_code in (None, d.product_code)]
     if not of_product:
         known = ", ".join(_named(d) for d in devices[:10])
-        raise ImportFailed(f"{file.name} has no product {product_code or 0:#x}; it has {known}")
+        raise ImportFailed(
+            "description.no-product", file=file.name, product=product_code or 0, known=known
+        )
     matching = [d for d in of_product if revision in (None, d.revision)]
     if not matching and product_code is None:
         known = ", ".join(_named(d) for d in devices[:10])
-        raise ImportFailed(f"{file.name} has no revision {revision or 0:#x}; it has {known}")
+        raise ImportFailed(
+            "description.no-revision", file=file.name, revision=revision or 0, known=known
+        )
     # The newest revision of the right product is nearer than any other product.
     chosen = _newest(matching or of_product)
     others = tuple(d for d in devices if d.number != chosen.number)
     if not matching:
         report.noted(
-            file.name, f"revision {revision or 0:#x} is not in it, {_named(chosen)} is used"
+            file.name, "description.other-revision", revision=revision or 0, used=_named(chosen)
         )
     elif len(matching) > 1:
         offered = ", ".join(_named(d) for d in matching if d.number != chosen.number)
-        report.noted(file.name, f"{_named(chosen)} is used; there are also {offered[:400]}")
+        report.noted(
+            file.name, "description.others-in-file", used=_named(chosen), others=offered[:400]
+        )
     return chosen, others
 
 
@@ -140,7 +140,9 @@ def _newest(devices: list[EsiDevice]) -> EsiDevice:
 
 
 def _named(device: EsiDevice) -> str:
-    return f"{device.name} ({device.product_code or 0:#x} revision {device.revision or 0:#x})"
+    """The device with the names that its numbers have in the file, for any language."""
+    product, revision = device.product_code or 0, device.revision or 0
+    return f"{device.name} (ProductCode {product:#x}, RevisionNo {revision:#x})"
 
 
 @_without_collection()
@@ -152,9 +154,7 @@ def write_profile(imported: Profile, folder: Path) -> Path:
     """
     target = folder / imported.drive / "profile.yaml"
     if target.exists():
-        raise ImportFailed(
-            f"{target} exists: import under another name, or move the old profile away first"
-        )
+        raise ImportFailed("description.profile-file-exists", path=str(target))
     text = profile_yaml(imported)
     target.parent.mkdir(parents=True, exist_ok=True)
     # Whole or not at all: the loader would trip over half a profile at every start.

@@ -2,7 +2,9 @@
 
 A maker's file may take seconds, and it is not known what is in it. Here it holds up no motion, and
 whoever started it can end it. One task comes pickled on the standard input, from our own parent
-only; one JSON object goes to the standard output: ``{"ok": …}`` or ``{"error": "…"}``.
+only; one JSON object goes to the standard output: ``{"ok": …}``, ``{"refused": {"code": …,
+"params": …}}`` with a message of the catalogue, or ``{"error": "…"}`` in the words of the operating
+system.
 """
 
 from __future__ import annotations
@@ -85,13 +87,13 @@ def _written(imported: ImportedProfile, folder: Path) -> dict[str, object]:
     """Write the profile and read it back the way everybody else will."""
     profile, report = imported.profile, imported.report
     if profile.drive in drive_names():
-        raise ImportFailed(f"there is a profile {profile.drive!r} already: choose another name")
+        raise ImportFailed("description.profile-exists", name=profile.drive)
     path = write_profile(profile, folder)
     try:
         load_profile(profile.drive)
     except ProfileError as error:
         path.unlink(missing_ok=True)
-        raise ImportFailed(f"what was made of it cannot be read back: {error}") from error
+        raise ImportFailed("description.not-read-back", detail=str(error)) from error
     return {
         "profile": profile.drive,
         "title": profile.title,
@@ -101,9 +103,9 @@ def _written(imported: ImportedProfile, folder: Path) -> dict[str, object]:
         "links": [spec.kind for spec in profile.links],
         "parameters": len(profile.parameters),
         "path": str(path),
-        "summary": report.summary(),
         "findings": [
-            {"place": f.place, "text": f.text, "outcome": f.outcome} for f in report.findings
+            {"place": f.place, "code": f.code, "params": dict(f.params), "outcome": f.outcome}
+            for f in report.findings
         ],
         "not_listed": report.not_listed,
     }
@@ -115,7 +117,9 @@ def main() -> None:
     answer: dict[str, object]
     try:
         answer = {"ok": task.run()}
-    except (ImportFailed, OSError) as error:
+    except ImportFailed as error:
+        answer = {"refused": {"code": error.code, "params": dict(error.params)}}
+    except OSError as error:
         answer = {"error": str(error)}
     json.dump(answer, sys.stdout)
 

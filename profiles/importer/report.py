@@ -1,28 +1,49 @@
-"""What was odd about a description file."""
+"""What was odd about a description file: codes of the catalogue with their facts.
+
+Words are made of them where they are shown (`drivers.texts.imports`).
+"""
 
 from __future__ import annotations
 
-from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, TypeAlias
 
 _KEPT = 500
+#: A reader of JSON rounds whole numbers beyond this.
+_EXACT = 2**53
+
+Fact: TypeAlias = str | int | float
+Outcome: TypeAlias = Literal["repaired", "left out", "noted"]
 
 
 class ImportFailed(Exception):
-    """Nothing usable is in the file; the message states why and what to do."""
+    """Nothing usable is in the file: a code of the catalogue and its facts state why."""
+
+    def __init__(self, code: str, /, **params: Fact) -> None:
+        super().__init__(code, params)
+        self.code = code
+        self.params: Mapping[str, Fact] = _facts(params)
+
+    def __str__(self) -> str:
+        return _code_with_facts(self.code, self.params)
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One oddity: where, what, and what was made of it."""
+    """One oddity: where, what, and what was made of it.
+
+    ``place`` is a file with its line, section or element, in the spelling of the file; ``code``
+    and ``params`` are the message.
+    """
 
     place: str
-    text: str
-    outcome: Literal["repaired", "left out", "noted"]
+    code: str
+    params: Mapping[str, Fact]
+    outcome: Outcome
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.text} ({self.outcome})"
+        return f"{self.place}: {_code_with_facts(self.code, self.params)} [{self.outcome}]"
 
 
 @dataclass(slots=True)
@@ -32,29 +53,33 @@ class ImportReport:
     findings: list[Finding] = field(default_factory=list)
     not_listed: int = 0
 
-    def repaired(self, place: str, text: str) -> None:
+    def repaired(self, place: str, code: str, /, **params: Fact) -> None:
         """Something wrong whose meaning is clear."""
-        self._add(Finding(place, text, "repaired"))
+        self._add(place, code, params, "repaired")
 
-    def left_out(self, place: str, text: str) -> None:
+    def left_out(self, place: str, code: str, /, **params: Fact) -> None:
         """Something that could not be understood and is missing from the profile."""
-        self._add(Finding(place, text, "left out"))
+        self._add(place, code, params, "left out")
 
-    def noted(self, place: str, text: str) -> None:
+    def noted(self, place: str, code: str, /, **params: Fact) -> None:
         """Something that the user should know."""
-        self._add(Finding(place, text, "noted"))
+        self._add(place, code, params, "noted")
 
-    def _add(self, finding: Finding) -> None:
+    def _add(self, place: str, code: str, params: Mapping[str, Fact], outcome: Outcome) -> None:
         if len(self.findings) < _KEPT:
-            self.findings.append(finding)
+            self.findings.append(Finding(place, code, _facts(params), outcome))
         else:
             self.not_listed += 1
 
-    def summary(self) -> str:
-        """One sentence for a heading."""
-        if not self.findings:
-            return "nothing odd"
-        counts = Counter(f.outcome for f in self.findings)
-        parts = [f"{counts[o]} {o}" for o in ("repaired", "left out", "noted") if counts[o]]
-        extra = f", {self.not_listed} more not listed" if self.not_listed else ""
-        return ", ".join(parts) + extra
+
+def _facts(params: Mapping[str, Fact]) -> dict[str, Fact]:
+    """Facts that JSON carries as they are."""
+    return {
+        name: str(fact) if isinstance(fact, int) and abs(fact) > _EXACT else fact
+        for name, fact in params.items()
+    }
+
+
+def _code_with_facts(code: str, params: Mapping[str, Fact]) -> str:
+    facts = ", ".join(f"{name}={fact}" for name, fact in params.items())
+    return f"{code} ({facts})" if facts else code

@@ -26,7 +26,7 @@ def check_size(data: bytes, limit: int, name: str) -> None:
     """Raises ImportFailed above ``limit`` bytes."""
     if len(data) > limit:
         raise ImportFailed(
-            f"{name} has {len(data)} bytes, more than the {limit // 2**20} MiB that are read"
+            "description.too-large", file=name, size_bytes=len(data), limit_mib=limit // 2**20
         )
 
 
@@ -37,13 +37,13 @@ def decode_text(data: bytes, name: str, report: ImportReport) -> str:
             return data[len(mark) :].decode(encoding, "replace")
     for zero, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
         if len(data) > 1 and data[zero] == 0 and 0 < data[1 - zero] < 0x80:
-            report.repaired(name, "UTF-16 without a byte order mark")
+            report.repaired(name, "description.utf16-no-mark")
             return data.decode(encoding, "replace")
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:
         encoding = "gb18030" if _looks_chinese(data) else "cp1252"
-    report.repaired(name, f"the text is not UTF-8, read as {encoding}")
+    report.repaired(name, "description.not-utf8", encoding=encoding)
     return data.decode(encoding, "replace")
 
 
@@ -73,11 +73,11 @@ def decode_xml(data: bytes, name: str, report: ImportReport) -> str:
     else:
         encoding = declared.group(1).decode("ascii").lower()
         if _python_name(encoding) not in _KNOWN_ENCODINGS:
-            report.repaired(name, f"unknown encoding {encoding!r}, read as UTF-8")
+            report.repaired(name, "description.encoding-unknown", encoding=encoding)
             encoding = "utf-8"
         try:
             text = data.decode(encoding.replace("windows-936", "gbk"))
         except (UnicodeDecodeError, LookupError):
-            report.repaired(name, f"the text is not {encoding} as declared")
+            report.repaired(name, "description.encoding-differs", encoding=encoding)
             text = decode_text(data, name, report)
     return _DECLARATION.sub("", text.lstrip("\ufeff \t\r\n\0"), count=1)

@@ -79,8 +79,8 @@ _UNIT_CODES = {
 _UNIT_IN_NAME = re.compile(r"[\[({（]\s*(?:unit\s*:?\s*)?([^\])}）]{1,12}?)\s*[\])}）]\s*$", re.I)
 _NODE_ID = re.compile(r"\$?\s*NODE[-_ ]?ID", re.I)
 _LONGEST_NUMBER = 40
-#: What the formats call an upper limit.
-_MAXIMA = ("maximum", "highlimit")
+#: Fields of ESI and EDS files with an upper limit.
+_MAXIMA = ("MaxValue", "MaxData", "HighLimit")
 _REAL32_MAX = 3.4028234e38
 
 
@@ -96,7 +96,7 @@ def parse_number(text: str, place: str, report: ImportReport) -> int | float | N
     if not bare or bare in ("-", "0x", "0X"):
         return None
     if len(bare) > _LONGEST_NUMBER:
-        report.left_out(place, f"{bare[:20]}… is too long for a number")
+        report.left_out(place, "description.number-too-long", value=bare[:20])
         return None
     if bare.lower() in ("true", "false"):
         return int(bare.lower() == "true")
@@ -114,31 +114,31 @@ def _based(
     try:
         return sign * int(digits, base)
     except ValueError:
-        report.left_out(place, f"{text.strip()!r} is not a number")
+        report.left_out(place, "description.no-number", value=text.strip())
         return None
 
 
 def _decimal(bare: str, text: str, place: str, report: ImportReport) -> int | float | None:
     if re.fullmatch(r"[+-]?\d+", bare):
         if re.fullmatch(r"[+-]?0\d+", bare):
-            report.noted(place, f"{bare} has leading zeros and was read as decimal")
+            report.noted(place, "description.leading-zeros", value=bare)
         return int(bare)
     if re.fullmatch(r"[+-]?[0-9a-fA-F]+[hH]", bare):
-        report.repaired(place, f"{bare} was read as hexadecimal")
+        report.repaired(place, "description.hexadecimal", value=bare)
         return int(bare[:-1], 16)
     if re.fullmatch(r"[+-]?\d+,\d+", bare):
-        report.repaired(place, f"{bare} has a decimal comma")
+        report.repaired(place, "description.decimal-comma", value=bare)
         bare = bare.replace(",", ".")
     try:
         value = float(bare)
     except ValueError:
         if re.fullmatch(r"[0-9a-fA-F]{2,16}", bare):
-            report.repaired(place, f"{bare} was read as hexadecimal")
+            report.repaired(place, "description.hexadecimal", value=bare)
             return int(bare, 16)
-        report.left_out(place, f"{text.strip()!r} is not a number")
+        report.left_out(place, "description.no-number", value=text.strip())
         return None
     if not math.isfinite(value):
-        report.left_out(place, f"{text.strip()!r} is not a finite number")
+        report.left_out(place, "description.not-finite", value=text.strip())
         return None
     return value
 
@@ -159,9 +159,11 @@ def whole_number(text: str, place: str, report: ImportReport) -> int | None:
 
 
 def fit(
-    value: int | float | None, data_type: DataType, what: str, place: str, report: ImportReport
+    value: int | float | None, data_type: DataType, name: str, place: str, report: ImportReport
 ) -> int | float | None:
     """``value`` as a raw value of ``data_type``, or None with a finding.
+
+    ``name`` is that of the field in the file's format, such as ``MaxValue`` or ``HighLimit``.
 
     A positive number above a signed type's maximum that fits its width is two's complement:
     most makers write negative limits so. As a maximum, the number just above the type's own and
@@ -171,34 +173,45 @@ def fit(
         return None
     if data_type == "REAL32":
         if abs(value) > _REAL32_MAX:
-            report.left_out(place, f"{what} {value:g} does not fit REAL32")
+            report.left_out(
+                place, "description.does-not-fit", name=name, value=value, type=data_type
+            )
             return None
         return float(value)
     if value != int(value):
-        report.left_out(place, f"{what} {value:g} is not whole, the type is {data_type}")
+        report.left_out(place, "description.not-whole", name=name, value=value, type=data_type)
         return None
     if isinstance(value, float):
-        report.repaired(place, f"{what} {value} is written with a decimal point")
+        report.repaired(place, "description.decimal-point", name=name, value=value)
     low, high = INTEGER_RANGE[data_type]
     whole = int(value)
-    if low < 0 and what in _MAXIMA and whole in (high + 1, 2 * high + 1):
-        report.repaired(place, f"{what} {whole} does not fit {data_type}, taken as {high}")
+    if low < 0 and name in _MAXIMA and whole in (high + 1, 2 * high + 1):
+        report.repaired(
+            place, "description.maximum-taken", name=name, value=whole, type=data_type, taken=high
+        )
         return high
     if whole > high and low < 0 and whole <= 2 * high + 1:
         return whole - 2 * (high + 1)
     if -(2**15) <= low < 0 and 2**32 + low <= whole < 2**32:
-        report.repaired(place, f"{what} {whole:#x} is a negative number of 32 bits")
+        report.repaired(place, "description.negative-32-bit", name=name, value=whole)
         return whole - 2**32
     if not low <= whole <= high:
-        report.left_out(place, f"{what} {whole} does not fit {data_type}")
+        report.left_out(place, "description.does-not-fit", name=name, value=whole, type=data_type)
         return None
     return whole
 
 
 def default_value(
-    text: str, data_type: DataType, place: str, report: ImportReport
+    text: str,
+    data_type: DataType,
+    place: str,
+    report: ImportReport,
+    name: str = "DefaultValue",
 ) -> tuple[Raw | None, str]:
-    """A default and a remark: a default that depends on the node number has no fixed value."""
+    """A default and a remark: a default that depends on the node number has no fixed value.
+
+    ``name`` is that of the field in the file's format.
+    """
     if _NODE_ID.search(text):
         return None, f"default {text.strip()[:60]}"
     if data_type == "STRING":
@@ -209,8 +222,8 @@ def default_value(
     if data_type == "REAL32" and bits is not None:
         # Nobody writes a real number in hexadecimal: these are its bits.
         return struct.unpack(">f", bytes.fromhex(bits.group(1).rjust(8, "0")))[0], ""
-    number = parse_number(text, f"{place} default", report)
-    return fit(number, data_type, "default", place, report), ""
+    number = parse_number(text, f"{place} {name}", report)
+    return fit(number, data_type, name, place, report), ""
 
 
 def named_type(name: str, bits: int | None) -> DataType | None:
@@ -231,7 +244,7 @@ def parse_access(text: str, place: str, report: ImportReport) -> Access:
     """Access rights; what cannot be understood becomes read-only, the harmless choice."""
     access = _ACCESS.get(text.strip().lower().replace(" ", "").replace("-", ""))
     if access is None:
-        report.repaired(place, f"access {text.strip()!r} is unknown, taken as read-only")
+        report.repaired(place, "description.access-unknown", access=text.strip())
         return "ro"
     return access
 

@@ -108,6 +108,26 @@ def _jog(station: Station, drive: str) -> None:
     assert float(station.state(drive)["position"]) - before > 0.5
 
 
+def test_findings_are_in_the_language_of_whoever_asks(station: Station) -> None:
+    answer = station.http.post(
+        "/descriptions", params={"file": "nova.eds", "profile": "spoken"}, content=makers_eds()
+    )
+    job = station.job(answer, 60)
+
+    def read(language: str) -> Any:
+        headers = {"Accept-Language": language}
+        return station.ok(station.http.get(f"/jobs/{job['id']}", headers=headers))["result"]
+
+    english, chinese = read("en"), read("zh")
+    facts = [(each["place"], each["text_message"]) for each in english["findings"]]
+    assert facts == [(each["place"], each["text_message"]) for each in chinese["findings"]]
+    assert len(facts) >= 2
+    assert "data type 0x0777 is unknown" in [each["text"] for each in english["findings"]]
+    assert "数据类型 0x0777 未知" in [each["text"] for each in chinese["findings"]]
+    assert "left out" in english["summary"]
+    assert "忽略" in chinese["summary"]
+
+
 def test_an_edited_profile_is_used_without_a_restart(station: Station) -> None:
     made = imported(station, makers_eds(), "nova.eds", profile="edited")
     path = Path(made["path"])

@@ -74,7 +74,9 @@ def _entries(language: Language) -> dict[str, set[str]]:
 ENGLISH, CHINESE = _entries("en"), _entries("zh")
 ERRORS = {each.__name__ for each in _kinds_of(DriveError)}
 #: Functions that make a message of a code.
-_MAKERS = {"text", "Text", "print_text", "note", "words_of", *ERRORS}
+_MAKERS = {"text", "Text", "print_text", "note", "words_of", "ImportFailed", *ERRORS}
+#: Functions of an import's report that take a place before the code.
+_REPORTING = {"repaired", "left_out", "noted"}
 
 
 class _Source(NamedTuple):
@@ -104,20 +106,23 @@ def _sources() -> list[_Source]:
     return found
 
 
+def _code_of(node: ast.Call) -> ast.expr | None:
+    """The argument that is a message's code; None where the call makes no message."""
+    called = _called(node)
+    if called in _MAKERS and node.args:
+        return node.args[0]
+    return node.args[1] if called in _REPORTING and len(node.args) > 1 else None
+
+
 def _raised() -> set[str]:
     return {words for source in _sources() for words in source.strings if is_code(words)}
 
 
 def _shown() -> set[str]:
     """What errors and messages are made of: `NotAllowed("…")`, `text("…")`."""
-    firsts = (
-        node.args[0]
-        for source in _sources()
-        for node in source.calls
-        if node.args and _called(node) in _MAKERS
-    )
+    made = (_code_of(node) for source in _sources() for node in source.calls)
     return {
-        node.value for node in firsts
+        node.value for node in made
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and is_code(node.value)
     }  # fmt: skip
 
@@ -259,3 +264,26 @@ def test_no_error_carries_a_sentence() -> None:
             if any(_is_sentence(each) for each in (*node.args[:1], *advice)):
                 found.append(f"{source.name}:{node.lineno}")
     assert not found, "\n".join(found)
+
+
+def test_no_import_reports_a_sentence() -> None:
+    """Findings of the importer and its errors are codes, with the facts in named arguments."""
+    calls = [
+        (f"{source.name}:{node.lineno}", node)
+        for source in _sources()
+        if source.name.startswith("profiles/importer/")
+        for node in source.calls
+        if _called(node) in {"ImportFailed", *_REPORTING}
+    ]
+    assert len(calls) > 80
+    found = [
+        place for place, node in calls
+        if (code := _code_of(node)) is None or _is_sentence(code)
+        or len(node.args) > (1 if _called(node) == "ImportFailed" else 2)
+    ]  # fmt: skip
+    assert not found, "\n".join(found)
+    codes = {
+        words for source in _sources() if source.name.startswith("profiles/")
+        for words in source.strings if is_code(words) and words.startswith("description.")
+    }  # fmt: skip
+    assert codes <= set(ENGLISH), "in no file of texts/catalogue"

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
 from backend.api import convert
 from backend.api.context import TheBench, TheDrive
-from backend.api.errors import NotFound
+from backend.api.errors import NotFound, message_of, words_of
 from backend.api.models import JobInfo
 from backend.api.station.models import ProfileMatch
 from backend.api.station.models_description import (
     PROFILE_NAME,
     DescribedDevice,
     ImportedDescription,
+    ImportFinding,
     LineSearchRequest,
     LineSearchResult,
     MissingPort,
@@ -29,7 +30,8 @@ from backend.work.jobs import JobResult, Progress
 from drivers.errors import NotAllowed
 from drivers.link import Found
 from drivers.texts import limits
-from drivers.texts.message import reason_of, text
+from drivers.texts.imports import failure_text, message_of_import, summary_text
+from drivers.texts.message import Text, reason_of, text
 from profiles import drive_names, load_profile
 from profiles.importer import ImportFailed, export_eds, export_esi
 from profiles.importer.esi import MAX_BYTES
@@ -101,9 +103,12 @@ async def import_description(
 
     async def work(progress: Progress) -> JobResult:
         progress(0.0, text("api-station.reading", file=file))
-        made = ImportedDescription.model_validate(await import_in_process(task))
+        made = _imported(await import_in_process(task))
         line = text(
-            "journal.description-imported", file=file, profile=made.profile, summary=made.summary
+            "journal.description-imported",
+            file=file,
+            profile=made.profile,
+            summary=_summary(made),
         )
         bench.journal.add(line)
         return made.model_dump(mode="json")
@@ -115,7 +120,7 @@ async def import_description(
 async def read_dictionary(bench: TheBench, request: ReadDictionaryRequest) -> JobInfo:
     """Make a profile from a drive's own dictionary; the job's result is ImportedDescription."""
     _require_new(request.profile)
-    place = f"station {request.station} of {request.url}"
+    place = text("api-station.station-of-bus", station=request.station, url=request.url)
 
     async def work(progress: Progress) -> JobResult:
         progress(0.0, text("api-station.looking", place=place))
@@ -128,12 +133,12 @@ async def read_dictionary(bench: TheBench, request: ReadDictionaryRequest) -> Jo
             task = await drive_task(link, found, request.profile, progress)
         except ImportFailed as error:
             raise BadDescription(
-                "api-station.description-of-drive", place=place, cause=str(error)
+                "api-station.description-of-drive", place=place, cause=failure_text(error)
             ) from error
         progress(0.95, text("api-station.making-profile"))
-        made = ImportedDescription.model_validate(await import_in_process(task))
+        made = _imported(await import_in_process(task))
         line = text(
-            "journal.dictionary-read", place=place, profile=made.profile, summary=made.summary
+            "journal.dictionary-read", place=place, profile=made.profile, summary=_summary(made)
         )
         bench.journal.add(line)
         return made.model_dump(mode="json")
@@ -178,6 +183,30 @@ async def export_slave_information(profile: ProfileName) -> Response:
         media_type="application/xml",
         headers={"Content-Disposition": f'attachment; filename="{known.drive}.xml"'},
     )
+
+
+def _imported(reported: dict[str, Any]) -> ImportedDescription:
+    """What the process of an import reports, with its messages."""
+    findings = [
+        ImportFinding(
+            place=found["place"],
+            text=words_of(message := message_of_import(found)),
+            text_message=message_of(message),
+            outcome=found["outcome"],
+        )
+        for found in reported.pop("findings")
+    ]
+    summary = summary_text((each.outcome for each in findings), reported["not_listed"])
+    return ImportedDescription(
+        **reported,
+        summary=words_of(summary),
+        summary_message=message_of(summary),
+        findings=findings,
+    )
+
+
+def _summary(made: ImportedDescription) -> Text:
+    return summary_text((each.outcome for each in made.findings), made.not_listed)
 
 
 def _known(name: str) -> Profile:

@@ -8,6 +8,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from backend.api.models import Message
 from backend.api.station.models import FoundDrive
+from backend.tools.wire_message import MessageInfo
 
 #: What a profile may be called.
 PROFILE_NAME = r"^[a-z][a-z0-9_]{0,59}$"
@@ -57,8 +58,9 @@ class MotionClassRequest(Message):
 class ImportFinding(Message):
     """Something odd about a description: where, what, and what was made of it."""
 
-    place: str
+    place: str = Field(description="the file with its line, section or element")
     text: str
+    text_message: MessageInfo = Field(description="of text")
     outcome: Literal["repaired", "left out", "noted"]
 
 
@@ -74,6 +76,7 @@ class ImportedDescription(Message):
     parameters: int
     path: str = Field(description="the file to edit on the server's machine")
     summary: str
+    summary_message: MessageInfo = Field(description="of summary")
     findings: list[ImportFinding]
     not_listed: int = Field(description="findings beyond those listed")
 

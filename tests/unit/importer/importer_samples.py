@@ -4,6 +4,15 @@ Each text was written for these tests; no maker's file is copied. The comments s
 of which makers, or of which tools that they use, the oddity was seen.
 """
 
+from profiles.importer import ImportedProfile
+from profiles.importer.report import Fact
+
+
+def facts(imported: ImportedProfile) -> list[tuple[str, dict[str, Fact]]]:
+    """Code and facts of each finding."""
+    return [(each.code, dict(each.params)) for each in imported.report.findings]
+
+
 GOOD_EDS = """\
 [FileInfo]
 FileName=good.eds

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import canopen
 import pytest
-from importer_samples import GOOD_EDS, ODD_EDS, with_object
+from importer_samples import GOOD_EDS, ODD_EDS, facts, with_object
 
 from profiles.importer import ImportFailed, export_eds, import_file, write_profile
 from profiles.importer.eds import MAX_BYTES
@@ -52,30 +52,42 @@ def test_counting_subindices_are_no_parameters() -> None:
     ("oddity", "key", "field", "value", "finding"),
     [
         ("blanks", "2100:00", "type", "UINT16", None),
-        ("orphan", "2100:01", "default_raw", 3, "no section of its own"),
+        ("orphan", "2100:01", "default_raw", 3, "description.no-own-section"),
         ("sub_case", "210A:01", "default_raw", 3, None),
         ("boolean", "2100:00", "default_raw", 1, None),
-        ("point", "2100:00", "default_raw", 5, "decimal point"),
-        ("deftype", "2100:00", "type", "UINT16", "defined by the file"),
-        ("zeros", "2100:00", "default_raw", 50, "leading zeros"),
-        ("modules", "2100:00", "type", "UINT16", "pluggable modules"),
+        ("point", "2100:00", "default_raw", 5, "description.decimal-point"),
+        ("deftype", "2100:00", "type", "UINT16", "description.type-of-file"),
+        ("zeros", "2100:00", "default_raw", 50, "description.leading-zeros"),
+        ("modules", "2100:00", "type", "UINT16", "description.module-sections"),
         ("compact", "2100:03", "default_raw", 9, None),
         ("compact", "2100:02", "name", "Rate: Second", None),
         ("access", "2100:00", "access", "ro", None),
         ("access", "2100:00", "default_raw", None, None),
         ("limits", "2100:00", "default_raw", -2, None),
-        ("limits", "2100:00", "min_raw", None, "above maximum"),
-        ("no_limits", "2100:00", "max_raw", None, "taken as not given"),
-        ("stray", "2100:00", "type", "UINT16", "neither a section nor a value"),
-        ("stray", "2100:00", "default_raw", None, "is not a number"),
-        ("suffix", "2100:00", "default_raw", 16, "hexadecimal"),
-        ("suffix", "2100:00", "access", "ro", "access 'rwx' is unknown"),
-        ("twice", "2100:00", "default_raw", 1, "a second time"),
-        ("count", "2100:01", "type", "UINT16", "9 subindices are announced and 2 given"),
-        ("count", "2100:01", "type", "UINT16", "2999h is listed but not described"),
-        ("sign", "606C:00", "type", "INT32", "CiA 402 says INT32"),
+        ("limits", "2100:00", "min_raw", None, "description.limits-swapped"),
+        ("no_limits", "2100:00", "max_raw", None, "description.limits-zero"),
+        ("stray", "2100:00", "type", "UINT16", "description.no-section-no-value"),
+        ("stray", "2100:00", "default_raw", None, "description.no-number"),
+        ("suffix", "2100:00", "default_raw", 16, "description.hexadecimal"),
+        ("suffix", "2100:00", "access", "ro", "description.access-unknown (access=rwx)"),
+        ("twice", "2100:00", "default_raw", 1, "description.section-twice"),
+        (
+            "count",
+            "2100:01",
+            "type",
+            "UINT16",
+            "description.subindices-differ (announced=9, given=2)",
+        ),
+        ("count", "2100:01", "type", "UINT16", "description.listed-not-described (index=10649)"),
+        (
+            "sign",
+            "606C:00",
+            "type",
+            "INT32",
+            "description.type-replaced (key=606C:00, type=UINT32, standard=INT32)",
+        ),
         ("sign", "606C:00", "max_raw", -1, None),
-        ("no_type", "6064:00", "type", "INT32", "taken from CiA 402"),
+        ("no_type", "6064:00", "type", "INT32", "description.type-of-standard"),
     ],
 )
 def test_oddities_are_understood_and_reported(
@@ -93,8 +105,8 @@ def test_oddities_are_understood_and_reported(
 def test_an_unknown_type_is_left_out_and_said() -> None:
     imported = import_file(with_object(ODD_EDS["unknown_type"]), "odd.eds")
     assert "2100:00" not in imported.profile.by_key
-    assert any("0x00ff is unknown" in str(f) for f in imported.report.findings)
-    assert "left out" in imported.report.summary()
+    assert ("description.type-code-unknown", {"type": 0xFF}) in facts(imported)
+    assert {f.outcome for f in imported.report.findings} == {"left out"}
 
 
 @pytest.mark.parametrize(
@@ -114,12 +126,14 @@ def test_makers_use_many_encodings(encoding: str, text: str) -> None:
 
 @pytest.mark.parametrize("data", [b"", b"hello", b"[2000]\nx=y\n", b"\0" * 1000, b"PK\x03\x04"])
 def test_what_is_no_eds_file_is_refused_with_a_reason(data: bytes) -> None:
-    with pytest.raises(ImportFailed, match=r"file|known type"):
+    with pytest.raises(
+        ImportFailed, match=r"description\.(no-eds-objects|no-typed-object|archive) \(file=x.eds"
+    ):
         import_file(data, "x.eds")
 
 
 def test_a_file_that_is_too_big_is_not_read() -> None:
-    with pytest.raises(ImportFailed, match="more than the 8 MiB"):
+    with pytest.raises(ImportFailed, match=r"too-large .*limit_mib=8"):
         import_file(b";" * (MAX_BYTES + 1), "x.eds")
 
 
@@ -127,7 +141,7 @@ def test_values_of_one_machine_are_no_defaults() -> None:
     odd = "[2100]\nParameterName=Rate\nDataType=6\nAccessType=rw\nDefaultValue=1\nParameterValue=2"
     imported = import_file(with_object(odd), "x.dcf")
     assert imported.profile.by_key["2100:00"].default_raw == 1
-    assert any("1 values configured for one machine" in str(f) for f in imported.report.findings)
+    assert ("description.configured-values", {"values": 1}) in facts(imported)
 
 
 CREATED = datetime(2026, 1, 2, 3, 4, tzinfo=UTC)
@@ -161,22 +175,22 @@ def test_an_imported_profile_is_written_and_loaded_like_any_other(tmp_path: Path
     profile = import_file(GOOD_EDS.encode(), "good.eds").profile
     target = write_profile(profile, tmp_path)
     assert parse_profile({"profile.yaml": target.read_text("utf-8")}) == profile
-    with pytest.raises(ImportFailed, match="exists"):
+    with pytest.raises(ImportFailed, match=r"description.profile-file-exists"):
         write_profile(profile, tmp_path)
 
 
 @pytest.mark.parametrize(
     ("data", "what"),
     [
-        (b"PK\x03\x04\x14\0", "an archive"),
-        (b"%PDF-1.7", "a PDF document"),
-        (b"\n<!DOCTYPE html><html><body>404</body></html>", "a web page"),
+        (b"PK\x03\x04\x14\0", "archive"),
+        (b"%PDF-1.7", "pdf"),
+        (b"\n<!DOCTYPE html><html><body>404</body></html>", "web-page"),
         (
             b'\xef\xbb\xbf<?xml version="1.0"?>\n<ISO15745ProfileContainer xmlns="x"/>',
-            "an XDD or XDC file",
+            "xdd",
         ),
     ],
 )
 def test_files_that_are_mistaken_for_a_description_are_named(data: bytes, what: str) -> None:
-    with pytest.raises(ImportFailed, match=rf"drive is {what}.*not an ESI, EDS or DCF file: "):
+    with pytest.raises(ImportFailed, match=rf"^description\.{what} \(file=drive\)$"):
         import_file(data, "drive")

@@ -55,7 +55,7 @@ async def test_the_drives_list_becomes_a_profile() -> None:
 
 async def test_a_drive_that_lists_nothing_is_reported() -> None:
     link: Any = FakeEthercat([])
-    with pytest.raises(ImportFailed, match="lists no objects"):
+    with pytest.raises(ImportFailed, match=r"description.no-objects-listed"):
         await profile_of_drive(link, FOUND, "x", lambda *_: None)
 
 

@@ -7370,10 +7370,15 @@ export interface components {
              * @enum {string}
              */
             outcome: "repaired" | "left out" | "noted";
-            /** Place */
+            /**
+             * Place
+             * @description the file with its line, section or element
+             */
             place: string;
             /** Text */
             text: string;
+            /** @description of text */
+            text_message: components["schemas"]["MessageInfo"];
         };
         /**
          * ImportedDescription
@@ -7404,6 +7409,8 @@ export interface components {
             revision: number | null;
             /** Summary */
             summary: string;
+            /** @description of summary */
+            summary_message: components["schemas"]["MessageInfo"];
             /** Title */
             title: string;
             /** Vendor Id */

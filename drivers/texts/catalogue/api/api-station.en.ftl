@@ -50,6 +50,7 @@ api-station_see-profiles = see the list of profiles
 api-station_send-confirmed = if all of this is true, send the request again with confirmed=true
 api-station_station-not-answer = station { $value } of { $url } does not answer
     .remedy = check its supply and cable, then scan the segment again
+api-station_station-of-bus = station { $station } of { $url }
 api-station_training-fault-needs-demo = { $drive }: training faults are for virtual drives
     .remedy = start `servodeck demo` and choose one of its axes
 api-station_try-setting = Try { $setting } = { $after } at station { $station } of { $url }

@@ -50,6 +50,7 @@ api-station_see-profiles = 参见配置文件列表
 api-station_send-confirmed = 如果上述各项均属实，请带 confirmed=true 重新发送
 api-station_station-not-answer = { $url } 的站 { $value } 无应答
     .remedy = 请检查其供电和电缆，然后重新扫描网段
+api-station_station-of-bus = { $url } 的站 { $station }
 api-station_training-fault-needs-demo = { $drive }：培训用故障仅用于虚拟驱动器
     .remedy = 请启动 `servodeck demo` 并选择其中的轴
 api-station_try-setting = 在 { $url } 的站 { $station } 上尝试 { $setting } = { $after }

@@ -1,5 +1,5 @@
 import type { FoundDrive, ImportedDescription } from '../../api/schema'
-import { useT } from '../../i18n'
+import { useSay, useT } from '../../i18n'
 import { ProfileExport } from './ProfileExport'
 
 type Finding = ImportedDescription['findings'][number]
@@ -54,9 +54,11 @@ export function ImportReport({
 
 function FindingLine({ finding }: { finding: Finding }) {
   const t = useT()
+  const say = useSay()
   return (
     <li>
-      <strong>{t(`notListed.outcome.${finding.outcome}`)}</strong> {finding.place}: {finding.text}
+      <strong>{t(`notListed.outcome.${finding.outcome}`)}</strong> {finding.place}:{' '}
+      {say.message(finding.text_message, finding.text)}
     </li>
   )
 }

@@ -1,0 +1,52 @@
+"""What an import of a description file reports, as messages of the catalogue."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import cast
+
+from drivers.texts.message import Text, joined, text
+from profiles.importer.report import Fact, Finding, ImportFailed, Outcome
+
+
+def message_of_import(message: Mapping[str, object]) -> Text:
+    """The message that the process of an import wrote as ``code`` and ``params``."""
+    return Text(str(message["code"]), cast(Mapping[str, Fact], message["params"]))
+
+
+def failure_text(error: ImportFailed) -> Text:
+    """Why nothing usable is in a file."""
+    return Text(error.code, error.params)
+
+
+def finding_text(finding: Finding) -> Text:
+    """An oddity of a file, without its place."""
+    return Text(finding.code, finding.params)
+
+
+def finding_line(finding: Finding) -> Text:
+    """An oddity of a file with its place and what was made of it."""
+    place, found = finding.place, finding_text(finding)
+    match finding.outcome:
+        case "repaired":
+            return text("description.line-repaired", place=place, finding=found)
+        case "left out":
+            return text("description.line-left-out", place=place, finding=found)
+        case "noted":
+            return text("description.line-noted", place=place, finding=found)
+
+
+def summary_text(outcomes: Iterable[Outcome], not_listed: int) -> Text:
+    """How many oddities there are, for a heading. ``not_listed`` are those beyond ``outcomes``."""
+    counts = Counter(outcomes)
+    parts: list[Text | str] = []
+    if count := counts["repaired"]:
+        parts.append(text("description.count-repaired", count=count))
+    if count := counts["left out"]:
+        parts.append(text("description.count-left-out", count=count))
+    if count := counts["noted"]:
+        parts.append(text("description.count-noted", count=count))
+    if not_listed:
+        parts.append(text("description.count-not-listed", count=not_listed))
+    return joined(parts, ", ") if parts else text("description.nothing-odd")
