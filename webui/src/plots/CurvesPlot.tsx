@@ -69,7 +69,8 @@ function options(
     ...axisLook(),
     values: (_plot: uPlot, splits: number[]) => splits.map((value) => figure(value, 4)),
   }
-  const series: uPlot.Series[] = [{ label: xLabel }]
+  const value = (_plot: uPlot, at: number | null) => (at === null ? '—' : figure(at, 4))
+  const series: uPlot.Series[] = [{ label: xLabel, ...(dates ? {} : { value }) }]
   const bands: uPlot.Band[] = []
   for (const curve of curves) {
     const at = series.length
@@ -79,10 +80,10 @@ function options(
       width: curve.points ? 0 : 1.8,
       spanGaps: true,
       points: { show: curve.points === true, size: 6, fill: curve.color },
-      value: (_plot, value) => (value === null ? '—' : figure(value, 4)),
+      value,
     })
     if (!curve.low || !curve.high) continue
-    const edge = { stroke: 'transparent', spanGaps: true, points: { show: false } }
+    const edge = { stroke: 'transparent', spanGaps: true, points: { show: false }, value }
     series.push({ ...edge, label: '2.5 %' }, { ...edge, label: '97.5 %' })
     bands.push({ series: [at + 2, at + 1], fill: `${curve.color}40` })
   }

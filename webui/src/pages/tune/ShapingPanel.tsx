@@ -140,7 +140,7 @@ function ShapingAnswer({ result, text }: { result: ShapingResult; text: Text }) 
       )}
       {shapingTables(result, text).map((table) => (
         <div className="scroll-table" key={table.name}>
-          <table className="reported-values" aria-label={table.name}>
+          <table className="reported-values of-lists" aria-label={table.name}>
             <thead>
               <tr>
                 {table.head.map((each) => (

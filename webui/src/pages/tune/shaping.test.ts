@@ -77,5 +77,5 @@ it('lists the impulses of each shaper, and the values of the drive', () => {
   expect(shapers?.rows).toEqual([
     ['chosen shaper=ZV', '52.00 / 48.00', '0.0 / 62.5', '0.0–3.3', '7.75–8.25'],
   ])
-  expect(drive?.rows).toEqual([['named parameter=P09.26 name=Frequency', '8 Hz']])
+  expect(drive?.rows).toEqual([['named parameter=P09.26 name=Frequency', '8\u00a0Hz']])
 })

@@ -131,7 +131,7 @@ export function shapingTables(result: ShapingResult, text: Text): ShownTable[] {
       head: [text('head.parameter'), text('head.value')],
       rows: values.map((each) => [
         text('named', { parameter: each.parameter, name: each.name }),
-        `${engineering(each.value)} ${each.unit}`.trim(),
+        `${engineering(each.value)}\u00a0${each.unit}`.trim(),
       ]),
     })
   }
