@@ -404,22 +404,6 @@ class friction_evaluate:
 class friction_run:
     """`friction/run.py`."""
 
-    # USED, FAST: Share of the permitted travel to each side that is used, and of the permitted
-    # speed.
-    USED = 0.8
-    """[ratio] Origin: 16e1fbc9."""
-    FAST = 0.9
-    """[ratio] Origin: 16e1fbc9."""
-    # RAMP_S, SETTLE_S, DWELL_S: Time of a ramp at least, and before a plateau counts; standstill
-    # between two strokes.
-    RAMP_S = 0.15
-    """[s] Origin: 16e1fbc9."""
-    SETTLE_S = 0.2
-    """[s] Origin: 16e1fbc9."""
-    DWELL_S = 0.15
-    """[s] Origin: 16e1fbc9."""
-    RAMP_SHARE = 0.35
-    """[ratio] Share of the torque beyond friction that ramps take. Origin: 16e1fbc9."""
     # LEAST_S, LONGEST_S: A plateau lasts so long at least, and no longer for the sake of a whole
     # revolution.
     LEAST_S = 0.3
@@ -868,6 +852,27 @@ class moves_small_move:
     """[count] Origin: 084d9723."""
     ARRIVED = 0.1
     """[ratio] Share of the way that may be missing. Origin: 084d9723."""
+
+
+class moves_strokes:
+    """`moves/strokes.py`."""
+
+    # USED, FAST: Share of the permitted travel to each side that is used, and of the permitted
+    # speed.
+    USED = 0.8
+    """[ratio] Origin: 16e1fbc9."""
+    FAST = 0.9
+    """[ratio] Origin: 16e1fbc9."""
+    # RAMP_S, SETTLE_S, DWELL_S: Time of a ramp at least, and before a plateau counts; standstill
+    # between two strokes.
+    RAMP_S = 0.15
+    """[s] Origin: 16e1fbc9."""
+    SETTLE_S = 0.2
+    """[s] Origin: 16e1fbc9."""
+    DWELL_S = 0.15
+    """[s] Origin: 16e1fbc9."""
+    RAMP_SHARE = 0.35
+    """[ratio] Share of the torque beyond friction that ramps take. Origin: 16e1fbc9."""
 
 
 class notch_effect:
