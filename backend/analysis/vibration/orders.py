@@ -70,7 +70,7 @@ def levels(
     """Amplitudes of speed [segments, components], their deviations, and those of torque.
 
     Not a number where a component is outside the band, has too few periods, or cannot be
-    distinguished from another one. A frequency gives way to an order that meets it.
+    distinguished from another one. Where an order meets a frequency, the level is the order's.
     """
     shape = len(segments), len(found)
     speed, deviation, torque = (np.full(shape, np.nan) for _ in range(3))

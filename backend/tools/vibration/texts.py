@@ -11,7 +11,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "help": (
         "Map vibration over speed, both directions: orders, frequencies and the resonances that "
         "orders excite. The axis moves.",
-        "测绘双向的振动-速度图谱：阶次、频率以及由阶次激发的共振。轴会运动。",
+        "测绘双向的振动-速度图谱：阶次、频率以及由阶次激发的谐振。轴会运动。",
     ),
     "lead": (
         "The axis turns at constant speeds, to and fro about where it stands, within the limits. "
@@ -23,7 +23,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "field.closer": ("Further speeds about the highest level", "最高振动附近补测的速度数"),
     "field.slowest_rpm": ("Slowest speed", "最低速度"),
     "unit.slowest_rpm": ("rpm", "rpm"),
-    "resonance": ("Resonance", "共振"),
+    "resonance": ("Resonance", "谐振"),
     "order": ("Order {order}, largest at {speed} rpm", "{order} 阶，在 {speed} rpm 处最大"),
     "frequency": ("Fixed frequency", "固定频率"),
     "head.order": ("Order per revolution", "每转阶次"),
@@ -32,7 +32,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "head.torque": ("Torque amplitude (%)", "转矩幅值 (%)"),
     "head.at": ("At (rpm)", "所在速度 (rpm)"),
     "head.place": ("Where it may come from", "可能来源"),
-    "head.resonance": ("Resonance (Hz)", "共振 (Hz)"),
+    "head.resonance": ("Resonance (Hz)", "谐振 (Hz)"),
     "head.excited_by": ("Excited by order", "激发阶次"),
     "head.avoid": ("Speeds to avoid (rpm)", "应避开的速度 (rpm)"),
     "head.speed": ("Speed (rpm)", "速度 (rpm)"),
@@ -62,11 +62,11 @@ TEXTS: dict[str, tuple[str, str]] = {
     "line.fourth": ("fourth order by size", "第四大阶次"),
     "finding.resonance": (
         "A resonance at {value} {unit} is excited where an order meets it.",
-        "在 {value} {unit} 处有共振，当某阶次达到该频率时被激发。",
+        "在 {value} {unit} 处有谐振，当某阶次达到该频率时被激发。",
     ),
     "finding.orders_only": (
         "{value} components repeat by the angle; no resonance shows between the speeds measured.",
-        "有 {value} 个分量随转角重复；在所测速度范围内未见共振。",
+        "有 {value} 个分量随转角重复；在所测速度范围内未见谐振。",
     ),
     "finding.nothing_seen": (
         "No order and no frequency stands out: none has more than about {value} {unit} at the "
@@ -82,7 +82,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "finding.highest_at_end": (
         "The level still rises at the fastest speed, {value} {unit}: whether a resonance follows "
         "cannot be known.",
-        "在最高速度 {value} {unit} 处振动仍在上升：无法得知其后是否有共振。",
+        "在最高速度 {value} {unit} 处振动仍在上升：无法得知其后是否有谐振。",
     ),
     "finding.not_closer": (
         "No time was left for further speeds about the highest level. Permit more time or measure "
