@@ -116,6 +116,16 @@ COMMANDS = {
         "Frequency and damping of the slow vibration after a move, input shapers for it, and the "
         "same move with one of them. The axis moves.",
     ),
+    "vibration": (
+        "tools:vibration",
+        "Map vibration over speed, both directions: orders, frequencies and the resonances that "
+        "orders excite. The axis moves.",
+    ),
+    "dwell": (
+        "tools:dwell",
+        "Vibrate at one frequency, for a person who looks for what rattles by hand and ear. The "
+        "axis moves.",
+    ),
     "cycle": (
         "tools:cycle",
         "Torque, speed, heat and braking energy of the machine's own cycle, from reading the drive "

@@ -1197,3 +1197,118 @@ class ring_down:
     SCATTER = 0.15
     """[ratio] Deviation of the frequencies between moves beyond which they are not one mode.
     Origin: docs/slow-vibration.md."""
+
+
+class sinusoids:
+    """`vibration/sinusoids.py`."""
+
+    MOST = 24
+    """[count] Sinusoids that are looked for in one recording. Origin: docs/vibration.md."""
+    STANDS_OUT = 18.0
+    """[ratio] Power over the noise around a line from which on it is a sinusoid: of white noise one
+    line in 10^7 is so high. Origin: docs/vibration.md."""
+    AROUND = 61
+    """[count] Lines, half a line apart, whose median is the noise. Origin: docs/vibration.md."""
+    TOGETHER = 2
+    """[count] So often the frequencies of all sinusoids are improved together. Origin:
+    docs/vibration.md."""
+    APART = 0.6
+    """[ratio] Of a line: two sinusoids that are closer cannot be distinguished. Origin:
+    docs/vibration.md."""
+
+
+class orders:
+    """`vibration/orders.py`."""
+
+    # SPEEDS, SPAN: An order or a frequency is stated that so many speeds show, whose fastest is so
+    # many times the slowest.
+    SPEEDS = 3
+    """[count] Origin: docs/vibration.md."""
+    SPAN = 1.15
+    """[ratio] Origin: docs/vibration.md."""
+    # DEVIATIONS, OF_LINE: So far from the others, in standard deviations and of a line, a sinusoid
+    # still belongs to them.
+    DEVIATIONS = 3.0
+    """[ratio] Origin: docs/vibration.md."""
+    OF_LINE = 0.1
+    """[ratio] Origin: docs/vibration.md."""
+    PERIODS = 3.0
+    """[count] Periods of a component that a speed has to hold. Origin: docs/vibration.md."""
+    APART = 1.0
+    """[ratio] Of a line: components that are closer have no levels of their own. Origin:
+    docs/vibration.md."""
+
+
+class level_peak:
+    """`vibration/level_peak.py`."""
+
+    MOST = 8
+    """[count] Frequencies at which a mode is looked for. Origin: docs/vibration.md."""
+    SCATTER = 0.03
+    """[ratio] A level is not known better than this, whatever the noise. Origin:
+    docs/vibration.md."""
+    REACH = 1.3
+    """[ratio] The oscillator describes the levels this far to both sides. Origin:
+    docs/vibration.md."""
+    STEP = 0.02
+    """[ratio] Step of the frequencies that are tried, as a logarithm. Origin: docs/vibration.md."""
+    # ZEROS, ZERO_REACH, START: The zero of a mode is looked for from these shares of its frequency
+    # on, so far as a logarithm; the damping of both begins with this.
+    ZEROS = (0.72, 0.86, 0.95)
+    """[ratio] Origin: docs/vibration.md."""
+    ZERO_REACH = 0.69
+    """[ratio] Origin: docs/vibration.md."""
+    START = 0.05
+    """[ratio] Origin: docs/vibration.md."""
+    WIDER = 1.2
+    """[ratio] Linearised intervals held 91 in 100 of 177 modes; so much wider they hold 95. Origin:
+    docs/vibration.md."""
+    # SPARE, EACH_SIDE: Points beyond what is fitted, and points on each side of the frequency.
+    SPARE = 3
+    """[count] Origin: docs/vibration.md."""
+    EACH_SIDE = 2
+    """[count] Origin: docs/vibration.md."""
+    CHANCE = 1e-4
+    """[ratio] Chance of a peak where there is none, at one frequency. Origin: docs/vibration.md."""
+    # DAMPINGS, DAMPING_STEPS: Damping ratios that are tried, and how many at first.
+    DAMPINGS = (0.004, 0.3)
+    """[ratio] Origin: docs/vibration.md."""
+    DAMPING_STEPS = 6
+    """[count] Origin: docs/vibration.md."""
+    BROAD = 0.2
+    """[ratio] From this damping on a hump is no resonance; a speed loop makes such ones. Origin:
+    docs/vibration.md."""
+    HEIGHT = 2.0
+    """[ratio] A resonance is so high over the levels about it. Origin: docs/vibration.md."""
+    MATTERS = 0.3
+    """[ratio] An order whose levels are below this share of the highest one about a frequency is
+    left out there. Origin: docs/vibration.md."""
+    # ON_PEAK, ON_PEAK_POINTS, FALLS: So many points lie within so many dampings of the frequency,
+    # and an order falls by this on both sides.
+    ON_PEAK = 3.5
+    """[ratio] Origin: docs/vibration.md."""
+    ON_PEAK_POINTS = 3
+    """[count] Origin: docs/vibration.md."""
+    FALLS = 1.5
+    """[ratio] Origin: docs/vibration.md."""
+
+
+class dwell:
+    """`vibration/dwell.py`."""
+
+    # PERIODS, BLOCK_S, BLOCKS: A block holds so many periods and lasts so long at least; most of
+    # them.
+    PERIODS = 4
+    """[count] Origin: docs/vibration.md."""
+    BLOCK_S = 0.2
+    """[s] Origin: docs/vibration.md."""
+    BLOCKS = 40
+    """[count] Origin: docs/vibration.md."""
+    ARRIVED = 0.6
+    """[ratio] A block of which less arrived is not used. Origin: docs/vibration.md."""
+    TREND = 5
+    """[count] Degree of the polynomial that slow motion is within a block. Origin:
+    docs/vibration.md."""
+    ALIKE = 0.9
+    """[ratio] Highest correlation of neighbouring blocks that widens an interval. Origin:
+    docs/vibration.md."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from backend.tools.autotune.tool import TOOL as AUTOTUNE
 from backend.tools.brake.run import TOOL as BRAKE_TEST
 from backend.tools.cycle.run import TOOL as CYCLE
+from backend.tools.dwell.run import TOOL as DWELL
 from backend.tools.first_power.run import TOOL as FIRST_POWER
 from backend.tools.friction.run import TOOL as FRICTION
 from backend.tools.health.run import TOOL as HEALTH
@@ -15,6 +16,7 @@ from backend.tools.shaping.run import TOOL as SHAPING
 from backend.tools.step.run import TOOL as STEP
 from backend.tools.sweep.run import TOOL as SWEEP
 from backend.tools.tool import AnyTool
+from backend.tools.vibration.run import TOOL as VIBRATION
 
 TOOLS: tuple[AnyTool, ...] = (
     FIRST_POWER,
@@ -27,6 +29,8 @@ TOOLS: tuple[AnyTool, ...] = (
     HEALTH,
     SAFETY_CHECK,
     SHAPING,
+    VIBRATION,
+    DWELL,
     CYCLE,
     AUTOTUNE,
 )

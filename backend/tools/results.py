@@ -12,6 +12,7 @@ from pydantic import Field
 from backend.tools.autotune.result import AutotuneAnswer
 from backend.tools.brake.result import BrakeResult
 from backend.tools.cycle.result import CycleResult
+from backend.tools.dwell.result import DwellResult
 from backend.tools.first_power.result import FirstPowerResult
 from backend.tools.friction.result import FrictionResult
 from backend.tools.health.result import HealthResult
@@ -21,6 +22,7 @@ from backend.tools.safety_check.result import SafetyResult
 from backend.tools.shaping.result import ShapingResult
 from backend.tools.step.result import StepAnswer
 from backend.tools.sweep.result import SweepAnswer
+from backend.tools.vibration.result import VibrationResult
 
 ToolOutcome: TypeAlias = Annotated[
     FrictionResult
@@ -32,6 +34,8 @@ ToolOutcome: TypeAlias = Annotated[
     | FirstPowerResult
     | SafetyResult
     | ShapingResult
+    | VibrationResult
+    | DwellResult
     | CycleResult
     | SweepAnswer
     | AutotuneAnswer,

@@ -404,22 +404,6 @@ class friction_evaluate:
 class friction_run:
     """`friction/run.py`."""
 
-    # USED, FAST: Share of the permitted travel to each side that is used, and of the permitted
-    # speed.
-    USED = 0.8
-    """[ratio] Origin: 16e1fbc9."""
-    FAST = 0.9
-    """[ratio] Origin: 16e1fbc9."""
-    # RAMP_S, SETTLE_S, DWELL_S: Time of a ramp at least, and before a plateau counts; standstill
-    # between two strokes.
-    RAMP_S = 0.15
-    """[s] Origin: 16e1fbc9."""
-    SETTLE_S = 0.2
-    """[s] Origin: 16e1fbc9."""
-    DWELL_S = 0.15
-    """[s] Origin: 16e1fbc9."""
-    RAMP_SHARE = 0.35
-    """[ratio] Share of the torque beyond friction that ramps take. Origin: 16e1fbc9."""
     # LEAST_S, LONGEST_S: A plateau lasts so long at least, and no longer for the sake of a whole
     # revolution.
     LEAST_S = 0.3
@@ -870,6 +854,27 @@ class moves_small_move:
     """[ratio] Share of the way that may be missing. Origin: 084d9723."""
 
 
+class moves_strokes:
+    """`moves/strokes.py`."""
+
+    # USED, FAST: Share of the permitted travel to each side that is used, and of the permitted
+    # speed.
+    USED = 0.8
+    """[ratio] Origin: 16e1fbc9."""
+    FAST = 0.9
+    """[ratio] Origin: 16e1fbc9."""
+    # RAMP_S, SETTLE_S, DWELL_S: Time of a ramp at least, and before a plateau counts; standstill
+    # between two strokes.
+    RAMP_S = 0.15
+    """[s] Origin: 16e1fbc9."""
+    SETTLE_S = 0.2
+    """[s] Origin: 16e1fbc9."""
+    DWELL_S = 0.15
+    """[s] Origin: 16e1fbc9."""
+    RAMP_SHARE = 0.35
+    """[ratio] Share of the torque beyond friction that ramps take. Origin: 16e1fbc9."""
+
+
 class notch_effect:
     """`notch/effect.py`."""
 
@@ -1129,3 +1134,131 @@ class sweep_texts:
     """[deg, dB, ratio] A loop is called sound from here. Origin: docs/tuning.md."""
     POOR = (30.0, 6.0, 2.5)
     """[deg, dB, ratio] Beyond these it is called unsafe. Origin: docs/tuning.md."""
+
+
+class vibration_evaluate:
+    """`vibration/evaluate.py`."""
+
+    LOWEST_HZ = 5.0
+    """[Hz] Below, a component of the speed is part of what the loop still settles. Origin:
+    docs/vibration.md."""
+    BAND = 0.4
+    """[ratio] Share of the sample rate up to which components are stated; what lies above its half
+    is folded. Origin: docs/vibration.md."""
+    PERIODS = 3.0
+    """[count] Periods that a plateau holds of a component at least. Origin: docs/vibration.md."""
+    # BLOCKS, EVEN: Blocks of a plateau, and how far their speed may differ from the mean.
+    BLOCKS = 6
+    """[count] Origin: docs/vibration.md."""
+    EVEN = 0.3
+    """[ratio] Origin: docs/vibration.md."""
+    ARRIVED = 0.7
+    """[ratio] A plateau of which less arrived is not used. Origin: docs/vibration.md."""
+    PEAK = 2.0
+    """[ratio] A level over those beside it from which on further speeds are measured about it.
+    Origin: docs/vibration.md."""
+    # MATTERS, SAME_SPEED: An order with less than this share of the largest acceleration at a speed
+    # asks for no further speeds and no further look; speeds that differ by less are one.
+    MATTERS = 0.3
+    """[ratio] Origin: docs/vibration.md."""
+    SAME_SPEED = 0.02
+    """[ratio] Origin: docs/vibration.md."""
+    PARTS = 3
+    """[count] Components that are listed of one speed. Origin: docs/vibration.md."""
+    # WHOLE, AS_WHOLE: An interval wider than this does not show whether an order is a whole number;
+    # one that is a whole number to this share is, which covers scales that are rounded.
+    WHOLE = 0.2
+    """[1/rev] Origin: docs/vibration.md."""
+    AS_WHOLE = 2e-4
+    """[ratio] Origin: docs/vibration.md."""
+    NEAR = 0.15
+    """[ratio] A speed this close to that of a resonance shows its level. Origin:
+    docs/vibration.md."""
+    EXCITES = 0.2
+    """[ratio] Orders that excite a resonance to less than this share of the largest level are not
+    listed. Origin: docs/vibration.md."""
+    STANDS_OUT = 18.0
+    """[ratio] As `sinusoids` of the analysis has it, for what would have been seen. Origin:
+    docs/vibration.md."""
+
+
+class vibration_run:
+    """`vibration/run.py`."""
+
+    # RANGE, LEAST_RANGE: Fastest over slowest speed where the settings name none; the slowest one
+    # is below this share of the fastest.
+    RANGE = 12.0
+    """[ratio] Origin: docs/vibration.md."""
+    LEAST_RANGE = 0.6
+    """[ratio] Origin: docs/vibration.md."""
+    # LONGEST_S, ENOUGH_S, SHORT_S: A plateau is no longer; one that is shorter is repeated; and no
+    # speed is measured whose plateaus would be shorter still.
+    LONGEST_S = 1.2
+    """[s] Origin: docs/vibration.md."""
+    ENOUGH_S = 0.6
+    """[s] Origin: docs/vibration.md."""
+    SHORT_S = 0.3
+    """[s] Origin: docs/vibration.md."""
+    POSITIONING = 0.25
+    """[ratio] Share of the permitted speed that the ways between plateaus take. Origin:
+    docs/vibration.md."""
+
+
+class dwell_evaluate:
+    """`dwell/evaluate.py`."""
+
+    HARMONICS = 4
+    """[count] Multiples of the frequency that are looked for, the first one included. Origin:
+    docs/vibration.md."""
+    BAND = 0.4
+    """[ratio] Share of the sample rate up to which multiples are stated. Origin:
+    docs/vibration.md."""
+    FEWEST = 4
+    """[count] Blocks below which nothing is stated. Origin: docs/vibration.md."""
+    SEEN = 4.0
+    """[ratio] An amplitude over the deviation of its mean that is seen. Origin:
+    docs/vibration.md."""
+    NOT_LINEAR = 0.1
+    """[ratio] A multiple with this share of the amplitude is named. Origin: docs/vibration.md."""
+    # CHANGED, CLEAR: The level changed by this share, and so many deviations, over the time.
+    CHANGED = 0.1
+    """[ratio] Origin: docs/vibration.md."""
+    CLEAR = 3.0
+    """[ratio] Origin: docs/vibration.md."""
+    STEP = 0.5
+    """[count] Nothing is known better than this share of a step of position or torque. Origin:
+    docs/vibration.md."""
+    LOST = 0.02
+    """[ratio] Share of lost samples that is named. Origin: docs/vibration.md."""
+
+
+class dwell_run:
+    """`dwell/run.py`."""
+
+    # LEAD_S, FADE_S: Standstill before and after, and how long the sine grows and falls.
+    LEAD_S = 0.1
+    """[s] Origin: docs/vibration.md."""
+    FADE_S = 0.5
+    """[s] Origin: docs/vibration.md."""
+    # RAMP_S, STROKE_S: Ramps of the slow speed, and how long a stroke of it lasts at most.
+    RAMP_S = 0.3
+    """[s] Origin: docs/vibration.md."""
+    STROKE_S = 3.0
+    """[s] Origin: docs/vibration.md."""
+    TURNING = 0.3
+    """[ratio] Share of the slow speed from which on a stroke of it counts. Origin:
+    docs/vibration.md."""
+    HIGHEST = 0.25
+    """[ratio] Share of the sample rate up to which setpoints carry a sine: four of them a period.
+    Origin: docs/vibration.md."""
+    # USED, FAST, SHARE: Of the limits of travel, speed and torque that are used.
+    USED = 0.7
+    """[ratio] Origin: docs/vibration.md."""
+    FAST = 0.8
+    """[ratio] Origin: docs/vibration.md."""
+    SHARE = 0.8
+    """[ratio] Origin: docs/vibration.md."""
+    STEPS = 3.0
+    """[count] Steps of the setpoint that an amplitude has at least. Origin: docs/vibration.md."""
+    LIVE_S = 0.3
+    """[s] The amplitude that is shown meanwhile is of so long. Origin: docs/vibration.md."""

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis.axis import Envelope
 from backend.scales.units import AxisUnits
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts
 from backend.tools.friction.evaluate import Map, evaluate, reevaluate
@@ -16,11 +15,10 @@ from backend.tools.friction.settings import FrictionSettings
 from backend.tools.friction.texts import TEXTS, report
 from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.inertia.moves import first_look, speed_move
-from backend.tools.inertia.probe import RoughFit
 from backend.tools.measuring.computing import meanwhile
 from backend.tools.measuring.recording import Recording, cycle_s, require_signals, share
 from backend.tools.moves.go_back import go_back
-from backend.tools.moves.raised_cosine import raised_cosine
+from backend.tools.moves.strokes import Room, Stroke, representable, room_of, speeds_of
 from backend.tools.thresholds import friction_run as threshold
 from backend.tools.tool import Run, Tool
 from drivers.cia402 import Mode
@@ -28,57 +26,23 @@ from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import Text, text
 
 FloatArray = npt.NDArray[np.float64]
-_TURN = 2 * np.pi
 
 
-@dataclass(frozen=True)
-class Stroke:
-    """One speed: ``strokes`` plateaus, in turn forwards and backwards."""
-
-    speed_rps: float
-    ramp_s: float
-    plateau_s: float
-    strokes: int
-
-    @property
-    def length_rev(self) -> float:
-        """Way of one stroke."""
-        return self.speed_rps * (self.ramp_s + threshold.SETTLE_S + self.plateau_s)
-
-    @property
-    def duration_s(self) -> float:
-        """About, with the ways to where it begins and back."""
-        one = 2 * self.ramp_s + threshold.SETTLE_S + self.plateau_s + threshold.DWELL_S
-        return self.strokes * one + 2 * threshold.DWELL_S + 1.0
-
-
-@dataclass(frozen=True)
-class Room:
-    """What the plan may use: rev to each side, rev/s, s, and the time of a ramp per rev/s."""
-
-    travel_rev: float
-    speed_rps: float
-    time_s: float
-    ramp_s_per_rps: float
-
-    def stroke(self, speed_rps: float, slow_s: float) -> Stroke | None:
-        """Plateaus of this speed; None where the travel has no room for them."""
-        ramp_s = max(threshold.RAMP_S, self.ramp_s_per_rps * speed_rps)
-        left_rev = 2 * self.travel_rev - speed_rps * (ramp_s + threshold.SETTLE_S)
-        wanted = max(1.0, np.ceil(threshold.LEAST_S * speed_rps))
-        whole = min(wanted, np.floor(left_rev))
-        if whole >= 1.0 and whole / speed_rps <= threshold.LONGEST_S:
-            plateau_s = whole / speed_rps
-        elif whole >= 1.0:
-            plateau_s = slow_s
-        else:
-            plateau_s = min(left_rev / speed_rps, slow_s)
-            # With room for a whole revolution, less would be a worse mean: not so fast then.
-            if plateau_s < threshold.SHORT_S or (2 * self.travel_rev >= 1.5 and speed_rps > 0.5):
-                return None
-        return Stroke(
-            speed_rps, ramp_s, float(plateau_s), 2 if plateau_s >= threshold.LEAST_S else 4
-        )
+def _stroke_of(room: Room, speed_rps: float, slow_s: float) -> Stroke | None:
+    """Plateaus of this speed; None where the travel has no room for them."""
+    ramp_s, left_rev = room.ramp_s(speed_rps), room.plateau_rev(speed_rps)
+    wanted = max(1.0, np.ceil(threshold.LEAST_S * speed_rps))
+    whole = min(wanted, np.floor(left_rev))
+    if whole >= 1.0 and whole / speed_rps <= threshold.LONGEST_S:
+        plateau_s = whole / speed_rps
+    elif whole >= 1.0:
+        plateau_s = slow_s
+    else:
+        plateau_s = min(left_rev / speed_rps, slow_s)
+        # With room for a whole revolution, less would be a worse mean: not so fast then.
+        if plateau_s < threshold.SHORT_S or (2 * room.travel_rev >= 1.5 and speed_rps > 0.5):
+            return None
+    return Stroke(speed_rps, ramp_s, float(plateau_s), 2 if plateau_s >= threshold.LEAST_S else 4)
 
 
 @dataclass(frozen=True)
@@ -101,7 +65,7 @@ def planned(settings: FrictionSettings, room: Room, units: AxisUnits) -> Plan:
         OutOfRange: the limits leave no speed to measure.
     """
     fastest = room.speed_rps
-    while room.stroke(fastest, threshold.SLOW_S[0]) is None and fastest > 1e-3:
+    while _stroke_of(room, fastest, threshold.SLOW_S[0]) is None and fastest > 1e-3:
         fastest *= 0.97
     slowest = (
         settings.slowest_rpm or min(threshold.SLOWEST_RPM, 0.05 * settings.speed_limit)
@@ -117,12 +81,12 @@ def planned(settings: FrictionSettings, room: Room, units: AxisUnits) -> Plan:
     ripple = _ripple_stroke(settings, room, slowest)
     lowest, count = slowest, settings.speeds
     while True:
-        speeds = _representable(np.geomspace(lowest, fastest, count), units)
+        speeds = representable(np.geomspace(lowest, fastest, count), units)
         if ripple is not None:
             near = ripple.speed_rps * np.array([1.0 - threshold.ALIKE, 1.0 + threshold.ALIKE])
             speeds = [v for v in speeds if not near[0] < v < near[1]]
         for slow_s in threshold.SLOW_S:
-            found = [stroke for v in speeds if (stroke := room.stroke(v, slow_s)) is not None]
+            found = [stroke for v in speeds if (stroke := _stroke_of(room, v, slow_s)) is not None]
             whole = sorted([*found, *([ripple] if ripple else [])], key=lambda s: s.speed_rps)
             if whole and sum(stroke.duration_s for stroke in whole) <= room.time_s:
                 return Plan(
@@ -147,37 +111,7 @@ def _ripple_stroke(settings: FrictionSettings, room: Room, slowest_rps: float) -
         return None
     speed = 2 * threshold.RIPPLE_REV / (threshold.RIPPLE_SHARE * room.time_s)
     speed = min(max(speed, slowest_rps), threshold.RIPPLE_HZ / settings.orders)
-    ramp_s = max(threshold.RAMP_S, room.ramp_s_per_rps * speed)
-    return Stroke(speed, ramp_s, threshold.RIPPLE_REV / speed, 2)
-
-
-def _representable(speeds_rps: FloatArray, units: AxisUnits) -> list[float]:
-    """The same, as the drive can be given them."""
-    raws = sorted({int(units.velocity_raw(60.0 * v)) for v in speeds_rps} - {0})
-    return [float(units.velocity(raw)) / 60.0 for raw in raws]
-
-
-def speeds_of(stroke: Stroke, rate: float, slow_rps: float) -> tuple[FloatArray, FloatArray]:
-    """Speed [n] in rpm and, per sample, the signed number of the plateau that it counts for.
-
-    The axis goes half a stroke back from where it is, and comes back there at the end.
-    """
-    half = raised_cosine(-0.5 * stroke.length_rev, max(stroke.length_rev / slow_rps, 0.4), rate)
-    still = np.zeros(round(threshold.DWELL_S * rate))
-    n = max(2, round(stroke.ramp_s * rate))
-    rise = 0.5 * (1.0 - np.cos(np.pi * (np.arange(n) + 0.5) / n))
-    settle, plateau = round(threshold.SETTLE_S * rate), round(stroke.plateau_s * rate)
-    one = np.concatenate([rise, np.ones(settle + plateau), rise[::-1], still])
-    counts = np.zeros(one.size)
-    counts[n + settle : n + settle + plateau] = 1.0
-    speed, number = [half, still], [np.zeros(half.size + still.size)]
-    for index in range(stroke.strokes):
-        sign = 1.0 if index % 2 == 0 else -1.0
-        speed.append(sign * one * stroke.speed_rps)
-        number.append(sign * (index + 1) * counts)
-    speed += [-half, still]
-    number.append(np.zeros(half.size + still.size))
-    return np.concatenate(speed) * 60.0, np.concatenate(number)
+    return Stroke(speed, room.ramp_s(speed), threshold.RIPPLE_REV / speed, 2)
 
 
 async def run(run: Run, settings: FrictionSettings) -> FrictionResult:
@@ -196,7 +130,7 @@ async def run(run: Run, settings: FrictionSettings) -> FrictionResult:
     run.progress(0.0, text("friction.first-short-move"))
     look = await first_look(axis, session, InertiaSettings(envelope), facts, home, None)
     await go_back(axis, session, home, envelope, facts)
-    plan = planned(settings, _room(envelope, facts, look.rough), units)
+    plan = planned(settings, room_of(envelope, facts, look.rough), units)
     total_s = sum(stroke.duration_s for stroke in plan.strokes)
     taken: list[tuple[Recording, FloatArray]] = []
     done_s = 0.0
@@ -234,19 +168,6 @@ async def _stroke(
         run.axis, run.session, speed_rpm, settings.envelope, facts, share(run.progress, *where)
     )
     return recording, numbers[: recording.velocity_rad_s.size]
-
-
-def _room(envelope: Envelope, facts: AxisFacts, rough: RoughFit) -> Room:
-    permitted_nm = envelope.torque_percent / 100.0 * facts.rated_torque_nm
-    free_nm = permitted_nm - rough.coulomb_nm - abs(rough.gravity_nm)
-    # The steepest place of a raised cosine is π/2 times its mean.
-    per_rps = np.pi / 2 * rough.inertia_kgm2 * _TURN / max(threshold.RAMP_SHARE * free_nm, 1e-9)
-    return Room(
-        threshold.USED * envelope.travel_rev,
-        threshold.FAST * envelope.speed_rpm / 60.0,
-        envelope.time_s,
-        per_rps,
-    )
 
 
 def _require_torque(run: Run, first: Recording, facts: AxisFacts, units: AxisUnits) -> None:

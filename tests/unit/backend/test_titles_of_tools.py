@@ -31,6 +31,8 @@ TITLES = {
     "health": ("Health check", "健康检查"),
     "safety-check": ("Safety acceptance record", "安全验收记录"),
     "shaping": ("Command shaping", "指令整形"),
+    "vibration": ("Vibration over speed", "振动-速度图谱"),
+    "dwell": ("Dwell at one frequency", "定频激振"),
     "cycle": ("Load of the machine's cycle", "机器循环负载"),
 }
 

@@ -1,6 +1,7 @@
 import type {
   BrakeResult,
   CycleResult,
+  DwellResult,
   FirstPowerResult,
   FrictionResult,
   HealthResult,
@@ -10,12 +11,14 @@ import type {
   SafetyResult,
   ShapingResult,
   StepAnswer,
+  VibrationResult,
 } from './schema'
 
 /** What a tool concluded: distinguished by its field `tool`. */
 type ToolOutcome =
   | BrakeResult
   | CycleResult
+  | DwellResult
   | FirstPowerResult
   | FrictionResult
   | HealthResult
@@ -24,6 +27,7 @@ type ToolOutcome =
   | SafetyResult
   | ShapingResult
   | StepAnswer
+  | VibrationResult
 
 /** The result of a tool, or null where it is something else. */
 export const outcome = (result: unknown): ToolOutcome | null =>
@@ -62,6 +66,18 @@ export function asSafetyCheck(result: unknown): SafetyResult | null {
 export function asFirstPower(result: unknown): FirstPowerResult | null {
   const found = outcome(result)
   return found?.tool === 'first-power' ? found : null
+}
+
+/** Vibration over speed, or null where it is something else. */
+export function asVibration(result: unknown): VibrationResult | null {
+  const found = outcome(result)
+  return found?.tool === 'vibration' ? found : null
+}
+
+/** A dwell at one frequency, or null where it is something else. */
+export function asDwell(result: unknown): DwellResult | null {
+  const found = outcome(result)
+  return found?.tool === 'dwell' ? found : null
 }
 
 /** Slow vibration and its shapers, or null where it is something else. */

@@ -1065,6 +1065,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/jobs/dwell": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Dwell
+         * @description Vibrate at one frequency, for a person who looks for what rattles by hand and ear. The axis moves.
+         */
+        post: operations["start_dwell"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/jobs/firmware": {
         parameters: {
             query?: never;
@@ -1444,6 +1464,26 @@ export interface paths {
          * @description Measure a frequency response and write it as JSON. The axis moves.
          */
         post: operations["start_sweep"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/drives/{drive_id}/jobs/vibration": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Vibration
+         * @description Map vibration over speed, both directions: orders, frequencies and the resonances that orders excite. The axis moves.
+         */
+        post: operations["start_vibration"];
         delete?: never;
         options?: never;
         head?: never;
@@ -5376,6 +5416,194 @@ export interface components {
             type: "drives";
         };
         /**
+         * DwellEstimate
+         * @description A value with its 95 % interval, in the unit that the field's name says.
+         */
+        DwellEstimate: {
+            /** Ci95 */
+            ci95: [
+                number | null,
+                number | null
+            ];
+            /** Value */
+            value: number;
+        };
+        /**
+         * DwellFinding
+         * @description What the dwell showed, as a code with the figure that it rests on.
+         */
+        DwellFinding: {
+            /**
+             * Code
+             * @enum {string}
+             */
+            code: "excited" | "not_seen" | "not_linear" | "linear" | "level_changed" | "harmonics_beyond_band" | "turn_slowly" | "blocks_lost" | "motor_side";
+            /**
+             * Unit
+             * @default
+             */
+            unit: string;
+            /** Value */
+            value?: number | null;
+        };
+        /**
+         * DwellHarmonic
+         * @description A multiple of the frequency, which only what is not linear makes.
+         */
+        DwellHarmonic: {
+            /** Multiple */
+            multiple: number;
+            /** Speed Ci95 Rpm */
+            speed_ci95_rpm: [
+                number | null,
+                number | null
+            ];
+            /** Speed Rpm */
+            speed_rpm: number;
+        };
+        /**
+         * DwellResult
+         * @description Amplitudes at the frequency, at full amplitude of the excitation.
+         *
+         *     The phase is that of the speed over the excitation as the bus shows both: the time that
+         *     setpoints and samples take on the bus is part of it.
+         */
+        DwellResult: {
+            /**
+             * By
+             * @enum {string}
+             */
+            by: "speed" | "torque";
+            /**
+             * Excitation
+             * @description amplitude that was sent, in rpm or % of rated torque
+             */
+            excitation: number;
+            /** Findings */
+            findings: components["schemas"]["DwellFinding"][];
+            /** Frequency Hz */
+            frequency_hz: number;
+            /** Harmonics */
+            harmonics: components["schemas"]["DwellHarmonic"][];
+            /**
+             * Measurements
+             * @description names of the stored raw data
+             * @default []
+             */
+            measurements: string[];
+            /**
+             * Over S
+             * @description time that the values are of
+             */
+            over_s: number;
+            /** @description null where the speed is not seen */
+            phase_deg: components["schemas"]["DwellEstimate"] | null;
+            position_deg: components["schemas"]["DwellEstimate"];
+            /**
+             * Seen
+             * @description whether the speed stands out of the noise
+             */
+            seen: boolean;
+            speed_rpm: components["schemas"]["DwellEstimate"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            tool: "dwell";
+            torque_percent: components["schemas"]["DwellEstimate"];
+            /**
+             * Trace Rpm
+             * @description [n] amplitude of the speed in each block
+             */
+            trace_rpm: number[];
+            /**
+             * Trace S
+             * @description [n] middle of each block, from the beginning
+             */
+            trace_s: number[];
+        };
+        /**
+         * DwellSettings
+         * @description A sine of the speed setpoint, or of torque ahead of the speed loop, faded in and out.
+         */
+        DwellSettings: {
+            /**
+             * Amplitude Percent
+             * @description amplitude of the torque, in % of rated
+             * @default 5
+             */
+            amplitude_percent: number;
+            /**
+             * Amplitude Rpm
+             * @description amplitude of the speed setpoint, in rpm
+             * @default 5
+             */
+            amplitude_rpm: number;
+            /**
+             * By
+             * @description what carries the sine: the speed setpoint, or torque ahead of the speed loop
+             * @default speed
+             * @enum {string}
+             */
+            by: "speed" | "torque";
+            /**
+             * Consent
+             * @description the user agreed that nothing in the drive ends a speed when this computer falls silent; needed where the drive has no watchdog (DS_C)
+             * @default false
+             */
+            consent: boolean;
+            /**
+             * Cycle Ms
+             * @description cycle of the exchange that is started where none runs, and ended afterwards
+             * @default 1
+             */
+            cycle_ms: number;
+            /**
+             * Duration S
+             * @description time at full amplitude, in s
+             * @default 10
+             */
+            duration_s: number;
+            /**
+             * Frequency Hz
+             * @description frequency of the vibration, in Hz
+             * @default 50
+             */
+            frequency_hz: number;
+            /**
+             * Rated Torque Nm
+             * @description overrides what the drive says
+             */
+            rated_torque_nm?: number | null;
+            /**
+             * Speed Limit
+             * @description highest speed, in rpm
+             */
+            speed_limit: number;
+            /**
+             * Time Limit S
+             * @description longest time of the motion, in s
+             * @default 70
+             */
+            time_limit_s: number;
+            /**
+             * Torque Limit
+             * @description highest torque, in % of rated
+             */
+            torque_limit: number;
+            /**
+             * Travel Limit
+             * @description longest way from the start, in revolutions
+             */
+            travel_limit: number;
+            /**
+             * Turn Rpm
+             * @description slow speed to and fro that the vibration is added to; 0: about standstill
+             * @default 0
+             */
+            turn_rpm: number;
+        };
+        /**
          * EepromComparison
          * @description The EEPROM of a slave next to a file.
          */
@@ -7747,7 +7975,7 @@ export interface components {
              * Result
              * @description of a tool: its result, which its field tool names
              */
-            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["LoadSideResult"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["ShapingResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | components["schemas"]["PlainResult"] | null;
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["LoadSideResult"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["ShapingResult"] | components["schemas"]["VibrationResult"] | components["schemas"]["DwellResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | components["schemas"]["PlainResult"] | null;
             /**
              * Started
              * Format: date-time
@@ -8482,7 +8710,7 @@ export interface components {
              * Result
              * @description of a tool: its result, which its field tool names
              */
-            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["LoadSideResult"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["ShapingResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | {
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["LoadSideResult"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["ShapingResult"] | components["schemas"]["VibrationResult"] | components["schemas"]["DwellResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | {
                 [key: string]: unknown;
             };
             /** Settings */
@@ -11737,6 +11965,20 @@ export interface components {
             unit: string;
         };
         /**
+         * SpeedRange
+         * @description Speeds at which this order excites a resonance to more than half of its highest level.
+         */
+        SpeedRange: {
+            /** High Rpm */
+            high_rpm: number;
+            /** Low Rpm */
+            low_rpm: number;
+            /** Order Per Rev */
+            order_per_rev: number;
+            /** Speed Rpm */
+            speed_rpm: number;
+        };
+        /**
          * StartRecording
          * @description What to record.
          */
@@ -12774,6 +13016,264 @@ export interface components {
             sha256: string;
         };
         /**
+         * VibrationFinding
+         * @description What the map states, or cannot state, as a code with the figure that it rests on.
+         */
+        VibrationFinding: {
+            /**
+             * Code
+             * @enum {string}
+             */
+            code: "resonance" | "orders_only" | "nothing_seen" | "band" | "highest_order" | "fixed_frequency" | "unassigned" | "highest_at_end" | "not_closer" | "uneven_speeds" | "fastest_by_travel" | "samples_lost" | "motor_side" | "listen";
+            /**
+             * Unit
+             * @default
+             */
+            unit: string;
+            /** Value */
+            value?: number | null;
+        };
+        /**
+         * VibrationFrequency
+         * @description A component whose frequency does not depend on the speed, and where it is largest.
+         */
+        VibrationFrequency: {
+            /** At Rpm */
+            at_rpm: number;
+            /** Frequency Ci95 Hz */
+            frequency_ci95_hz: [
+                number,
+                number
+            ];
+            /** Frequency Hz */
+            frequency_hz: number;
+            /** Largest Rpm */
+            largest_rpm: number;
+            /** Speeds */
+            speeds: number;
+            /** Torque Percent */
+            torque_percent: number;
+        };
+        /**
+         * VibrationOrder
+         * @description A component of ``order_per_rev`` periods per motor revolution, and where it is largest.
+         */
+        VibrationOrder: {
+            /** At Rpm */
+            at_rpm: number;
+            /**
+             * Largest Rpm
+             * @description amplitude of the speed
+             */
+            largest_rpm: number;
+            /**
+             * Level Rpm
+             * @description [n] amplitude of the speed
+             */
+            level_rpm: number[];
+            /**
+             * Level Speed Rpm
+             * @description [n] both directions, absolute
+             */
+            level_speed_rpm: number[];
+            /** Order Ci95 */
+            order_ci95: [
+                number,
+                number
+            ];
+            /** Order Per Rev */
+            order_per_rev: number;
+            /**
+             * Place
+             * @enum {string}
+             */
+            place: "whole" | "not_whole" | "unknown";
+            /**
+             * Speeds
+             * @description speeds that show it
+             */
+            speeds: number;
+            /**
+             * Torque Percent
+             * @description amplitude of the torque there
+             */
+            torque_percent: number;
+        };
+        /**
+         * VibrationPart
+         * @description One sinusoid of the speed at one speed; amplitudes.
+         */
+        VibrationPart: {
+            /** Frequency Hz */
+            frequency_hz: number;
+            /** Order Per Rev */
+            order_per_rev: number;
+            /** Speed Rpm */
+            speed_rpm: number;
+            /** Torque Percent */
+            torque_percent: number;
+        };
+        /**
+         * VibrationResonance
+         * @description A mode of the axis with its loops as they are, excited where order · speed meets it.
+         */
+        VibrationResonance: {
+            /**
+             * Avoid
+             * @description largest first, inside the speeds measured
+             */
+            avoid: components["schemas"]["SpeedRange"][];
+            /** Frequency Ci95 Hz */
+            frequency_ci95_hz: [
+                number,
+                number
+            ];
+            /** Frequency Hz */
+            frequency_hz: number;
+            /**
+             * Height
+             * @description highest level over that about it
+             */
+            height: number;
+        };
+        /**
+         * VibrationResult
+         * @description The map. What lies above ``band_hz`` is folded by the sampling and is not stated.
+         */
+        VibrationResult: {
+            /** Band Hz */
+            band_hz: [
+                number,
+                number
+            ];
+            /** Findings */
+            findings: components["schemas"]["VibrationFinding"][];
+            /**
+             * Frequencies
+             * @description largest first
+             */
+            frequencies: components["schemas"]["VibrationFrequency"][];
+            /**
+             * Measurements
+             * @description names of the stored raw data
+             * @default []
+             */
+            measurements: string[];
+            /** Motion S */
+            motion_s: number;
+            /**
+             * Orders
+             * @description largest first
+             */
+            orders: components["schemas"]["VibrationOrder"][];
+            /**
+             * Resonances
+             * @description highest first
+             */
+            resonances: components["schemas"]["VibrationResonance"][];
+            /** Sample Rate Hz */
+            sample_rate_hz: number;
+            /**
+             * Speeds
+             * @description slowest first, backwards and forwards
+             */
+            speeds: components["schemas"]["VibrationSpeed"][];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            tool: "vibration";
+        };
+        /**
+         * VibrationSettings
+         * @description Speeds of the map; the time limit is that of all moves together.
+         */
+        VibrationSettings: {
+            /**
+             * Closer
+             * @description further speeds about the one at which an order has its highest level
+             * @default 8
+             */
+            closer: number;
+            /**
+             * Consent
+             * @description the user agreed that nothing in the drive ends a speed when this computer falls silent; needed where the drive has no watchdog (DS_C)
+             * @default false
+             */
+            consent: boolean;
+            /**
+             * Cycle Ms
+             * @description cycle of the exchange that is started where none runs, and ended afterwards
+             * @default 1
+             */
+            cycle_ms: number;
+            /**
+             * Rated Torque Nm
+             * @description overrides what the drive says
+             */
+            rated_torque_nm?: number | null;
+            /**
+             * Slowest Rpm
+             * @description lowest speed; a twelfth of the highest one without it
+             */
+            slowest_rpm?: number | null;
+            /**
+             * Speed Limit
+             * @description highest speed, in rpm
+             */
+            speed_limit: number;
+            /**
+             * Speeds
+             * @description speeds in each direction
+             * @default 14
+             */
+            speeds: number;
+            /**
+             * Time Limit S
+             * @description longest time of all moves together, in s
+             * @default 180
+             */
+            time_limit_s: number;
+            /**
+             * Torque Limit
+             * @description highest torque, in % of rated
+             */
+            torque_limit: number;
+            /**
+             * Travel Limit
+             * @description longest way from the start, in revolutions
+             */
+            travel_limit: number;
+        };
+        /**
+         * VibrationSpeed
+         * @description One constant speed; negative speeds turn backwards. RMS about the mean and a slow drift.
+         */
+        VibrationSpeed: {
+            /**
+             * Highest Order
+             * @description orders above lie beyond the band at this speed
+             */
+            highest_order: number;
+            /**
+             * Parts
+             * @description largest first
+             */
+            parts: components["schemas"]["VibrationPart"][];
+            /**
+             * Speed Rms Rpm
+             * @description of the measured speed, encoder steps included
+             */
+            speed_rms_rpm: number;
+            /** Speed Rpm */
+            speed_rpm: number;
+            /**
+             * Torque Rms Percent
+             * @description of the torque that the drive reports
+             */
+            torque_rms_percent: number;
+        };
+        /**
          * WatchState
          * @description Send AxisState of these drives as it changes (replaces the earlier choice).
          */
@@ -12970,6 +13470,11 @@ export type DriveIdentification = components['schemas']['DriveIdentification'];
 export type DriveSummary = components['schemas']['DriveSummary'];
 export type DriveUpdate = components['schemas']['DriveUpdate'];
 export type DrivesChanged = components['schemas']['DrivesChanged'];
+export type DwellEstimate = components['schemas']['DwellEstimate'];
+export type DwellFinding = components['schemas']['DwellFinding'];
+export type DwellHarmonic = components['schemas']['DwellHarmonic'];
+export type DwellResult = components['schemas']['DwellResult'];
+export type DwellSettings = components['schemas']['DwellSettings'];
 export type EepromComparison = components['schemas']['EepromComparison'];
 export type EepromDifference = components['schemas']['EepromDifference'];
 export type EepromPlan = components['schemas']['EepromPlan'];
@@ -13213,6 +13718,7 @@ export type SmallMovesInfo = components['schemas']['SmallMovesInfo'];
 export type SnapshotHeader = components['schemas']['SnapshotHeader'];
 export type SnapshotInfo = components['schemas']['SnapshotInfo'];
 export type SnapshotTrace = components['schemas']['SnapshotTrace'];
+export type SpeedRange = components['schemas']['SpeedRange'];
 export type StartRecording = components['schemas']['StartRecording'];
 export type StateChanged = components['schemas']['StateChanged'];
 export type StationDiagnosis = components['schemas']['StationDiagnosis'];
@@ -13249,6 +13755,14 @@ export type ValuesChanged = components['schemas']['ValuesChanged'];
 export type VerdictInfo = components['schemas']['VerdictInfo'];
 export type VerifiedInfo = components['schemas']['VerifiedInfo'];
 export type VersionInfo = components['schemas']['VersionInfo'];
+export type VibrationFinding = components['schemas']['VibrationFinding'];
+export type VibrationFrequency = components['schemas']['VibrationFrequency'];
+export type VibrationOrder = components['schemas']['VibrationOrder'];
+export type VibrationPart = components['schemas']['VibrationPart'];
+export type VibrationResonance = components['schemas']['VibrationResonance'];
+export type VibrationResult = components['schemas']['VibrationResult'];
+export type VibrationSettings = components['schemas']['VibrationSettings'];
+export type VibrationSpeed = components['schemas']['VibrationSpeed'];
 export type WatchState = components['schemas']['WatchState'];
 export type WatchUpdate = components['schemas']['WatchUpdate'];
 export type WatchValues = components['schemas']['WatchValues'];
@@ -22410,6 +22924,149 @@ export interface operations {
             };
         };
     };
+    start_dwell: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["DwellSettings"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     load_firmware: {
         parameters: {
             query: {
@@ -25001,6 +25658,149 @@ export interface operations {
         requestBody: {
             content: {
                 "application/json": components["schemas"]["SweepRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_vibration: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["VibrationSettings"];
             };
         };
         responses: {

@@ -354,8 +354,8 @@ export const tuning = {
   'fold.manual': ['Step by step', '逐步整定'],
   'fold.manualHelp': ['Steps 2 to 6 by hand.', '手动完成步骤 2 至 6。'],
   'fold.more': [
-    'Cycle load, slow vibration, friction, brake, health',
-    '循环负载、低频振动、摩擦、抱闸、健康检查',
+    'Cycle load, vibration, friction, brake, health',
+    '循环负载、振动、摩擦、抱闸、健康检查',
   ],
   'fold.moreHelp': ['Not part of tuning.', '不属于整定步骤。'],
   'fold.response': [

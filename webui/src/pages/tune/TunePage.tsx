@@ -30,6 +30,7 @@ import { PreChecks } from './PreChecks'
 import { SafetyPanel } from './SafetyPanel'
 import { ShapingPanel } from './ShapingPanel'
 import { ReportPanel, useReports } from './ReportPanel'
+import { DwellPanel, VibrationPanel } from './VibrationPanel'
 import { present, type Section, useSections } from './sections'
 import { StepPanel } from './StepPanel'
 import { preChecks, ready } from './steps'
@@ -65,6 +66,8 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
   const healthJob = useToolJob(drive, 'health').job
   const safetyJob = useToolJob(drive, 'safety-check').job
   const shapingJob = useToolJob(drive, 'shaping').job
+  const vibrationJob = useToolJob(drive, 'vibration').job
+  const dwellJob = useToolJob(drive, 'dwell').job
   const cycleJob = useToolJob(drive, 'cycle').job
   useJobEnd(inertiaJob?.id ?? null, () => void measured.refresh())
   useJobEnd(frictionJob?.id ?? null, () => void measured.refresh())
@@ -73,6 +76,8 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
   useJobEnd(firstJob?.id ?? null, () => void measured.refresh())
   useJobEnd(cycleJob?.id ?? null, () => void measured.refresh())
   useJobEnd(shapingJob?.id ?? null, () => void measured.refresh())
+  useJobEnd(vibrationJob?.id ?? null, () => void measured.refresh())
+  useJobEnd(dwellJob?.id ?? null, () => void measured.refresh())
   useJobEnd(stepJob?.id ?? null, () => void measured.refresh())
   useJobEnd(tuneJob?.id ?? null, () => {
     void measured.refresh()
@@ -127,6 +132,8 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
     [safetyJob, 'more'],
     [cycleJob, 'more'],
     [shapingJob, 'more'],
+    [vibrationJob, 'more'],
+    [dwellJob, 'more'],
   ]
   const now: Section[] = possible
     ? present(done, {
@@ -251,6 +258,8 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
           {possible && (
             <>
               <ShapingPanel {...measure} />
+              <VibrationPanel {...measure} />
+              <DwellPanel {...measure} />
               <FrictionPanel {...measure} />
               <LoadSidePanel {...measure} />
               <BrakePanel {...measure} />

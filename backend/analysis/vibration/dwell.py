@@ -1,0 +1,88 @@
+"""A dwell at one frequency: what follows the excitation, block by block, and its harmonics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
+from backend.analysis.thresholds import dwell as threshold
+
+
+@dataclass(frozen=True)
+class Followed:
+    """Complex amplitudes [blocks, harmonics] of a signal, over the phase of the excitation.
+
+    The first harmonic is the frequency of the excitation; ``middle_s`` [blocks] is when.
+    """
+
+    blocks: ComplexArray
+    middle_s: FloatArray
+
+    def mean(self, harmonic: int = 0) -> complex:
+        """Over all blocks."""
+        return complex(np.mean(self.blocks[:, harmonic]))
+
+    def half(self, harmonic: int = 0) -> float:
+        """Half of the 95 % interval of the amplitude, by the scatter between the blocks."""
+        return self._half(harmonic, 1.0)
+
+    def phase_half_deg(self) -> float:
+        """Half of the 95 % interval of the phase, in degrees."""
+        share = self._half(0, 1j) / max(abs(self.mean()), 1e-300)
+        return float(np.degrees(np.arcsin(min(share, 1.0))))
+
+    def _half(self, harmonic: int, along: complex) -> float:
+        """Of the part along the mean (1), or across it (1j); neighbouring blocks may be alike."""
+        column = self.blocks[:, harmonic]
+        if column.size < 3:
+            return float("inf")
+        mean = complex(np.mean(column))
+        axis = along * mean / max(abs(mean), 1e-300)
+        away = np.real((column - mean) * np.conj(axis))
+        lag = float(np.sum(away[1:] * away[:-1]) / max(float(np.sum(away**2)), 1e-300))
+        lag = min(max(lag, 0.0), threshold.ALIKE)
+        scatter = float(np.std(away, ddof=1)) / np.sqrt(column.size)
+        wider = np.sqrt((1.0 + lag) / (1.0 - lag))
+        return float(student.ppf(0.975, column.size - 1) * scatter * wider)
+
+    def noise(self, harmonic: int = 0) -> float:
+        """Standard deviation of the mean, both parts together."""
+        column = self.blocks[:, harmonic]
+        power = float(np.sum(np.abs(column - np.mean(column)) ** 2))
+        return float(np.sqrt(power / max(column.size - 1, 1) / max(column.size, 1)))
+
+
+def followed(
+    signal: FloatArray, valid: BoolArray, frequency_hz: float, rate_hz: float, first: int,
+    harmonics: int,
+) -> Followed:  # fmt: skip
+    """Amplitudes in blocks of whole periods; ``first`` is the sample number of ``signal[0]``.
+
+    By least squares with a polynomial in each block, so that slow motion and lost samples do not
+    count.
+    """
+    period = rate_hz / frequency_hz
+    periods = max(threshold.PERIODS, int(np.ceil(threshold.BLOCK_S * frequency_hz)))
+    size = max(round(periods * period), 4 * harmonics + 8)
+    count = min(signal.size // size, threshold.BLOCKS)
+    size = signal.size // max(count, 1)
+    rows: list[ComplexArray] = []
+    middle_s: list[float] = []
+    for number in range(count):
+        part = slice(number * size, (number + 1) * size)
+        good = valid[part]
+        if np.mean(good) < threshold.ARRIVED:
+            continue
+        at = first + np.arange(part.start, part.stop)
+        phase = 2 * np.pi * frequency_hz / rate_hz * at
+        turning = np.outer(phase, np.arange(1, harmonics + 1))
+        trend = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, size), threshold.TREND)
+        columns = np.hstack([np.cos(turning), -np.sin(turning), trend])
+        solved = np.linalg.lstsq(columns[good], signal[part][good], rcond=None)[0]
+        middle_s.append((first + 0.5 * (part.start + part.stop)) / rate_hz)
+        rows.append(solved[:harmonics] + 1j * solved[harmonics : 2 * harmonics])
+    blocks = np.array(rows, np.complex128).reshape(len(rows), harmonics)
+    return Followed(blocks, np.array(middle_s))

@@ -1,0 +1,1 @@
+"""Vibration over speed: orders, frequencies, and the resonances that orders excite."""

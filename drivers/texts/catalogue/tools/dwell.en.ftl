@@ -1,0 +1,17 @@
+dwell_amplitude-too-small = an amplitude of { NUM($value, format: ".3g") } { $unit } is less than the steps of the setpoint can form
+    .remedy = take at least { NUM($least, format: ".3g") } { $unit }
+dwell_beyond-envelope = the vibration needs { NUM($needed_rpm, format: ".3g") } rpm and { NUM($way_rev, format: ".3g") } rev, more than the { NUM($permitted_rpm, format: ".3g") } rpm and { NUM($travel_rev, format: ".3g") } rev that it may use of the limits
+    .remedy = take a smaller amplitude, a lower slow speed, a higher frequency or wider limits
+dwell_few-samples = too few samples came to state what vibrated
+    .remedy = vibrate for longer, or at a slow speed whose strokes are longer
+dwell_frequency-too-high = setpoints with every cycle carry no sine above { NUM($highest_hz, format: "g") } Hz
+    .remedy = take a lower frequency or a shorter cycle
+dwell_going-back-evaluating = going back and evaluating
+dwell_no-torque-offset = { $drive } takes no torque ahead of its speed loop with every cycle
+    .remedy = let the speed setpoint carry the sine
+dwell_takes-too-long = the vibration takes { NUM($takes_s, format: ".3g") } s with its beginning and end, more than the time limit of { NUM($time_s, format: "g") } s
+    .remedy = take a shorter time at full amplitude, or a longer time limit
+dwell_title = Dwell at one frequency
+dwell_torque-beyond-envelope = a torque of { NUM($value, format: ".3g") } % is more than the { NUM($permitted_percent, format: ".3g") } % that the vibration may use of the torque limit
+    .remedy = take a smaller amplitude or a higher torque limit
+dwell_vibrating = vibrating at { NUM($frequency_hz, format: "g") } Hz, { NUM($amplitude_rpm, format: ".2g") } rpm at the motor

@@ -1,0 +1,10 @@
+vibration_first-short-move = 首次短距离运动
+vibration_going-back-evaluating = 正在返回并评估
+vibration_no-room-for-speeds = 在 { NUM($slowest_rpm, format: ".3g") } rpm 与限制允许的最高速度 { NUM($fastest_rpm, format: ".3g") } rpm 之间，无法安排一系列速度
+    .remedy = 请允许更大的行程或更高的速度，或降低最低速度
+vibration_no-speed-held = 没有任何速度能在两个方向上均匀保持；未能保持的最高速度为 { NUM($value, format: ".3g") } rpm
+    .remedy = 请允许更高的速度和更大的转矩；检查速度环增益
+vibration_speed-both-directions = { NUM($speed_rpm, format: ".3g") } rpm，双向
+vibration_takes-too-long = { $speeds } 个速度需要 { NUM($takes_s, format: ".0f") } s，超过时间限值 { NUM($time_s, format: "g") } s
+    .remedy = 请减少速度数，或允许更长时间
+vibration_title = 振动-速度图谱
