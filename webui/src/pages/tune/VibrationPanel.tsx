@@ -121,7 +121,14 @@ function VibrationTool({
     <Panel title={text('title')}>
       <p className="dim">{text('lead')}</p>
       {before?.(text)}
-      <ToolForm fields={fields} values={values} text={text} onChange={setValues} />
+      <ToolForm
+        tool={tool}
+        limits={limits}
+        fields={fields}
+        values={values}
+        text={text}
+        onChange={setValues}
+      />
       <StartButton
         obstacle={obstacle ?? (complete(fields, values) ? null : t('start.incomplete'))}
         busy={start.busy}
