@@ -26,6 +26,7 @@ DEFINED = {
     "_DELAY": "place of a parameter",
     "_POSITION_DELAY": "place of a parameter",
     "_FILTER": "place of a parameter",
+    "_FIRST": "place of a parameter",
     "GROUP": "numbers of parts in stored raw data",
     "_ORDER": "order of a polynomial, which the window follows from",
     "_RATIO": "logarithm of a damping ratio by those of its parts",
