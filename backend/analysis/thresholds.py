@@ -1203,6 +1203,9 @@ class coupled_response:
     PERIODS = 2
     """[count] Whole periods that each experiment needs for a covariance. Origin:
     tests/unit/analysis/test_coupled_axes.py."""
+    IMAGE_LEFT = 0.2
+    """[ratio] Of the setpoints' images in the sampled torque so much may be left, as the drive's
+    loop is known by its parameters alone. Origin: tests/virtual/tools/test_gantry.py."""
     REACH = 4
     """[count] Lines on each side over which the distortion is averaged: two realisations alone show
     it with four degrees of freedom a line. Origin: tests/unit/analysis/test_coupled_axes.py."""
@@ -1247,6 +1250,14 @@ class coupled_modes:
     """[ratio] No stiffness at rest is known better than this (one deviation): it is concluded from
     modes above it whose damping is taken as proportional. Origin:
     tests/unit/analysis/test_coupled_axes.py."""
+    # KNOWN_HZ, KNOWN_DAMPING: No frequency and no damping of a mode is known better than this (one
+    # deviation of its logarithm): what is left of images and filters is no noise.
+    KNOWN_HZ = 0.002
+    """[ratio] Virtual drives at 1 kHz were off by up to 0.25 %. Origin:
+    tests/virtual/tools/test_gantry.py."""
+    KNOWN_DAMPING = 0.06
+    """[ratio] Virtual drives at 1 kHz were off by up to 8 %. Origin:
+    tests/virtual/tools/test_gantry.py."""
     DAMPING_KNOWN = 10.0
     """[ratio] A mode whose damping may differ by more from one end of its interval to the other is
     an outlier of one line. Origin: tests/unit/analysis/test_coupled_axes.py."""

@@ -37,6 +37,7 @@ DEFINED = {
     "_POINTS": "drawn on a page",
     "_WAYS": "two directions",
     "_DIRECTIONS": "two directions",
+    "DIRECTIONS": "two directions, each with every sign",
     "_WHOLE_RANGE": "2^31 of a 32-bit position",
     "_MOST_INCREMENTS": "half of the range of a 32-bit position",
     "_TURN_RPM": "60/2π",

@@ -238,8 +238,12 @@ class _Fit:
             modes.append(
                 Mode(
                     "skew" if share > 0.5 else "common",
-                    float(np.exp(log_hz)), self._around(log_hz, deviations[place]),
-                    float(np.exp(log_damping)), self._around(log_damping, deviations[place + 1]),
+                    float(np.exp(log_hz)),
+                    self._around(log_hz, np.hypot(deviations[place], threshold.KNOWN_HZ)),
+                    float(np.exp(log_damping)),
+                    self._around(
+                        log_damping, np.hypot(deviations[place + 1], threshold.KNOWN_DAMPING)
+                    ),
                     share,
                 )
             )  # fmt: skip

@@ -9,7 +9,7 @@ noise; its covariance is carried to the four entries.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -52,6 +52,16 @@ class PairRecord:
 
 
 @dataclass(frozen=True)
+class Controllers:
+    """From the error of the reported speed to the torque of each axis, on the lines f [n, 2], and
+    at their images fs - f.
+    """
+
+    at_line: ComplexArray
+    at_image: ComplexArray
+
+
+@dataclass(frozen=True)
 class CoupledResponse:
     """The 2×2 response on its lines [n]; ``response`` [n, 2, 2] from torque of axis j to speed of
     axis i, in (rad/s)/Nm.
@@ -91,6 +101,38 @@ class CoupledResponse:
         flat = slope.reshape(-1, 4)
         variance = np.einsum("ki,kij,kj->k", flat, self.covariance, flat.conj()).real
         return np.asarray(np.sqrt(np.maximum(variance, 0.0) / 2.0))
+
+    def without_images(self, share: FloatArray, controllers: Controllers | None) -> CoupledResponse:
+        """Without what the sampled torques show of the setpoints' images.
+
+        Between two cycles the setpoints go on in a straight line; their image at fs - f is
+        ``share`` [n] of what they are at f, and each loop makes torque of it that a sample cannot
+        tell from that at f. With ``controllers`` it is subtracted: of the sampled torque u',
+        (1 + q/C) u = u' - q y with q = share C*(fs - f), as the setpoint is u/C + y. What may be
+        left of it widens the covariance.
+        """
+        g, covariance, left = self.response, self.covariance, np.abs(share)
+        if controllers is not None:
+            q = share[:, None] * controllers.at_image.conj()
+            p = 1.0 / (1.0 + q / controllers.at_line)
+            q = q * p
+            right = np.linalg.inv(p[:, :, None] * np.eye(2) - q[:, :, None] * self.response)
+            g = self.response @ right
+            before = np.eye(2) + g * q[:, None, :]
+            each = np.einsum("kil,kmj->kijlm", before, right).reshape(-1, 4, 4)
+            covariance = each @ covariance @ np.conj(np.swapaxes(each, 1, 2))
+            left = threshold.IMAGE_LEFT * left
+        own = 2.0 * (left[:, None] * np.abs(g.reshape(-1, 4)) / self.spread) ** 2
+        return replace(self, response=g, covariance=covariance + own[:, :, None] * np.eye(4))
+
+    def without_filter(self, rows: ComplexArray) -> CoupledResponse:
+        """Without filters [n, 2] that the speed of each axis has passed."""
+        each = np.repeat(1.0 / rows, 2, axis=1)
+        return replace(
+            self,
+            response=self.response / rows[:, :, None],
+            covariance=self.covariance * each[:, :, None] * each.conj()[:, None, :],
+        )
 
     def transformed(self, rows: FloatArray, columns: FloatArray) -> CoupledResponse:
         """``rows`` G ``columns``, with the covariance of that; the coherence is left out (NaN)."""

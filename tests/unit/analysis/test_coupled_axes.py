@@ -9,7 +9,12 @@ import pytest
 
 from backend.analysis.coupled.excitation import SIGNS, orthogonal_multisines
 from backend.analysis.coupled.modes import _Fit, common_and_differential, find_modes
-from backend.analysis.coupled.response import CoupledResponse, PairRecord, estimate
+from backend.analysis.coupled.response import (
+    Controllers,
+    CoupledResponse,
+    PairRecord,
+    estimate,
+)
 from backend.analysis.coupled.stability import (
     coupling,
     design,
@@ -134,6 +139,30 @@ def test_distortion_that_repeats_with_each_period_widens_the_intervals():
     assert np.median(bent.distortion) > 5.0
 
 
+def test_images_of_the_setpoints_and_filters_of_the_speed_are_removed():
+    """What is sampled of the torque: its own line, and what each loop makes of the image."""
+    plant, f = Gantry(), LINES.astype(float)
+    g = plant.response(f)
+    share = (f / (RATE - f)) ** 2
+    at_line, at_image = controllers(f), controllers(RATE - f)
+    r = np.array([[1.0, 1.0], [1.0, -1.0]])
+    u = np.linalg.inv(np.eye(2) + at_line[:, :, None] * g) @ (at_line[:, :, None] * r)
+    y = g @ u
+    sampled = u + share[:, None, None] * at_image.conj()[:, :, None] * r
+    filters = 1.0 / (1.0 + 1j * f / 500.0)[:, None] * np.ones(2)
+    seen = replace(exact(plant), response=y @ np.linalg.inv(sampled))
+    assert np.max(np.abs(seen.response / g - 1.0)) > 0.05
+    plain = seen.without_images(share, Controllers(at_line, at_image))
+    assert np.allclose(plain.response, g, rtol=1e-9)
+    # A fifth of it may be left.
+    left = plain.spread * plain.std[:, 0, 0] / np.abs(g[:, 0, 0]) / share
+    assert left == pytest.approx(np.full(f.size, 0.2), rel=0.01)
+    unknown = seen.without_images(share, None)
+    assert np.allclose(unknown.response, seen.response)
+    late = replace(exact(plant), response=filters[:, :, None] * g).without_filter(filters)
+    assert np.allclose(late.response, g)
+
+
 def test_a_period_with_a_gap_is_left_out():
     plant, rng = Gantry(), np.random.default_rng(5)
     whole = records(plant, rng)
@@ -195,7 +224,7 @@ def test_intervals_of_modes_inertia_and_skew_stiffness_hold_the_truth_in_95_of_1
     plant, rng = Gantry(), np.random.default_rng(7)
     truth = [mode for mode in plant.modes() if 4.0 < mode[0] < 230.0]
     total, stiffness = sum(plant.motors) + plant.beam, static_stiffness(plant)
-    # Searched once, so that a draw takes a tenth of a second; each is fitted anew from there.
+    # Searched once, so that a draw takes a tenth of a second; each is fitted again from there.
     poles = [0.0, *np.log((0.5, 10.0))]
     for frequency_hz, damping, _ in truth:
         poles += [np.log(frequency_hz), np.log(damping)]
