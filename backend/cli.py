@@ -91,6 +91,11 @@ COMMANDS = {
         "tools:load_side",
         "Measure backlash, stiffness and transmission error with a second encoder. The axis moves.",
     ),
+    "gantry": (
+        "tools:gantry",
+        "Measure two coupled axes together: response, skew and the margins of both loops. Both "
+        "axes move.",
+    ),
     "first-power": (
         "tools:first_power",
         "Before the first closed loop: supply, counts, direction, switches, brake and phase order. "

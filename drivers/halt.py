@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple
 
 from drivers.texts.message import Text, as_text, text
 
-Quantity = Literal["position", "speed", "torque", "following error"]
+Quantity = Literal["position", "speed", "torque", "following error", "skew"]
 
 
 class HaltCause(Enum):
@@ -27,6 +27,10 @@ class HaltCause(Enum):
     """The torque was above the envelope's limit."""
     FOLLOWING = "following"
     """The following error was above the envelope's limit."""
+    SKEW = "skew"
+    """Two axes of one machine went apart by more than the envelope's limit."""
+    PARTNER = "partner"
+    """The other axis of the same machine was stopped."""
     EXPIRED = "expired"
     """The setpoints were not renewed in time."""
     LEFT_ENABLED = "left_enabled"
@@ -56,13 +60,20 @@ class LeftBy(Enum):
 
 #: Causes that are a limit of the envelope.
 ENVELOPE_CAUSES = frozenset(
-    {HaltCause.POSITION, HaltCause.SPEED, HaltCause.TORQUE, HaltCause.FOLLOWING}
+    {
+        HaltCause.POSITION,
+        HaltCause.SPEED,
+        HaltCause.TORQUE,
+        HaltCause.FOLLOWING,
+        HaltCause.SKEW,
+    }
 )
 _CAUSE_OF: Mapping[Quantity, HaltCause] = {
     "position": HaltCause.POSITION,
     "speed": HaltCause.SPEED,
     "torque": HaltCause.TORQUE,
     "following error": HaltCause.FOLLOWING,
+    "skew": HaltCause.SKEW,
 }
 
 
@@ -108,6 +119,8 @@ class Halted:
             return text(
                 "motion.contradiction", speed=self.value, from_position=self.limit or 0.0, note=note
             )
+        if self.cause is HaltCause.PARTNER:
+            return text("motion.partner", note=note)
         return note if self.note else text(_TEXTS[self.cause])
 
     @property
@@ -146,6 +159,7 @@ _TEXTS: Mapping[HaltCause, str] = {
     HaltCause.SPEED: "motion.speed",
     HaltCause.TORQUE: "motion.torque",
     HaltCause.FOLLOWING: "motion.following",
+    HaltCause.SKEW: "motion.skew",
     HaltCause.COMMANDED: "motion.commanded",
     HaltCause.LOST: "motion.lost",
     HaltCause.UNFIT: "motion.unfit",

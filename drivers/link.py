@@ -280,6 +280,27 @@ class Trajectory:
     renew_s: float = 0.2
 
 
+@dataclass(frozen=True, slots=True)
+class Coupled:
+    """What holds for two trajectories on one machine: neither axis goes on when the other one is
+    stopped, and both stop when the difference of their ways changes by more than ``skew_max``.
+
+    In raw increments of the first axis from ``zero``, the position of each; an increment of the
+    second axis is ``ratio`` of the first, negative where they count against each other.
+    """
+
+    zero: tuple[int, int]
+    ratio: float
+    skew_max: float
+
+
+class PlaysPairs(Protocol):
+    """An exchange whose loop can hold two axes together."""
+
+    async def play_pair(self, pair: tuple[Trajectory, Trajectory], coupled: Coupled) -> int:
+        """As `Cyclic.play`, with this watched in every cycle until both axes are at rest."""
+
+
 class OwnsPowerState(Protocol):
     """A loop that writes the control words, so that nobody else may."""
 
@@ -309,7 +330,7 @@ class TakesSpeeds(Protocol):
 class Cyclic(Protocol):
     """Synchronous process data of a bus that has them (EtherCAT, CANopen with SYNC).
 
-    `power` and `speeds` are parts that an exchange may lack, and are None then.
+    `power`, `speeds` and `pairs` are parts that an exchange may lack, and are None then.
     """
 
     @property
@@ -319,6 +340,10 @@ class Cyclic(Protocol):
     @property
     def speeds(self) -> TakesSpeeds | None:
         """What gives speeds to drives without a cyclic mode."""
+
+    @property
+    def pairs(self) -> PlaysPairs | None:
+        """What moves two axes of one machine together."""
 
     @property
     def running(self) -> bool:

@@ -1312,3 +1312,94 @@ class dwell:
     ALIKE = 0.9
     """[ratio] Highest correlation of neighbouring blocks that widens an interval. Origin:
     docs/vibration.md."""
+
+
+class coupled_response:
+    """`coupled/response.py`."""
+
+    PERIODS = 2
+    """[count] Whole periods that each experiment needs for a covariance. Origin:
+    tests/unit/analysis/test_coupled_axes.py."""
+    IMAGE_LEFT = 0.2
+    """[ratio] Of the setpoints' images in the sampled torque so much may be left, as the drive's
+    loop is known by its parameters alone. Origin: tests/virtual/tools/test_gantry.py."""
+    REACH = 4
+    """[count] Lines on each side over which the distortion is averaged: two realisations alone show
+    it with four degrees of freedom a line. Origin: tests/unit/analysis/test_coupled_axes.py."""
+
+
+class coupled_modes:
+    """`coupled/modes.py`."""
+
+    FEWEST_LINES = 12
+    """[count] A model of one mode has ten parameters. Origin:
+    tests/unit/analysis/test_coupled_axes.py."""
+    MODES = 4
+    """[count] No more modes are looked for. Origin: tests/unit/analysis/test_coupled_axes.py."""
+    GAIN = 6.0
+    """[ratio] Chi-square that a mode must take for each of its parameters (1 by chance, 2 by
+    Akaike's criterion). Origin: tests/unit/analysis/test_coupled_axes.py."""
+    FLOOR = 0.003
+    """[ratio] No entry is known better than this share of its line, as filters of the feedback are
+    taken as a delay. Origin: tests/unit/analysis/test_coupled_axes.py."""
+    # VISCOUS_RAD_S, VISCOUS_RANGE: Corners of viscous friction from which the search begins, and
+    # within which it stays.
+    VISCOUS_RAD_S = (0.5, 10.0)
+    """[rad/s] Origin: tests/unit/analysis/test_coupled_axes.py."""
+    VISCOUS_RANGE = (1e-3, 300.0)
+    """[rad/s] Origin: tests/unit/analysis/test_coupled_axes.py."""
+    DELAY_RAD = 3.0
+    """[rad] Most that the speed is reported later (or earlier) than the torque, as phase at the
+    highest line. Origin: tests/unit/analysis/test_coupled_axes.py."""
+    # DAMPING_RANGE, TRIED_DAMPING: Damping ratios that a mode may have, and the one that is tried
+    # first at each place.
+    DAMPING_RANGE = (5e-4, 0.7)
+    """[ratio] Origin: tests/unit/analysis/test_coupled_axes.py."""
+    TRIED_DAMPING = 0.03
+    """[ratio] Origin: tests/unit/analysis/test_coupled_axes.py."""
+    RIDGE = 1e-9
+    """[ratio] Added to squares of 1 of the regression. Origin:
+    tests/unit/analysis/test_coupled_axes.py."""
+    APART = 0.06
+    """[ratio] A mode that was found may be two, so far below and above it. Origin:
+    tests/unit/analysis/test_coupled_axes.py."""
+    STATIC = 0.01
+    """[ratio] No stiffness at rest is known better than this (one deviation): it is concluded from
+    modes above it whose damping is taken as proportional. Origin:
+    tests/unit/analysis/test_coupled_axes.py."""
+    # KNOWN_HZ, KNOWN_DAMPING: No frequency and no damping of a mode is known better than this (one
+    # deviation of its logarithm): what is left of images and filters is no noise.
+    KNOWN_HZ = 0.002
+    """[ratio] Virtual drives at 1 kHz were off by up to 0.25 %. Origin:
+    tests/virtual/tools/test_gantry.py."""
+    KNOWN_DAMPING = 0.06
+    """[ratio] Virtual drives at 1 kHz were off by up to 8 %. Origin:
+    tests/virtual/tools/test_gantry.py."""
+    DAMPING_KNOWN = 10.0
+    """[ratio] A mode whose damping may differ by more from one end of its interval to the other is
+    an outlier of one line. Origin: tests/unit/analysis/test_coupled_axes.py."""
+    # PLACES, STARTS, EVALUATIONS: Frequencies at which one more mode is tried, the best ones that
+    # are searched from, and the evaluations of each search.
+    PLACES = 60
+    """[count] Origin: tests/unit/analysis/test_coupled_axes.py."""
+    STARTS = 2
+    """[count] Origin: tests/unit/analysis/test_coupled_axes.py."""
+    EVALUATIONS = 60
+    """[count] Origin: tests/unit/analysis/test_coupled_axes.py."""
+    RIGID_SHARE = 0.1
+    """[ratio] A rigid body that the differential torque moves by less than this share of what the
+    common torque does is none: the difference of the positions has a stiffness. Origin:
+    tests/unit/analysis/test_coupled_axes.py."""
+
+
+class coupled_stability:
+    """`coupled/stability.py`."""
+
+    OPEN = 0.8
+    """[ratio] A locus that is larger at the highest line may turn round -1 above it. Origin:
+    tests/unit/analysis/test_coupled_axes.py."""
+    # FACTORS, STEPS: Common factors of both speed gains that are tried, and how many.
+    FACTORS = (0.05, 6.0)
+    """[ratio] Origin: tests/unit/analysis/test_coupled_axes.py."""
+    STEPS = 80
+    """[count] Origin: tests/unit/analysis/test_coupled_axes.py."""

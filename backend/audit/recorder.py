@@ -36,9 +36,9 @@ class _Sent:
 
 @dataclass(slots=True)
 class _Running:
-    """A job whose begin was recorded. ``drive`` is the axis that it moves, None for others."""
+    """A job whose begin was recorded, with the axes that it moves."""
 
-    drive: str | None
+    drives: tuple[str, ...]
     sent: dict[str, _Sent] = field(default_factory=dict)
 
 
@@ -98,7 +98,7 @@ class AuditRecorder:
         What a motion sends, many a second, is recorded with its end. All else is recorded at once,
         and again only when it changes: words that STOP repeats are one event.
         """
-        motion = next((j for j in self._running.values() if j.drive == record.drive), None)
+        motion = next((j for j in self._running.values() if record.drive in j.drives), None)
         if motion is not None:
             sent = motion.sent.get(record.key)
             if sent is None:
@@ -132,10 +132,12 @@ class AuditRecorder:
         detail: dict[str, Value] = {}
         if job.drive is not None:
             detail["drive"] = job.drive
+        if job.partner is not None:
+            detail["partner"] = job.partner
         if job.state == "running":
             if job.id in self._running:
                 return
-            self._running[job.id] = _Running(job.drive if job.motion else None)
+            self._running[job.id] = _Running(job.moved)
             detail = settings_now() | detail
         elif (ended := self._running.pop(job.id, None)) is None:
             return
@@ -144,7 +146,7 @@ class AuditRecorder:
             reason = (job.result or {}).get("reason")
             if isinstance(reason, str):
                 detail["reason"] = reason
-            self._forget_commands(job.drive)
+            self._forget_commands(job.moved or (job.drive,))
         self._audit.add(
             Fact(
                 _KINDS.get(job.kind, "motion" if job.motion else "job"),
@@ -157,9 +159,9 @@ class AuditRecorder:
             )
         )
 
-    def _forget_commands(self, drive: str | None) -> None:
+    def _forget_commands(self, drives: Sequence[str | None]) -> None:
         """A motion has commanded since; what comes next is new, whatever it was before."""
-        for place in [place for place in self._commanded if place[0] == drive]:
+        for place in [place for place in self._commanded if place[0] in drives]:
             del self._commanded[place]
 
     def lease_changed(self, drive: str, holder: Holder | None) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from backend.motion.grant import Grant
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed
-from drivers.link import OwnsPowerState, Trajectory
+from drivers.link import Coupled, OwnsPowerState, Trajectory
 
 if TYPE_CHECKING:
     from backend.axis.cyclic import CyclicSession
@@ -58,6 +58,23 @@ async def play(session: CyclicSession, drive: Drive, trajectory: Trajectory, gra
     """
     drive.require_grant(grant, drive.require("control_word"))
     return await session.cyclic.play([trajectory])
+
+
+async def play_pair(
+    session: CyclicSession, drives: tuple[Drive, Drive], pair: tuple[Trajectory, Trajectory],
+    coupled: Coupled, grants: tuple[Grant, Grant],
+) -> int:  # fmt: skip
+    """Give the loop setpoints for two axes of one machine; see `drivers.link.PlaysPairs`.
+
+    Raises:
+        NotGranted: a grant is not for its axis, or has ended.
+        NotAllowed: the loop of this bus moves each axis by itself.
+    """
+    for drive, grant in zip(drives, grants, strict=True):
+        drive.require_grant(grant, drive.require("control_word"))
+    if session.cyclic.pairs is None:
+        raise NotAllowed("axis.bus-moves-single-axes", url=session.link.url)
+    return await session.cyclic.pairs.play_pair(pair, coupled)
 
 
 def _owner(session: CyclicSession, drive: Drive) -> OwnsPowerState:

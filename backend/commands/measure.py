@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -17,8 +17,9 @@ from backend.commands.options import server_for
 from backend.commands.printing import print_text
 from backend.commands.remote import Remote, remote
 from backend.commands.restoring import restore_first
-from backend.commands.session import drive_and_pending, run_in_order
+from backend.commands.session import drive_and_pending, drive_on, opened, run_in_order
 from backend.store.files import write_atomically
+from backend.tools.tool import ToolSettings
 from drivers.errors import NotAllowed
 
 Answer = Mapping[str, object]
@@ -64,6 +65,42 @@ async def exchanging(
         finally:
             axis.session = None
             await session.stop()
+
+
+@asynccontextmanager
+async def exchanging_pair(
+    url: str | None, stations: tuple[int, str], profile: str | None, settings: ToolSettings
+) -> AsyncIterator[tuple[Axis, Axis, CyclicSession]]:
+    """As `exchanging`, with two drives of one bus; the second station as it was typed.
+
+    Raises:
+        NotAllowed: the second station is no number, or the first one again.
+    """
+    from backend.commands.scales import take_taught
+    from backend.tools.sweep import profile_speed
+
+    assert url is not None, "Where.asked says so"
+    first, other = stations
+    if not other.isdecimal() or int(other) == first:
+        raise NotAllowed("command.partner-no-station", value=other)
+    async with opened(url) as link, AsyncExitStack() as held:
+        axes = []
+        for station in (first, int(other)):
+            drive, pending = await drive_on(link, url, station, profile)
+            axis = Axis(drive)
+            await restore_first(axis, pending)
+            await take_taught(axis)
+            axes.append(axis)
+        session = CyclicSession(link, [axis.drive for axis in axes])
+        await session.start(settings.cycle_ms / 1e3)
+        held.push_async_callback(session.stop)
+        for axis in axes:
+            axis.session = session
+            held.enter_context(axis.granted("measurement from the command line", settings.envelope))
+            await held.enter_async_context(
+                profile_speed.prepared(axis, session, settings.envelope, settings.consent)
+            )
+        yield axes[0], axes[1], session
 
 
 @asynccontextmanager

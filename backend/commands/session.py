@@ -151,22 +151,31 @@ async def drive_and_pending(
         NotAllowed: nothing answers, or several families would fit.
     """
     async with opened(url) as link:
-        seen = await link.scan(show_progress, [station])
-        found = next((f for f in seen if f.station == station), None)
-        if found is None:
-            raise NotAllowed(
-                "command.nothing-answers-station-check-power", station=station, url=url
-            )
-        facts, spec = profile_for(link.kind, profile or _recognise(link, found))
-        link.attach(station, facts)
-        drive = Drive(
-            f"{facts.drive}-{station}",
-            f"{facts.drive} station {station}",
-            facts,
-            [Port(link, station, spec)],
-        )
-        drive.found = found
-        yield drive, recall(drive, url, station)
+        yield await drive_on(link, url, station, profile)
+
+
+async def drive_on(
+    link: Link, url: str, station: int, profile: str | None
+) -> tuple[Drive, Pending]:
+    """A drive on an open bus, with what is pending in it.
+
+    Raises:
+        NotAllowed: nothing answers, or several families would fit.
+    """
+    seen = await link.scan(show_progress, [station])
+    found = next((f for f in seen if f.station == station), None)
+    if found is None:
+        raise NotAllowed("command.nothing-answers-station-check-power", station=station, url=url)
+    facts, spec = profile_for(link.kind, profile or _recognise(link, found))
+    link.attach(station, facts)
+    drive = Drive(
+        f"{facts.drive}-{station}",
+        f"{facts.drive} station {station}",
+        facts,
+        [Port(link, station, spec)],
+    )
+    drive.found = found
+    return drive, recall(drive, url, station)
 
 
 def _recognise(link: Link, found: Found) -> str:

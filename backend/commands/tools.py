@@ -62,6 +62,13 @@ def command_of(tool: AnyTool, extras: CommandExtras | None = None) -> Callable[.
                 async with measure.reading(where.url, where.station, where.profile) as axis:
                     found = await tool.run(Run(axis, None, progress(), recording=Path), settings)
                 return dict(found.model_dump(mode="json"))
+            if tool.pair:
+                async with measure.exchanging_pair(
+                    where.url, (where.station, settings.partner), where.profile, settings
+                ) as (axis, partner, session):
+                    pair = Run(axis, session, progress(), partner=partner)
+                    found = await tool.run(pair, settings)
+                return dict(found.model_dump(mode="json"))
             async with measure.exchanging(
                 where.url, where.station, where.profile, settings.cycle_ms, settings.envelope,
                 settings.consent, closes_loops=tool.closes_loops,
@@ -175,6 +182,7 @@ step = command_of(BY_KIND["step"])
 friction = command_of(BY_KIND["friction"])
 brake_test = command_of(BY_KIND["brake-test"])
 load_side = command_of(BY_KIND["load-side"])
+gantry = command_of(BY_KIND["gantry"])
 first_power = command_of(BY_KIND["first-power"])
 safety_check = command_of(BY_KIND["safety-check"])
 shaping = command_of(BY_KIND["shaping"])

@@ -43,8 +43,9 @@ class Exchanges:
         ]
         if not users:
             raise NotAllowed("station.no-connected-drives", url=url)
+        own = None if in_job_of is None else bench.jobs.moving(in_job_of)
         for connected in users:
-            if connected.drive.id != in_job_of:
+            if own is None or bench.jobs.moving(connected.drive.id) is not own:
                 bench.motion.require_idle(connected)
         self._require_settled(url)
         if (old := self.running.get(url)) is not None and old.running:
@@ -83,7 +84,9 @@ class Exchanges:
         """
         if self.running.get(url) is not session:
             return
-        movers = [m for m in self._movers(session) if m.drive.id != but]
+        own = self._bench.jobs.moving(but)
+        others = [m for m in self._movers(session) if m.drive.id != but]
+        movers = [m for m in others if own is None or m.drive.id not in own.moved]
         if not movers:
             await self.stop(url)
             return

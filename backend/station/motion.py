@@ -102,16 +102,27 @@ class Motion:
         Work that keeps its axis still (`Job.stoppable`) has none. When the grant ends before the
         job does, the job is cancelled and brings its axis to rest.
         """
-        connected = self._bench.connected_drives.get(job.drive or "")
-        if connected is None or not job.motion or not job.stoppable:
+        found = [self._bench.connected_drives.get(each) for each in job.moved]
+        drives = [connected.drive for connected in found if connected is not None]
+        if not drives or not job.stoppable:
             return contextlib.nullcontext()
-        drive = connected.drive
 
         def ended(_why: Text) -> None:
             if job.task is not None:
                 job.task.cancel()
 
-        return self._bench.authority.granted(drive.id, drive.name, job.title_text, ended=ended)
+        @contextlib.contextmanager
+        def grants() -> Iterator[None]:
+            with contextlib.ExitStack() as held:
+                for drive in drives:
+                    held.enter_context(
+                        self._bench.authority.granted(
+                            drive.id, drive.name, job.title_text, ended=ended
+                        )
+                    )
+                yield
+
+        return grants()
 
     def unattended(self, drive_id: str, why: Text) -> None:
         """Nobody may leave this axis enabled any longer: it loses its power."""
@@ -129,8 +140,11 @@ class Motion:
 
         The write does not wait for any job's cleanup, and goes out even when whoever asked for
         it is gone by then. Returns drive id to problem, None where the drive took the stop.
-        Whether the axis is at standstill is watched from then on, and shows `standstill`.
+        Whether the axis is at standstill is watched from then on, and shows `standstill`. The
+        other axis of a job that moves two on one machine is stopped as well.
         """
+        moved = [job.moved for each in drive_ids if (job := self._bench.jobs.moving(each))]
+        drive_ids = list(dict.fromkeys([*drive_ids, *(each for two in moved for each in two)]))
         connected_drives = [self._bench.connected(drive_id) for drive_id in drive_ids]
         for connected in connected_drives:
             # Before anything else runs: nothing in progress may enable the axis from here on.

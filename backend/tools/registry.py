@@ -8,6 +8,7 @@ from backend.tools.cycle.run import TOOL as CYCLE
 from backend.tools.dwell.run import TOOL as DWELL
 from backend.tools.first_power.run import TOOL as FIRST_POWER
 from backend.tools.friction.run import TOOL as FRICTION
+from backend.tools.gantry.run import TOOL as GANTRY
 from backend.tools.health.run import TOOL as HEALTH
 from backend.tools.inertia.run import TOOL as INERTIA
 from backend.tools.load_side.run import TOOL as LOAD_SIDE
@@ -25,6 +26,7 @@ TOOLS: tuple[AnyTool, ...] = (
     STEP,
     FRICTION,
     LOAD_SIDE,
+    GANTRY,
     BRAKE_TEST,
     HEALTH,
     SAFETY_CHECK,

@@ -15,6 +15,7 @@ from backend.tools.cycle.result import CycleResult
 from backend.tools.dwell.result import DwellResult
 from backend.tools.first_power.result import FirstPowerResult
 from backend.tools.friction.result import FrictionResult
+from backend.tools.gantry.result import GantryResult
 from backend.tools.health.result import HealthResult
 from backend.tools.inertia.result import InertiaAnswer
 from backend.tools.load_side.result import LoadSideResult
@@ -29,6 +30,7 @@ ToolOutcome: TypeAlias = Annotated[
     | InertiaAnswer
     | StepAnswer
     | LoadSideResult
+    | GantryResult
     | BrakeResult
     | HealthResult
     | FirstPowerResult

@@ -600,6 +600,92 @@ class jog_run:
     Origin: a412d0d6."""
 
 
+class gantry_evaluate:
+    """`gantry/evaluate.py`."""
+
+    FIGHT_PERCENT = 10.0
+    """[% of rated torque] Both sides of a gantry that press against each other with more are out of
+    square: as much as friction of a sound axis takes. Origin:
+    tests/virtual/tools/test_gantry.py."""
+    TORQUE_PERCENT = 0.1
+    """[% of rated torque] No mean torque is known better: the step of 6077h. Origin: CiA 402-2
+    object 6077h."""
+    # MS, PHASE_MARGIN_DEG: What the pair must keep at the far end of its intervals.
+    MS = 2.0
+    """[ratio] Origin:
+    tests/virtual/tools/test_gantry.py."""
+    PHASE_MARGIN_DEG = 30.0
+    """[°] That of an Ms of 2. Origin:
+    tests/virtual/tools/test_gantry.py."""
+    DISTORTED = 4.0
+    """[ratio] Variance between realisations over that of the noise, above which it is named.
+    Origin:
+    tests/virtual/tools/test_gantry.py."""
+
+
+class gantry_run:
+    """`gantry/run.py`."""
+
+    # LOWEST_HZ, TOP, LINES: Band of the lines, the upper end as a share of the sample rate, and how
+    # many lines there are.
+    LOWEST_HZ = 4.0
+    """[Hz] Origin:
+    tests/virtual/tools/test_gantry.py."""
+    TOP = 0.25
+    """[ratio] Origin:
+    tests/virtual/tools/test_gantry.py."""
+    LINES = 70
+    """[count] Origin:
+    tests/virtual/tools/test_gantry.py."""
+    CORNER_HZ = 40.0
+    """[Hz] Amplitudes of the speed fall above this, as the torque for them rises. Origin:
+    tests/virtual/tools/test_gantry.py."""
+    PERIODS = 6
+    """[count] Periods of each experiment that count. Origin:
+    tests/virtual/tools/test_gantry.py."""
+    REALISATIONS = 2
+    """[count] Draws of the phases: one for each direction first. Origin:
+    tests/virtual/tools/test_gantry.py."""
+    RAMP_S = 0.4
+    """[s] Into and out of the steady speed. Origin:
+    tests/virtual/tools/test_gantry.py."""
+    # USED, FAST: Share of travel and speed limit that is planned with.
+    USED = 0.75
+    """[ratio] Origin:
+    tests/virtual/tools/test_gantry.py."""
+    FAST = 0.8
+    """[ratio] Origin:
+    tests/virtual/tools/test_gantry.py."""
+    EXCITED = 0.6
+    """[ratio] Peak of the excitation over the steady speed: no motor may reverse. Origin:
+    tests/virtual/tools/test_gantry.py."""
+    LEAST_RPM = 3.0
+    """[rpm] No slower steady speed: friction would stick. Origin:
+    tests/virtual/tools/test_gantry.py."""
+    # ATTEMPTS, WEAKER: So often everything is played where torque ends a motion, each time with
+    # this share of the excitation.
+    ATTEMPTS = 3
+    """[count] Origin:
+    tests/virtual/tools/test_gantry.py."""
+    WEAKER = 0.5
+    """[ratio] Origin:
+    tests/virtual/tools/test_gantry.py."""
+    # BACK, BACK_S, BACK_ATTEMPTS, NEAR_REV: Ways home: share of the speed limit, shortest time, how
+    # many, and how near is enough.
+    BACK = 0.25
+    """[ratio] Origin:
+    tests/virtual/tools/test_gantry.py."""
+    BACK_S = 0.5
+    """[s] Origin:
+    tests/virtual/tools/test_gantry.py."""
+    BACK_ATTEMPTS = 3
+    """[count] Origin:
+    tests/virtual/tools/test_gantry.py."""
+    NEAR_REV = 0.002
+    """[rev] Origin:
+    tests/virtual/tools/test_gantry.py."""
+
+
 class load_side_evaluate:
     """`load_side/evaluate.py`."""
 
@@ -713,7 +799,7 @@ class measuring_excite:
 
 
 class measuring_recording:
-    """`measuring/recording.py`."""
+    """`measuring/recording.py` and `measuring/pair.py`."""
 
     RENEW_S = 0.03
     """[s] Period of the setpoints' renewal. Origin: f0621549."""

@@ -106,7 +106,8 @@ class Run:
     """What a tool is given for one measurement.
 
     ``exchange`` exchanges process data, None for a tool that moves nothing; ``keep`` stores raw
-    data before they are evaluated; ``repeats`` bounds what is measured again only to know it
+    data before they are evaluated; ``partner`` is the other axis of a tool that moves two;
+    ``repeats`` bounds what is measured again only to know it
     better; ``recording`` finds the file of a recording by its name.
     """
 
@@ -117,6 +118,7 @@ class Run:
     repeats: Repeats = field(default_factory=Repeats)
     begun_s: float = field(default_factory=time.monotonic)
     recording: Callable[[str], Path] | None = None
+    partner: Axis | None = None
 
     @property
     def session(self) -> CyclicSession:
@@ -223,7 +225,8 @@ class Tool(Generic[S, R]):
     start it. ``motion`` False: it reads alone, so that no exchange is started for it, it holds no
     grant, and needs no control of the axis; its settings have no envelope then.
     ``closes_loops`` False: it runs before anybody knows whether a loop may be closed, so that no
-    speed is tried and no ramp is prepared before it.
+    speed is tried and no ramp is prepared before it. ``pair``: it moves two axes of one bus, the
+    second one named by the setting ``partner``.
     """
 
     kind: str
@@ -239,6 +242,7 @@ class Tool(Generic[S, R]):
     right: Right = Right.MEASURE
     motion: bool = True
     closes_loops: bool = True
+    pair: bool = False
 
     def text(
         self, name: str, language: Literal["en", "zh"] = "en",

@@ -45,6 +45,7 @@ class Job:
 
     ``motion``: it holds its axis, so that no other such job can begin. ``stoppable``: STOP
     cancels it; not so for work that holds the axis still and must not be left half done.
+    ``partner`` is the other axis that it moves and holds, of a machine with two.
     ``actor`` is who began it, through which live connection; None where the program did.
     """
 
@@ -63,6 +64,14 @@ class Job:
     person: str = ""
     actor: Actor | None = None
     task: asyncio.Task[None] | None = None
+    partner: str | None = None
+
+    @property
+    def moved(self) -> tuple[str, ...]:
+        """The axes that it moves or holds still; none where it is no motion."""
+        if not self.motion:
+            return ()
+        return tuple(each for each in (self.drive, self.partner) if each is not None)
 
     @property
     def title(self) -> str:
@@ -114,9 +123,7 @@ class JobRunner:
 
     def moving(self, drive: str) -> Job | None:
         """The running motion job of a drive, or None."""
-        return next(
-            (j for j in self._jobs.values() if j.motion and j.drive == drive and _runs(j)), None
-        )
+        return next((j for j in self._jobs.values() if drive in j.moved and _runs(j)), None)
 
     def _require_room(self, kind: str, drive: str | None) -> None:
         """Jobs that nothing else bounds do not take the computer from STOP and from what moves.
@@ -138,6 +145,7 @@ class JobRunner:
         work: Work,
         *,
         drive: str | None = None,
+        partner: str | None = None,
         motion: bool = False,
         person: str = "",
         stoppable: bool = True,
@@ -152,12 +160,14 @@ class JobRunner:
             Busy: a motion job already holds this axis, its bus is being changed, or as many jobs
                 run as may.
         """
-        if motion and drive is not None and (other := self.moving(drive)) is not None:
-            raise Busy("work.axis-already-moved", drive=drive, other_title=other.title_text)
+        moved = [each for each in (drive, partner) if motion and each is not None]
+        for each in moved:
+            if (other := self.moving(each)) is not None:
+                raise Busy("work.axis-already-moved", drive=each, other_title=other.title_text)
         if not motion and by_person:
             self._require_room(kind, drive)
-        if motion and by_person and drive is not None:
-            self._permit(drive)
+        for each in moved if by_person else ():
+            self._permit(each)
         job = Job(
             id=f"{kind}-{self._run_mark}-{next(self._numbers)}",
             kind=kind,
@@ -168,6 +178,7 @@ class JobRunner:
             person=person or acting_person(),
             actor=acting.get(),
             stoppable=stoppable,
+            partner=partner,
         )
         self._jobs[job.id] = job
         job.task = asyncio.create_task(self._run(job, work), name=job.id)

@@ -86,6 +86,11 @@ class CanopenCyclic:
         return self
 
     @property
+    def pairs(self) -> None:
+        """Its loop moves each axis by itself."""
+        return None
+
+    @property
     def speeds(self) -> CanopenCyclic:
         """Drives without a cyclic mode are given speeds in Profile velocity."""
         return self

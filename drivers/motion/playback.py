@@ -114,6 +114,11 @@ class AxisLoop:
         self._sampled_s = 0.0
         self._speed_guard = SpeedGuard(None, None)
 
+    @property
+    def position(self) -> int | None:
+        """Actual position [increments] of the last trusted cycle; None before there was one."""
+        return self._last_position
+
     # Commands ------------------------------------------------------------------------------
 
     def drive_to(self, goal: State, mode: int | None) -> None:

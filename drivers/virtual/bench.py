@@ -13,6 +13,10 @@
     moves = {kind = "screw", lead_mm = 10}    # what the page shows it to move
     [axis.mechanics.motor]
     …
+
+    [[gantry]]                         # a beam between two drives of one EtherCAT segment
+    axes = ["X", "Y"]
+    …
 """
 
 from __future__ import annotations
@@ -27,6 +31,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts import limits
 from drivers.urls import parse_url
+from drivers.virtual.mechanics.gantry import GantrySpec
+from drivers.virtual.mechanics.rough import RoughTorqueSpec
 from drivers.virtual.mechanics.spec import MechanicsSpec, standard_mechanics
 from profiles.loader import ProfileError, load_profile
 
@@ -76,6 +82,7 @@ class BenchSpec(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     axis: tuple[AxisSpec, ...] = Field(min_length=1)
+    gantry: tuple[GantrySpec, ...] = ()
 
     def urls(self, scheme: str | None = None) -> list[str]:
         """Bus URLs in the order they appear, of one scheme where given."""
@@ -119,6 +126,8 @@ def load_bench(path: Path = STANDARD_BENCH) -> BenchSpec:
     _check_stations(bench, path)
     for axis in bench.axis:
         _check_ports(axis, path)
+    for gantry in bench.gantry:
+        _check_gantry(gantry, bench, path)
     return bench
 
 
@@ -131,6 +140,24 @@ def _check_names(bench: BenchSpec, path: Path) -> None:
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise NotAllowed("virtual.bench-file-two-axes", value=twice, path=str(path))
+
+
+def _check_gantry(gantry: GantrySpec, bench: BenchSpec, path: Path) -> None:
+    """Both axes are there, on one EtherCAT segment, with nothing on their shafts but the beam."""
+    names = " + ".join(gantry.axes)
+    axes = [axis for axis in bench.axis if axis.name in gantry.axes]
+    beams = [name for each in bench.gantry for name in each.axes]
+    if len(axes) != 2 or any(beams.count(name) > 1 for name in gantry.axes):
+        raise NotAllowed("virtual.bench-file-gantry-axes", value=names, path=str(path))
+    ports = {url for axis in axes for url, _ in axis.ports}
+    if len(ports) != 1 or parse_url(ports.pop()).scheme != "ethercat":
+        raise NotAllowed("virtual.bench-file-gantry-bus", value=names, path=str(path))
+    for axis in axes:
+        m = axis.mechanics
+        if m.load or m.load_encoder is not None or m.rough_torque != RoughTorqueSpec():
+            raise NotAllowed(
+                "virtual.bench-file-gantry-load", value=axis.name, path=str(path), names=names
+            )
 
 
 def _check_ports(axis: AxisSpec, path: Path) -> None:

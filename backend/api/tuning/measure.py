@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
+from contextlib import AsyncExitStack
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +12,7 @@ from fastapi import APIRouter
 from pydantic import BaseModel
 
 from backend.api import convert
-from backend.api.context import Controlled, TheBench, TheDrive
+from backend.api.context import Connection, Controlled, TheBench, TheDrive
 from backend.api.health.kept import keep_health
 from backend.api.models import JobInfo
 from backend.api.report import routes as routes_report
@@ -38,7 +39,7 @@ from backend.tools.sweep.preview import preview
 from backend.tools.sweep.settings import SweepRequest
 from backend.tools.tool import AnyTool, Run, ToolResult, ToolSettings
 from backend.work.jobs import JobResult, Progress
-from drivers.errors import DriveError
+from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import text
 
 router = APIRouter()
@@ -46,12 +47,32 @@ for part in (routes_design, routes_measurements, routes_report, routes_response_
     router.include_router(part.router)
 
 
+def partner_of(
+    bench: Bench, connected: ConnectedDrive, name: str, connection: str | None
+) -> ConnectedDrive:
+    """The other axis of a machine, by its name or identifier; nobody else may have control of it.
+
+    Raises:
+        NotAllowed: there is none, it is on another bus, or somebody else has control.
+        Busy: it is moved.
+    """
+    named = [m for m in bench.connected_drives.values() if name in (m.drive.name, m.drive.id)]
+    links = {port.link for port in connected.drive.ports}
+    found = [m for m in named if m is not connected and links & {p.link for p in m.drive.ports}]
+    if not found:
+        raise NotAllowed("station.no-partner", drive=connected.drive.name, value=name)
+    bench.leases.require(found[0].drive.id, connection)
+    bench.motion.require_idle(found[0])
+    return found[0]
+
+
 async def start_tool(
-    bench: Bench, connected: ConnectedDrive, tool: AnyTool, request: ToolSettings
-) -> JobInfo:
+    bench: Bench, connected: ConnectedDrive, tool: AnyTool, request: ToolSettings,
+    partner: ConnectedDrive | None = None,
+) -> JobInfo:  # fmt: skip
     """Start a tool as a job, as its route does for whoever acts now.
 
-    Raw data are stored before they are evaluated.
+    Raw data are stored before they are evaluated. ``partner`` is moved as well, see `Tool.pair`.
 
     Raises:
         DriveError: it cannot begin; nothing has moved.
@@ -70,12 +91,16 @@ async def start_tool(
         exchange.taken = True
         limits, axis = request.envelope, connected.axis
         try:
-            async with (
-                profile_speed.prepared(axis, session, limits, request.consent)
-                if tool.closes_loops
-                else keeping_mode(axis, session)
-            ):
-                found: ToolResult = await tool.run(Run(axis, session, progress, keep), request)
+            async with AsyncExitStack() as held:
+                for each in (axis,) if partner is None else (axis, partner.axis):
+                    await held.enter_async_context(
+                        profile_speed.prepared(each, session, limits, request.consent)
+                        if tool.closes_loops
+                        else keeping_mode(each, session)
+                    )
+                other = None if partner is None else partner.axis
+                given = Run(axis, session, progress, keep, partner=other)
+                found: ToolResult = await tool.run(given, request)
                 left = tool.written(found)
                 if left is not None:
                     change = Change(left.time, tool.kind, left.before, left.after)
@@ -95,6 +120,7 @@ async def start_tool(
             text("work.of-drive", title=tool.title, drive=connected.drive.name),
             work,
             drive=connected.drive.id,
+            partner=None if partner is None else partner.drive.id,
             motion=True,
         )
     except DriveError:
@@ -205,8 +231,17 @@ def _add(tool: AnyTool) -> None:
     async def start(bench: TheBench, connected: Controlled, request: ToolSettings) -> JobInfo:
         return await start_tool(bench, connected, tool, request)
 
+    async def start_pair(
+        bench: TheBench, connected: Controlled, request: ToolSettings,
+        connection: Connection = None,
+    ) -> JobInfo:  # fmt: skip
+        name = str(request.model_dump()["partner"])
+        partner = partner_of(bench, connected, name, connection)
+        return await start_tool(bench, connected, tool, request, partner)
+
     # The body is the tool's own settings, which the interface's description shows.
-    route = start if tool.motion else start_reading
+    moving = start_pair if tool.pair else start
+    route = moving if tool.motion else start_reading
     route.__annotations__["request"] = tool.settings
     router.add_api_route(
         f"/drives/{{drive_id}}/jobs/{tool.kind}", route, methods=["POST"], status_code=202,

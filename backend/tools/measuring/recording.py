@@ -36,8 +36,8 @@ from drivers.errors import LinkLost, LinkTimeout, NotAllowed
 from drivers.feedback import FeedbackScale
 from drivers.texts.message import Text
 
-_ROLES = ("position_actual", "velocity_actual", "torque_actual", "status_word")
-_TARGET_OF = {
+ROLES = ("position_actual", "velocity_actual", "torque_actual", "status_word")
+TARGET_OF = {
     Mode.CSP: "position_target",
     Mode.CSV: "velocity_target",
     Mode.CST: "torque_target",
@@ -82,7 +82,7 @@ class Play:
 
 
 @dataclass
-class _Catch:
+class Catch:
     """Blocks as they come, of a motion that begins with cycle ``first``.
 
     A server that stood still finds in one go what the bus did meanwhile, and most of that belongs
@@ -94,6 +94,7 @@ class _Catch:
     first: int | None = None
 
     def take(self, block: bus.ScopeBlock) -> None:
+        """Keep a block, as the exchange delivers it."""
         self.blocks += self._of_motion(block)
 
     def begin(self, first: int) -> None:
@@ -170,7 +171,7 @@ def require_signals(axis: Axis, session: CyclicSession, mode: Mode, offset: bool
         NotAllowed: naming the signal that does not.
     """
     drive = axis.drive
-    needed = [*_ROLES[:3], _TARGET_OF[mode], *(["torque_offset"] if offset else [])]
+    needed = [*ROLES[:3], TARGET_OF[mode], *(["torque_offset"] if offset else [])]
     for role in needed:
         key = drive.key(role)
         if key is None or not session.carries(drive, key):
@@ -184,7 +185,7 @@ def require_signals(axis: Axis, session: CyclicSession, mode: Mode, offset: bool
 
 def takes_torque(axis: Axis, session: CyclicSession) -> bool:
     """Whether the axis is given torques with every cycle."""
-    key = axis.drive.key(_TARGET_OF[Mode.CST])
+    key = axis.drive.key(TARGET_OF[Mode.CST])
     return key is not None and session.carries(axis.drive, key)
 
 
@@ -281,13 +282,13 @@ async def play(
     """
     drive = axis.drive
     period_s = cycle_s(session)
-    keys = [drive.require(role) for role in _ROLES[:3]]
-    target_key = drive.require(_TARGET_OF[sequence.mode])
+    keys = [drive.require(role) for role in ROLES[:3]]
+    target_key = drive.require(TARGET_OF[sequence.mode])
     offset_key = drive.require(sequence.offset_role) if sequence.offset_role else None
     names = [channel(drive, key) for key in [*keys, *also, target_key]]
     if offset_key is not None:
         names.append(channel(drive, offset_key))
-    catch = _Catch(tuple(names))
+    catch = Catch(tuple(names))
     trajectory = bus.Trajectory(
         session.station(drive),
         address_of(drive.parameter(target_key)),
@@ -310,13 +311,13 @@ async def play(
         aligned, whole, catch.runs(), drive.name, ended_early=ended_early
     )
     if limits.feedback is not None:
-        _require_agreement(axis, bridged(table, valid), valid, period_s, limits.feedback)
-    recording = await _in_si(axis, whole, table, valid, period_s, rated_torque_nm)
+        require_agreement(axis, bridged(table, valid), valid, period_s, limits.feedback)
+    recording = await in_si(axis, whole, table, valid, period_s, rated_torque_nm)
     further = bridged(table, valid)[:, len(keys) : len(keys) + len(also)] if also else None
     return replace(recording, also=further)
 
 
-def _require_agreement(
+def require_agreement(
     axis: Axis, table: FloatArray, valid: BoolArray, period_s: float, scale: FeedbackScale
 ) -> None:
     """Nothing is computed from a 606Ch that the position contradicts.
@@ -334,7 +335,7 @@ async def _drive_through(
     session: CyclicSession,
     trajectory: bus.Trajectory,
     period_s: float,
-    catch: _Catch,
+    catch: Catch,
     progress: Callable[[float], None],
     until: Callable[[FloatArray], bool] | None,
 ) -> bool:
@@ -374,7 +375,7 @@ async def _drive_through(
                 return True
 
 
-async def _in_si(
+async def in_si(
     axis: Axis,
     whole: FloatArray,
     table: FloatArray,
@@ -382,6 +383,7 @@ async def _in_si(
     period_s: float,
     rated_torque_nm: float,
 ) -> Recording:
+    """Rows [n, 3 and more] of raw position, velocity and torque next to what was sent, in SI."""
     units = await axis.units()
     count = len(table)
     table = bridged(table, valid)

@@ -19,6 +19,7 @@ from drivers.ethercat.exchange.mapping import Entry
 from drivers.ethercat.exchange.ring import RESYNCED, VALID, Ring, lost_flag
 from drivers.ethercat.process.segment import Segment
 from drivers.halt import HaltCause, Halted
+from drivers.motion.pair_guard import PairGuard
 from drivers.motion.playback import AxisLoop
 from drivers.motion.setpoint_plan import Phase
 from drivers.texts.message import text
@@ -115,6 +116,7 @@ class CyclicLoop:
         self._resynced = 0
         self._lockstep = lockstep
         self._real_next_ns = 0
+        self._pairs: list[PairGuard] = []
 
     def start(self) -> None:
         """Begin the grid now; frames no longer block."""
@@ -149,6 +151,8 @@ class CyclicLoop:
             self._count_invalid(wkc)
         for image, slave in zip(self.images, self._slaves, strict=True):
             self._decide(image, slave, valid=valid)
+        if self._pairs:
+            self._look_at_pairs()
         self.number += 1
         follows = self.dc and not self._lockstep
         self.next_ns += self.cycle_ns + (self._follow_clock() if follows and wkc > 0 else 0)
@@ -172,6 +176,11 @@ class CyclicLoop:
         for image in self.images:
             if station in (None, image.station):
                 image.axis.stop(why)
+
+    def hold_together(self, pair: PairGuard) -> None:
+        """Watch two axes until both are at rest; it takes the place of what held one of them."""
+        self._pairs = [p for p in self._pairs if not set(p.axes) & set(pair.axes)]
+        self._pairs.append(pair)
 
     def leave_out(self, station: int, *, lost: bool) -> None:
         """Take a lost station out of the expected working counter, or back in."""
@@ -266,6 +275,11 @@ class CyclicLoop:
         if outputs != image.outputs:
             image.outputs = outputs
             slave.output = outputs  # type: ignore[attr-defined]
+
+    def _look_at_pairs(self) -> None:
+        for pair in self._pairs:
+            pair.look()
+        self._pairs = [pair for pair in self._pairs if not pair.over]
 
     def _sample(self, wkc: int, *, valid: bool) -> None:
         self._ring.put(

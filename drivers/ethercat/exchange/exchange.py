@@ -26,6 +26,7 @@ from drivers.ethercat.wire.al_status import ERROR_BIT, AlState
 from drivers.ethercat.wire.lanes import Done, LaneName, Lanes
 from drivers.ethercat.wire.steps import Pause, Steps
 from drivers.halt import HaltCause, Halted
+from drivers.motion.pair_guard import PairGuard, SkewLimit
 from drivers.motion.playback import AxisLoop
 from drivers.motion.setpoint_plan import Motion, limits_of
 from drivers.texts.message import Text, text
@@ -292,8 +293,10 @@ class Exchange:
                 return image.axis
         raise NotAllowed("ethercat.station-no-cyclic-data", station=number)
 
-    def play(self, trajectories: Sequence[Message]) -> int:
+    def play(self, trajectories: Sequence[Message], coupled: Message | None) -> int:
         """Begin trajectories together in the next cycle; returns its number.
+
+        Two of them may be ``coupled``, see `drivers.link.Coupled`.
 
         Raises:
             NotAllowed: one of them is not possible; then none begins.
@@ -302,9 +305,13 @@ class Exchange:
         motions = [_motion(item, self._cycle_ns) for item in trajectories]
         for axis, motion in zip(axes, motions, strict=True):
             axis.check(motion)
+        assert self.loop is not None
         for axis, motion in zip(axes, motions, strict=True):
             axis.play(motion)
-        assert self.loop is not None
+        if coupled is not None:
+            first, second = axes
+            limit = SkewLimit(tuple(coupled["zero"]), coupled["ratio"], coupled["skew_max"])
+            self.loop.hold_together(PairGuard((first, second), limit))
         return self.loop.number
 
     def route_write(self, station: int, index: int, subindex: int, data: bytes) -> bool:

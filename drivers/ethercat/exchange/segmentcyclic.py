@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +22,7 @@ from drivers.ethercat.exchange.trajectory import message_of
 from drivers.ethercat.process.hostprocess import HostProcess
 from drivers.ethercat.process.protocol import Message
 from drivers.halt import Halted, LoopState
-from drivers.link import CyclicSignal, ScopeBlock, Trajectory, Unsubscribe
+from drivers.link import Coupled, CyclicSignal, ScopeBlock, Trajectory, Unsubscribe
 from drivers.motion.setpoint_plan import Phase
 from drivers.texts.message import Text, text
 from profiles.schema import Profile
@@ -85,6 +85,11 @@ class EthercatCyclic:
     @property
     def power(self) -> EthercatCyclic:
         """Its loop writes the control words."""
+        return self
+
+    @property
+    def pairs(self) -> EthercatCyclic:
+        """The loop can hold two axes together."""
         return self
 
     @property
@@ -163,12 +168,20 @@ class EthercatCyclic:
             OutOfRange: a value does not fit its object or the envelope; nothing moves.
             NotAllowed: not enabled, not mapped, a limit that cannot be watched, or a jump.
         """
+        return await self._play(trajectories, None)
+
+    async def play_pair(self, pair: tuple[Trajectory, Trajectory], coupled: Coupled) -> int:
+        """See `drivers.link.PlaysPairs`."""
+        return await self._play(pair, asdict(coupled))
+
+    async def _play(self, trajectories: Sequence[Trajectory], coupled: Message | None) -> int:
         messages = [message_of(trajectory) for trajectory in trajectories]
         generation = self._generation
         for each in trajectories:
             values = f"{len(each.values)} values" if len(each.values) != 1 else "1 value"
             self._note(f"setpoints: {values} for {each.target}", each.station)
-        number: int = await self._host.call({"op": "play", "trajectories": messages}, _ANSWER_S)
+        message = {"op": "play", "trajectories": messages, "coupled": coupled}
+        number: int = await self._host.call(message, _ANSWER_S)
         self._played |= {trajectory.station: generation for trajectory in trajectories}
         return number
 

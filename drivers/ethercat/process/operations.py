@@ -396,7 +396,7 @@ class Operations:
         self.roster.exchange.stop(done)
 
     def _play(self, message: Message, done: Done) -> None:
-        first = self.roster.exchange.play(message["trajectories"])
+        first = self.roster.exchange.play(message["trajectories"], message["coupled"])
         self._report_figures()
         done(first, None)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -41,6 +42,8 @@ class VirtualAxis:
         self._current_loop_hz = 0.0
         self._x = np.zeros(FIRST_LOAD + 2 * len(spec.load))
         self._scratch = np.zeros_like(self._x)
+        #: Called when the shaft was turned by hand: whatever else hangs on it follows.
+        self.placed: Callable[[], None] = lambda: None
         self._loops: LoopSettings | None = None
         self._homing = False
         self._braked = self._brake_released = False
@@ -70,6 +73,20 @@ class VirtualAxis:
             chain.half_gap_rad, self._scratch, self._random,
         )  # fmt: skip
         return done
+
+    def share_state(self, x: npt.NDArray[np.float64]) -> npt.NDArray[np.uint64]:
+        """Keep angle, speed and torque of the motor in ``x`` [3], which others step from now on.
+
+        Returns the state of this axis' random numbers.
+        """
+        x[:] = self._x
+        self._x = x
+        return self._random
+
+    @property
+    def current_loop_rad_s(self) -> float:
+        """Bandwidth of the current loop."""
+        return loop_parameters.TURN * self._current_loop_hz
 
     @property
     def events(self) -> int:
@@ -287,6 +304,7 @@ class VirtualAxis:
         s[k.S_THETA] = s[k.S_THETA_FILTERED] = s[k.S_P_DEMAND] = seen
         s[k.S_OMEGA_LOW] = s[k.S_OMEGA_OBSERVED] = s[k.S_OMEGA] = 0.0
         s[k.S_INDEX_COUNT] = math.floor(angle_rad / self.p[k.P_INDEX_RAD])
+        self.placed()
 
     def clear_faults(self) -> None:
         """Forget latched faults and their timers."""

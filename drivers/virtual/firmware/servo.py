@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Final, Protocol
 
 from drivers.virtual.device import (
     ABORT_DEVICE_STATE,
@@ -48,6 +48,16 @@ _OPTION_CODES: Final = frozenset({"605A:00", "605B:00", "605C:00", "605D:00", "6
 _UNIT_OBJECTS: Final = frozenset({0x6065, 0x6066, 0x607E, 0x608F, 0x6091, 0x6092})
 
 
+class SteppedTogether(Protocol):
+    """Several axes on one machine, which is stepped in one place."""
+
+    def begin(self, start_ns: int) -> None:
+        """The clock of all of them starts."""
+
+    def run(self, steps: int) -> int:
+        """Advance all by up to ``steps`` of 50 µs and let each drive react; returns those done."""
+
+
 class VirtualServo:
     """Firmware, loops and mechanics of one drive; see `drivers.virtual.device.Device`.
 
@@ -80,6 +90,8 @@ class VirtualServo:
         self._off_until_ns: int | None = None
         self._reset_step: int | None = None
         self._maps_outputs = False
+        #: What steps this axis together with another one on the same beam; None for its own.
+        self.stepped: SteppedTogether | None = None
         self._power_on()
 
     # --- power -----------------------------------------------------------------------------
@@ -120,6 +132,8 @@ class VirtualServo:
         """Compute everything up to ``t_ns``; events are handled in the step they happen."""
         if self._start_ns is None:
             self._start_ns = t_ns - int(self.axis.s[k.S_STEP]) * k.STEP_NS
+            if self.stepped is not None:
+                self.stepped.begin(self._start_ns)
         if self._reset_step is not None:
             reset_ns = self._start_ns + self._reset_step * k.STEP_NS
             if t_ns < reset_ns:
@@ -141,10 +155,19 @@ class VirtualServo:
         axis = self.axis
         left = (t_ns - (self._start_ns or 0)) // k.STEP_NS - int(axis.s.item(k.S_STEP))
         while left > 0:
-            left -= axis.run(left)
-            events = axis.events
-            if events and self._off_until_ns is None:
-                self.control.on_events(events)
+            left -= axis.run(left) if self.stepped is None else self.stepped.run(left)
+            if self.stepped is None:
+                self.take_events()
+
+    def take_events(self) -> None:
+        """React to what ended the last run of the loop."""
+        events = self.axis.events
+        if events and self._off_until_ns is None:
+            self.control.on_events(events)
+
+    def begin(self, start_ns: int) -> None:
+        """Its clock starts with that of an axis that it is stepped together with."""
+        self._start_ns = start_ns
 
     # --- dictionary ------------------------------------------------------------------------
     def read(self, index: int, subindex: int) -> bytes:

@@ -2,6 +2,7 @@
 
 from drivers.virtual.mechanics.chain import analytic_response
 from drivers.virtual.mechanics.friction_curve import friction_nm, ripple_nm
+from drivers.virtual.mechanics.gantry import GantrySpec, gantry_response
 from drivers.virtual.mechanics.load_encoder import LoadEncoderSpec
 from drivers.virtual.mechanics.rough import RoughTorqueSpec
 from drivers.virtual.mechanics.spec import (
@@ -23,6 +24,7 @@ from drivers.virtual.mechanics.spec import (
 __all__ = [
     "EncoderSpec",
     "FrictionSpec",
+    "GantrySpec",
     "LoadEncoderSpec",
     "LoadSpec",
     "MechanicsSpec",
@@ -36,6 +38,7 @@ __all__ = [
     "TravelSpec",
     "analytic_response",
     "friction_nm",
+    "gantry_response",
     "load_mechanics",
     "ripple_nm",
     "standard_mechanics",

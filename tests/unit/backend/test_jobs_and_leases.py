@@ -114,3 +114,22 @@ def test_leases() -> None:
     assert leases.drop("c1") == ["x"]
     leases.require("x", "c2")
     assert reported == ["x", "x"]
+
+
+async def test_a_job_that_moves_two_axes_holds_both() -> None:
+    permitted: list[str] = []
+    runner = JobRunner(permit=permitted.append)
+
+    async def work(_progress: Progress) -> None:
+        await asyncio.sleep(60)
+
+    job = runner.start("gantry", "two axes", work, drive="l", partner="r", motion=True)
+    assert permitted == ["l", "r"]
+    assert job.moved == ("l", "r")
+    assert runner.moving("l") is runner.moving("r") is job
+    for drive, partner in (("r", None), ("x", "l")):
+        with pytest.raises(Busy):
+            runner.start("jog", "one axis", work, drive=drive, partner=partner, motion=True)
+    assert runner.moving("x") is None
+    await runner.cancel(job)
+    assert runner.moving("r") is None

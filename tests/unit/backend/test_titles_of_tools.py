@@ -27,6 +27,7 @@ TITLES = {
     "step": ("Step response", "阶跃响应"),
     "friction": ("Friction map", "摩擦图谱"),
     "load-side": ("Load side", "负载侧"),
+    "gantry": ("Gantry", "龙门"),
     "brake-test": ("Brake test", "抱闸测试"),
     "health": ("Health check", "健康检查"),
     "safety-check": ("Safety acceptance record", "安全验收记录"),
@@ -60,6 +61,7 @@ def waiting(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
 
     for place, put in {
         "exchange_for": exchange,
+        "partner_of": lambda *_args: None,
         "profile_speed.require_consent": lambda *_args: None,
         "profile_speed.prepared": forever,
         "keeping_mode": forever,

@@ -1147,6 +1147,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/v1/drives/{drive_id}/jobs/gantry": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Start Gantry
+         * @description Measure two coupled axes together: response, skew and the margins of both loops. Both axes move.
+         */
+        post: operations["start_gantry"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/drives/{drive_id}/jobs/generate": {
         parameters: {
             query?: never;
@@ -6584,6 +6604,258 @@ export interface components {
             speed_nms: number;
         };
         /**
+         * GantryEntry
+         * @description Response from the torque of axis ``torque`` to the speed of axis ``speed``, line by line.
+         */
+        GantryEntry: {
+            /** Coherence */
+            coherence: number[];
+            /** Half Db */
+            half_db: number[];
+            /** Magnitude Db */
+            magnitude_db: number[];
+            /** Phase Deg */
+            phase_deg: number[];
+            /**
+             * Speed
+             * @enum {integer}
+             */
+            speed: 1 | 2;
+            /**
+             * Torque
+             * @enum {integer}
+             */
+            torque: 1 | 2;
+        };
+        /**
+         * GantryFinding
+         * @description A verdict; ``values`` are figures with their units for the places in its text.
+         */
+        GantryFinding: {
+            /**
+             * Code
+             * @enum {string}
+             */
+            code: "square" | "out_of_square" | "square_uncertain" | "no_skew_stiffness" | "skew_mode" | "pair_sound" | "pair_margin_low" | "pair_unstable" | "margins_beyond_band" | "controllers_unknown" | "factor" | "no_factor" | "distortion" | "rated_torque_unknown";
+            /**
+             * Values
+             * @default {}
+             */
+            values: {
+                [key: string]: string;
+            };
+        };
+        /**
+         * GantryMargins
+         * @description Of both speed loops together, on the measured lines; ``stable`` None where they do not show
+         *     it. ``ms_alone`` is the peak of each axis by itself.
+         */
+        GantryMargins: {
+            /** Crossover Hz */
+            crossover_hz: number | null;
+            /** Ms */
+            ms: number;
+            /** Ms Alone */
+            ms_alone: [
+                number,
+                number
+            ];
+            /** Ms Ci95 */
+            ms_ci95: [
+                number | null,
+                number | null
+            ];
+            /** Ms Hz */
+            ms_hz: number;
+            /** Phase Margin Deg */
+            phase_margin_deg: number | null;
+            /** Stable */
+            stable: boolean | null;
+        };
+        /**
+         * GantryMode
+         * @description A resonance of both axes; ``skew_share`` is how much of it is differential, 0 to 1.
+         */
+        GantryMode: {
+            /** Damping */
+            damping: number;
+            /** Damping Ci95 */
+            damping_ci95: [
+                number | null,
+                number | null
+            ];
+            /** Frequency Ci95 Hz */
+            frequency_ci95_hz: [
+                number | null,
+                number | null
+            ];
+            /** Frequency Hz */
+            frequency_hz: number;
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "common" | "skew";
+            /** Skew Share */
+            skew_share: number;
+        };
+        /**
+         * GantryResult
+         * @description Axis 1 is the one that the measurement was started on, axis 2 is ``partner``.
+         *
+         *     ``holding_percent`` is the torque that each axis needs on the mean of both directions, without
+         *     friction, and ``fight_percent`` half their difference: what both sides press against each other
+         *     with. ``out_of_square_rev`` is by how much axis 1 is ahead of where the beam would rest.
+         *     ``coupling`` is √|G12·G21/(G11·G22)|, 0 without coupling, 1 for one rigid body;
+         *     ``relative_gain`` that of axis 1, 1 without coupling.
+         */
+        GantryResult: {
+            /** Coupling */
+            coupling: number[];
+            /** Coupling Half */
+            coupling_half: number[];
+            /** Entries */
+            entries: components["schemas"]["GantryEntry"][];
+            fight_percent: components["schemas"]["GantryValue"];
+            /** Findings */
+            findings: components["schemas"]["GantryFinding"][];
+            /** Frequency Hz */
+            frequency_hz: number[];
+            /** Friction Percent */
+            friction_percent: [
+                components["schemas"]["GantryValue"],
+                components["schemas"]["GantryValue"]
+            ];
+            /** Gain Factor */
+            gain_factor: number | null;
+            /** Holding Percent */
+            holding_percent: [
+                components["schemas"]["GantryValue"],
+                components["schemas"]["GantryValue"]
+            ];
+            inertia_kgm2: components["schemas"]["GantryValue"] | null;
+            /** Largest Skew Rev */
+            largest_skew_rev: number;
+            margins: components["schemas"]["GantryMargins"] | null;
+            /**
+             * Measurements
+             * @description names of the stored raw data
+             * @default []
+             */
+            measurements: string[];
+            /** Modes */
+            modes: components["schemas"]["GantryMode"][];
+            /** Motion S */
+            motion_s: number;
+            out_of_square_mm: components["schemas"]["GantryValue"] | null;
+            out_of_square_rev: components["schemas"]["GantryValue"] | null;
+            /** Partner */
+            partner: string;
+            /** Periods Dropped */
+            periods_dropped: number;
+            /** Periods Used */
+            periods_used: number;
+            /** Relative Gain */
+            relative_gain: number[];
+            skew_stiffness_nm_per_rad: components["schemas"]["GantryValue"] | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            tool: "gantry";
+        };
+        /**
+         * GantrySettings
+         * @description The limits of every measurement, for both axes, and what couples them.
+         */
+        GantrySettings: {
+            /**
+             * Consent
+             * @description the user agreed that nothing in the drive ends a speed when this computer falls silent; needed where the drive has no watchdog (DS_C)
+             * @default false
+             */
+            consent: boolean;
+            /**
+             * Cycle Ms
+             * @description cycle of the exchange that is started where none runs, and ended afterwards
+             * @default 1
+             */
+            cycle_ms: number;
+            /**
+             * Highest Hz
+             * @description highest line, in Hz; a quarter of the bus rate without it
+             */
+            highest_hz?: number | null;
+            /**
+             * Lead Mm
+             * @description way of the beam for one motor revolution, in mm
+             */
+            lead_mm?: number | null;
+            /**
+             * Mirrored
+             * @description the other motor turns the other way when the beam moves
+             * @default false
+             */
+            mirrored: boolean;
+            /**
+             * Partner
+             * @description the other axis: its name on the server, or its station on a bus of one's own
+             * @default
+             */
+            partner: string;
+            /**
+             * Rated Torque Nm
+             * @description overrides what the drive says
+             */
+            rated_torque_nm?: number | null;
+            /**
+             * Resolution Hz
+             * @description distance of the lines, in Hz
+             * @default 2
+             */
+            resolution_hz: number;
+            /**
+             * Skew Limit Rev
+             * @description largest change of the difference of both positions, in revolutions
+             * @default 0.05
+             */
+            skew_limit_rev: number;
+            /**
+             * Speed Limit
+             * @description highest speed, in rpm
+             */
+            speed_limit: number;
+            /**
+             * Time Limit S
+             * @description longest time of a motion, in s
+             * @default 60
+             */
+            time_limit_s: number;
+            /**
+             * Torque Limit
+             * @description highest torque, in % of rated
+             */
+            torque_limit: number;
+            /**
+             * Travel Limit
+             * @description longest way from the start, in revolutions
+             */
+            travel_limit: number;
+        };
+        /**
+         * GantryValue
+         * @description A figure with its 95 % interval.
+         */
+        GantryValue: {
+            /** Ci95 */
+            ci95: [
+                number | null,
+                number | null
+            ];
+            /** Value */
+            value: number;
+        };
+        /**
          * GearLimits
          * @description Bounds on the electronic gear: encoder increments per user increment.
          */
@@ -7975,7 +8247,7 @@ export interface components {
              * Result
              * @description of a tool: its result, which its field tool names
              */
-            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["LoadSideResult"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["ShapingResult"] | components["schemas"]["VibrationResult"] | components["schemas"]["DwellResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | components["schemas"]["PlainResult"] | null;
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["LoadSideResult"] | components["schemas"]["GantryResult"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["ShapingResult"] | components["schemas"]["VibrationResult"] | components["schemas"]["DwellResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | components["schemas"]["PlainResult"] | null;
             /**
              * Started
              * Format: date-time
@@ -8710,7 +8982,7 @@ export interface components {
              * Result
              * @description of a tool: its result, which its field tool names
              */
-            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["LoadSideResult"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["ShapingResult"] | components["schemas"]["VibrationResult"] | components["schemas"]["DwellResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | {
+            result: (components["schemas"]["FrictionResult"] | components["schemas"]["InertiaAnswer"] | components["schemas"]["StepAnswer"] | components["schemas"]["LoadSideResult"] | components["schemas"]["GantryResult"] | components["schemas"]["BrakeResult"] | components["schemas"]["HealthResult"] | components["schemas"]["FirstPowerResult"] | components["schemas"]["SafetyResult"] | components["schemas"]["ShapingResult"] | components["schemas"]["VibrationResult"] | components["schemas"]["DwellResult"] | components["schemas"]["CycleResult"] | components["schemas"]["SweepAnswer"] | components["schemas"]["AutotuneAnswer"]) | {
                 [key: string]: unknown;
             };
             /** Settings */
@@ -13510,6 +13782,13 @@ export type GainStepsInfo = components['schemas']['GainStepsInfo'];
 export type GainValues = components['schemas']['GainValues'];
 export type GainWrite = components['schemas']['GainWrite'];
 export type GainsInfo = components['schemas']['GainsInfo'];
+export type GantryEntry = components['schemas']['GantryEntry'];
+export type GantryFinding = components['schemas']['GantryFinding'];
+export type GantryMargins = components['schemas']['GantryMargins'];
+export type GantryMode = components['schemas']['GantryMode'];
+export type GantryResult = components['schemas']['GantryResult'];
+export type GantrySettings = components['schemas']['GantrySettings'];
+export type GantryValue = components['schemas']['GantryValue'];
 export type GearLimits = components['schemas']['GearLimits'];
 export type GearPlanInfo = components['schemas']['GearPlanInfo'];
 export type GearValueInfo = components['schemas']['GearValueInfo'];
@@ -23374,6 +23653,151 @@ export interface operations {
         requestBody: {
             content: {
                 "application/json": components["schemas"]["FrictionSettings"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    start_gantry: {
+        parameters: {
+            query?: never;
+            header?: {
+                "X-Servodeck-Connection"?: string | null;
+            };
+            path: {
+                drive_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["GantrySettings"];
             };
         };
         responses: {

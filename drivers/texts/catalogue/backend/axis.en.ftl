@@ -1,5 +1,7 @@
 axis_606ch-6064h-opposite-signs = { $drive }: 606Ch and 6064h have opposite signs
     .remedy = check the polarity 607Eh: set its bits 6 and 7 to the same value; then move again
+axis_bus-moves-single-axes = { $url }: the loop of this bus moves each axis by itself
+    .remedy = two axes of one machine are moved together on EtherCAT only
 axis_cause-a-fault = a fault is present
 axis_cause-fault = fault present: { $faults }
 axis_cause-input = input { $terminal } ({ $function }) is active

@@ -3,12 +3,14 @@ motion_beyond-limit = { $quantity ->
     [position] position
     [speed] speed
     [torque] torque
+    [skew] skew
    *[following-error] following error
  } { $value } is beyond the limit of { $limit }: the axis is braked and disabled
 motion_beyond-limit-in = { $quantity ->
     [position] position
     [speed] speed
     [torque] torque
+    [skew] skew
    *[following-error] following error
  } { $value } { $unit } is beyond the limit of { $limit } { $unit }: the axis is braked and disabled
 motion_by-door = { $how } ({ $route })
@@ -44,11 +46,13 @@ motion_moved-already = { $drive } is moved already: { $purpose }
     .remedy = wait for it to end, or stop it
 motion_nobody-asked-motion-not = { $drive }: this motion was not requested, so it is not begun
     .remedy = begin it on the Motion page
+motion_partner = the other axis of this machine was stopped: { $note }
 motion_permission-move-ended = { $drive }: { $purpose }: the permission to move has ended: { $why }
     .remedy = begin the motion anew when it is safe
 motion_position = the position is beyond its limit
 motion_put-energy-motor-not = { $drive }: { $parameter } { $key } can energise the motor, so it is not written as a parameter
 motion_session-is-over = the session of the person who began it has ended
+motion_skew = the skew of both axes is beyond its limit
 motion_speed = the speed is beyond its limit
 motion_stop-was-pressed = STOP was pressed
 motion_time-is-over = its time has ended

@@ -3,12 +3,14 @@ motion_beyond-limit = { $quantity ->
     [position] 位置
     [speed] 速度
     [torque] 转矩
+    [skew] 歪斜
    *[following-error] 跟随误差
  } { $value } 超出限值 { $limit }：轴已制动并断使能
 motion_beyond-limit-in = { $quantity ->
     [position] 位置
     [speed] 速度
     [torque] 转矩
+    [skew] 歪斜
    *[following-error] 跟随误差
  } { $value } { $unit } 超出限值 { $limit } { $unit }：轴已制动并断使能
 motion_by-door = { $how }（{ $route }）
@@ -44,11 +46,13 @@ motion_moved-already = { $drive } 已在运动：{ $purpose }
     .remedy = 请等待其结束，或将其停止
 motion_nobody-asked-motion-not = { $drive }：无人请求此运动，因此不启动
     .remedy = 请在“运动”页面启动
+motion_partner = 同一机械的另一轴已停止：{ $note }
 motion_permission-move-ended = { $drive }：{ $purpose }：运动许可已结束：{ $why }
     .remedy = 请在安全时重新开始运动
 motion_position = 位置超出限值
 motion_put-energy-motor-not = { $drive }：{ $parameter } { $key } 可向电机输入能量，因此不作为参数写入
 motion_session-is-over = 启动者的会话已结束
+motion_skew = 两轴的歪斜超出限值
 motion_speed = 速度超出限值
 motion_stop-was-pressed = 已按下 STOP
 motion_time-is-over = 其时间已到

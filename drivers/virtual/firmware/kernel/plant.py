@@ -25,20 +25,20 @@ def _behind(x, size):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True)
-def _pull(p, x, size):  # type: ignore[no-untyped-def]
+def pull(p, x, size):  # type: ignore[no-untyped-def]
     """What the load takes of the last inertia: its weight, by its place, and as a fan does."""
-    pull = p[k.P_GRAVITY]
+    torque = p[k.P_GRAVITY]
     if p[k.P_PLACE_NM] != 0.0:
         angle = _behind(x, size) - p[k.P_PLACE_AT]
-        pull += p[k.P_PLACE_NM] * math.sin(p[k.P_PLACE_PER_RAD] * angle)
+        torque += p[k.P_PLACE_NM] * math.sin(p[k.P_PLACE_PER_RAD] * angle)
     if p[k.P_FAN] != 0.0:
         speed = x[size - 1] if size > 3 else x[1]
-        pull += p[k.P_FAN] * speed * abs(speed)
-    return pull
+        torque += p[k.P_FAN] * speed * abs(speed)
+    return torque
 
 
 @njit(nogil=True)
-def _beyond(p, x, size):  # type: ignore[no-untyped-def]
+def beyond(p, x, size):  # type: ignore[no-untyped-def]
     """How far the last inertia is beyond an end stop, signed."""
     behind = _behind(x, size)
     if behind > p[k.P_STOP_MAX]:
@@ -92,6 +92,42 @@ def _grip(p, s, angle, speed):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True)
+def _gripped(p):  # type: ignore[no-untyped-def]
+    """Whether a holding brake would be closed."""
+    return int(p[k.P_LOOP]) == k.LOOP_OFF or p[k.P_BRAKE_CLOSED] > 0.0
+
+
+@njit(nogil=True)
+def _elastic(p):  # type: ignore[no-untyped-def]
+    """Whether there is a brake whose hub twists."""
+    return p[k.P_BRAKE_STIFFNESS] > 0.0 and p[k.P_BRAKE_TORQUE] > 0.0
+
+
+@njit(nogil=True)
+def opposing(p, s, x):  # type: ignore[no-untyped-def]
+    """What the motor has to make besides its load: ripple, wrong phases, an elastic brake."""
+    torque = _ripple(p, x[0])
+    if p[k.P_PHASES_WRONG] > 0.0:
+        torque += (1.0 - _torque_share(p, x[0])) * x[2]
+    if _gripped(p) and _elastic(p):
+        torque += _grip(p, s, x[0], x[1])
+    else:
+        s[k.S_BRAKE_ANCHOR] = x[0]
+    return torque
+
+
+@njit(nogil=True)
+def dry_friction(p, x):  # type: ignore[no-untyped-def]
+    """The most that dry friction takes at the motor, a rigid brake included."""
+    coulomb = p[k.P_COULOMB]
+    if p[k.P_STICTION] > 0.0:
+        coulomb += _stribeck(p, x[1])
+    if _gripped(p) and not _elastic(p):
+        coulomb += p[k.P_BRAKE_TORQUE]
+    return coulomb
+
+
+@njit(nogil=True)
 def _load_friction(p, x, scratch, b, last):  # type: ignore[no-untyped-def]
     """Dry friction of the last inertia, by the same rule as the motor's."""
     most = p[k.P_LOAD_COULOMB]
@@ -112,29 +148,17 @@ def step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-
         if abs(x[gap_state[g]]) >= half_gap[g]:
             contact |= 1 << g
     am, bm = a[contact], b[contact]
-    pull = _pull(p, x, size)
-    ripple = _ripple(p, x[0])
-    if p[k.P_PHASES_WRONG] > 0.0:
-        ripple += (1.0 - _torque_share(p, x[0])) * x[2]
-    gripped = int(p[k.P_LOOP]) == k.LOOP_OFF or p[k.P_BRAKE_CLOSED] > 0.0
-    elastic = p[k.P_BRAKE_STIFFNESS] > 0.0 and p[k.P_BRAKE_TORQUE] > 0.0
-    if gripped and elastic:
-        ripple += _grip(p, s, x[0], x[1])
-    else:
-        s[k.S_BRAKE_ANCHOR] = x[0]
+    load = pull(p, x, size)
+    motor = opposing(p, s, x)
     for i in range(size):
-        total = bm[i, 0] * s[k.S_TORQUE_COMMAND] - bm[i, 1] * ripple - bm[i, 2] * pull
+        total = bm[i, 0] * s[k.S_TORQUE_COMMAND] - bm[i, 1] * motor - bm[i, 2] * load
         for j in range(size):
             total += am[i, j] * x[j]
         for g in range(gap_state.shape[0]):
             if contact >> g & 1:
                 total += bm[i, 3 + g] * (1.0 if x[gap_state[g]] > 0.0 else -1.0)
         scratch[i] = total
-    coulomb = p[k.P_COULOMB]
-    if p[k.P_STICTION] > 0.0:
-        coulomb += _stribeck(p, x[1])
-    if gripped and not elastic:
-        coulomb += p[k.P_BRAKE_TORQUE]
+    coulomb = dry_friction(p, x)
     friction = 0.0
     if coulomb > 0.0:
         needed = -scratch[1] / bm[1, 1]
@@ -148,18 +172,18 @@ def step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-
     last = size - 1 if size > 3 else 1
     if p[k.P_LOAD_COULOMB] > 0.0 and size > 3:
         _load_friction(p, x, scratch, bm, last)
-    beyond = _beyond(p, scratch, size)
-    if beyond * scratch[last] > 0.0:
+    over = beyond(p, scratch, size)
+    if over * scratch[last] > 0.0:
         push = -scratch[last] / bm[last, 2]
         for i in range(size):
             scratch[i] += bm[i, 2] * push
         scratch[last] = 0.0
         # What the push over the step did not take back is removed as an inelastic impact.
-        beyond = _beyond(p, scratch, size)
+        over = beyond(p, scratch, size)
         if size > 3:
-            scratch[size - 2] += beyond
+            scratch[size - 2] += over
         else:
-            scratch[0] -= beyond
+            scratch[0] -= over
     for i in range(size):
         x[i] = scratch[i]
     s[k.S_TORQUE] = x[2]

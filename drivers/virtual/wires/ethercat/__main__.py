@@ -16,6 +16,7 @@ from drivers.virtual.firmware.factory import number_device
 from drivers.virtual.wires.ethercat.bench import (
     axes_by_name,
     axes_of_bench,
+    couple,
     load_factory,
     load_slave,
 )
@@ -81,6 +82,8 @@ def build(arguments: argparse.Namespace) -> Segment:
         factory(axis.drive, axis.mechanics, arguments.nvm, station)
         for station, axis in enumerate(axes, 1)
     ]
+    if arguments.bench:
+        couple(arguments.bench, axes, devices)
     for axis, device in zip(axes, devices, strict=True):
         number_device(device, axis.serial_number)
         _warm_up(device)

@@ -9,6 +9,8 @@ from pathlib import Path
 from drivers.errors import NotAllowed
 from drivers.virtual.bench import AxisSpec, load_bench
 from drivers.virtual.device import Device
+from drivers.virtual.firmware.gantry import VirtualGantry
+from drivers.virtual.firmware.servo import VirtualServo
 from drivers.virtual.mechanics.spec import MechanicsSpec
 from drivers.virtual.wires.ethercat.slave import Slave
 
@@ -43,6 +45,23 @@ def axes_of_bench(path: Path, url: str | None) -> list[AxisSpec]:
             stations=", ".join(map(str, stations)),
         )
     return [axis for axis, _ in found]
+
+
+def couple(path: Path, axes: Sequence[AxisSpec], devices: Sequence[Device]) -> None:
+    """Put the drives that the bench file has on a common beam on it; none has run yet.
+
+    Raises:
+        NotAllowed: a wrong file. ValueError: devices of another factory, which have no shaft to
+            put a beam on.
+    """
+    by_name = {axis.name: device for axis, device in zip(axes, devices, strict=True)}
+    for gantry in load_bench(path).gantry:
+        first, second = (by_name.get(name) for name in gantry.axes)
+        if first is None or second is None:
+            continue  # a beam of another segment
+        if not isinstance(first, VirtualServo) or not isinstance(second, VirtualServo):
+            raise ValueError("a gantry needs virtual servo drives")  # noqa: TRY004 - of a file
+        VirtualGantry(gantry, first, second)
 
 
 def axes_by_name(drives: Sequence[str], first: int) -> list[AxisSpec]:

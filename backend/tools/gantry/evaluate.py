@@ -1,0 +1,382 @@
+"""From recordings of both axes to the figures. Pure: also works on kept raw data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import scipy
+
+from backend.analysis.coupled.modes import CoupledModes, find_modes
+from backend.analysis.coupled.response import Controllers, CoupledResponse, PairRecord, estimate
+from backend.analysis.coupled.stability import (
+    Design,
+    JointMargins,
+    coupling,
+    design,
+    interaction,
+    joint_margins,
+)
+from backend.analysis.signals.arrays import magnitude_db, phase_deg
+from backend.analysis.signals.excitation import Excitation
+from backend.tools.gantry.result import (
+    GantryEntry,
+    GantryFinding,
+    GantryMargins,
+    GantryMode,
+    GantryResult,
+    GantryValue,
+)
+from backend.tools.gantry.settings import GantrySettings
+from backend.tools.thresholds import gantry_evaluate as threshold
+from backend.tools.tool import Arrays, Meta
+from drivers.errors import NotAllowed
+
+FloatArray = npt.NDArray[np.float64]
+_TURN = 2 * np.pi
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Where the periods of every experiment lie; the excited bins are apart."""
+
+    sample_rate_hz: float
+    period_samples: int
+    periods: int
+    transient_periods: int
+    first_sample: int
+
+
+@dataclass(frozen=True)
+class Experiments:
+    """Raw data of e experiments, pairs of common phases one behind the other.
+
+    ``sent``, ``torque``, ``speed`` [e, 2, n] in rad/s and Nm, turning alike counted alike;
+    ``valid`` [e, n]; ``direction`` [e] of the steady motion; ``skew_rad`` [e, n]. ``controllers``
+    [lines, 2] from the error of the reported speed to torque, ``at_image`` the same at fs - f;
+    both are empty where they are not known. ``filters`` [lines, 2] is what the reported speeds have
+    passed, 1 where that is not known. ``interpolates``: setpoints are reached in straight lines.
+    """
+
+    shape: Shape
+    lines: npt.NDArray[np.int64]
+    sent: FloatArray
+    torque: FloatArray
+    speed: FloatArray
+    valid: npt.NDArray[np.bool_]
+    direction: FloatArray
+    skew_rad: FloatArray
+    controllers: npt.NDArray[np.complex128]
+    at_image: npt.NDArray[np.complex128]
+    filters: npt.NDArray[np.complex128]
+    interpolates: bool
+    rated_torque_nm: tuple[float, float]
+    torque_known: bool
+    partner: str
+
+    def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
+        """For storage."""
+        return {
+            "lines": self.lines, "sent": self.sent, "torque": self.torque, "speed": self.speed,
+            "valid": self.valid, "direction": self.direction, "skew_rad": self.skew_rad,
+            "controllers": self.controllers, "at_image": self.at_image,
+            "filters": self.filters,
+        }  # fmt: skip
+
+    def records(self) -> tuple[PairRecord, ...]:
+        """As the estimate takes them."""
+        s = self.shape
+        found = []
+        for number in range(self.direction.size):
+            e = Excitation(
+                "multisine", self.sent[number, 0], s.sample_rate_hz, s.first_sample,
+                s.period_samples, s.periods, s.transient_periods, self.lines,
+            )  # fmt: skip
+            found.append(
+                PairRecord(
+                    e, self.sent[number], self.torque[number], self.speed[number],
+                    self.valid[number],
+                )
+            )  # fmt: skip
+        return tuple(found)
+
+
+@dataclass(frozen=True)
+class _Steady:
+    """Torque that each axis needs on the mean of both directions, and its friction; ``fight`` is
+    half the difference. Percent of rated, each with half of its interval.
+    """
+
+    holding: tuple[GantryValue, GantryValue]
+    friction: tuple[GantryValue, GantryValue]
+    fight: GantryValue
+
+
+def evaluate(data: Experiments, settings: GantrySettings) -> GantryResult:
+    """The figures of what was recorded.
+
+    Raises:
+        NotAllowed: too many samples were lost.
+    """
+    records = data.records()
+    try:
+        response = _response(data, records)
+        modes = find_modes(response)
+    except ValueError as error:
+        raise NotAllowed("gantry.few-samples") from error
+    steady = _steady(data, records, _stiffness(modes))
+    margins, best = None, None
+    if data.controllers.size > 0:
+        # The loops see the filters, wherever they stand in the loop.
+        loops = data.controllers * data.filters
+        goals = {"ms": threshold.MS, "phase_margin_deg": threshold.PHASE_MARGIN_DEG}
+        margins, best = joint_margins(response, loops), design(response, loops, **goals)
+    ratio, deviation = coupling(response)
+    square = _square_rev(data, steady, modes)
+    lead = settings.lead_mm
+    in_mm = None if lead is None or square is None else _scaled(square, lead)
+    return GantryResult(
+        partner=data.partner,
+        frequency_hz=_tuple(response.frequency_hz),
+        entries=_entries(response),
+        coupling=_tuple(ratio),
+        coupling_half=_tuple(response.spread * deviation),
+        relative_gain=_tuple(interaction(response.response)),
+        modes=tuple(
+            GantryMode(
+                kind=m.kind, frequency_hz=m.frequency_hz, frequency_ci95_hz=m.frequency_ci95_hz,
+                damping=m.damping, damping_ci95=m.damping_ci95, skew_share=m.skew_share,
+            )
+            for m in modes.modes
+        ),
+        inertia_kgm2=GantryValue(value=modes.inertia_kgm2, ci95=modes.inertia_ci95_kgm2)
+        if modes.inertia_kgm2 > 0 and data.torque_known else None,
+        skew_stiffness_nm_per_rad=_stiffness(modes) if data.torque_known else None,
+        holding_percent=steady.holding,
+        friction_percent=steady.friction,
+        fight_percent=steady.fight,
+        out_of_square_rev=square,
+        out_of_square_mm=in_mm,
+        largest_skew_rev=float(np.max(np.abs(data.skew_rad))) / _TURN,
+        margins=None if margins is None else _margins(margins),
+        gain_factor=None if best is None else best.factor,
+        findings=tuple(_findings(data, steady, square, in_mm, modes, response, margins, best)),
+        periods_used=response.periods_used,
+        periods_dropped=response.periods_dropped,
+        motion_s=data.sent.shape[0] * data.sent.shape[2] / data.shape.sample_rate_hz,
+    )  # fmt: skip
+
+
+def reevaluate(arrays: Arrays, meta: Meta) -> GantryResult:
+    """The same again, from kept raw data.
+
+    Raises:
+        ValueError: not the raw data of a gantry.
+    """
+    given, shape = meta.get("settings"), meta.get("shape")
+    rated = meta.get("rated_torque_nm")
+    if not isinstance(shape, dict) or not isinstance(rated, list) or "controllers" not in arrays:
+        raise ValueError("not the raw data of a gantry")
+    data = Experiments(
+        Shape(**shape), np.asarray(arrays["lines"], np.int64),
+        np.asarray(arrays["sent"], np.float64), np.asarray(arrays["torque"], np.float64),
+        np.asarray(arrays["speed"], np.float64), np.asarray(arrays["valid"], np.bool_),
+        np.asarray(arrays["direction"], np.float64),
+        np.asarray(arrays["skew_rad"], np.float64),
+        np.asarray(arrays["controllers"], np.complex128),
+        np.asarray(arrays["at_image"], np.complex128),
+        np.asarray(arrays["filters"], np.complex128), bool(meta["interpolates"]),
+        (float(rated[0]), float(rated[1])), bool(meta["torque_known"]), str(meta["partner"]),
+    )  # fmt: skip
+    return evaluate(data, GantrySettings.model_validate(given))
+
+
+def _response(data: Experiments, records: tuple[PairRecord, ...]) -> CoupledResponse:
+    """From torque to the speed of the motor, without images and filters of speed."""
+    found = estimate(records)
+    rate, f = data.shape.sample_rate_hz, found.frequency_hz
+    # Of a straight line between setpoints; one that is held for a cycle is late by half of it.
+    share = (f / (rate - f)) ** 2 if data.interpolates else -f / (rate - f)
+    known = data.controllers.size > 0
+    controllers = Controllers(data.controllers, data.at_image) if known else None
+    return found.without_images(share, controllers).without_filter(data.filters)
+
+
+def _steady(
+    data: Experiments, records: tuple[PairRecord, ...], stiffness: GantryValue | None
+) -> _Steady:
+    """Friction changes its sign with the direction, the torque that holds the beam does not.
+
+    The axes are let go between experiments, where the beam may come to rest somewhere else: with
+    the stiffness between them, every torque is taken to the skew that they stood at.
+    """
+    n = data.shape.period_samples
+    rated = np.array(data.rated_torque_nm)
+    per_rad = np.zeros(2)
+    off_rad = 0.0
+    if stiffness is not None:
+        low, high = _ends(stiffness)
+        per_rad = 100.0 * stiffness.value * np.array([1.0, -1.0]) / rated
+        off_rad = 0.5 * (high - low) / stiffness.value
+    rows: dict[float, list[FloatArray]] = {1.0: [], -1.0: []}
+    skews: list[float] = []
+    for number, (record, direction) in enumerate(zip(records, data.direction, strict=True)):
+        for period in record.good_periods():
+            cut = slice(record.excitation.first_sample + period * n, None)
+            torque = record.torque[:, cut][:, :n].mean(axis=1)
+            skews.append(float(data.skew_rad[number, cut][:n].mean()))
+            rows[float(np.sign(direction))].append(100.0 * torque / rated - per_rad * skews[-1])
+    if min(len(each) for each in rows.values()) < 2:
+        raise NotAllowed("gantry.few-samples")
+    forwards, backwards = np.array(rows[1.0]), np.array(rows[-1.0])
+    freedom = len(forwards) + len(backwards) - 2
+    spread = float(scipy.special.stdtrit(freedom, 0.975))
+    moved = off_rad * abs(float(np.mean(skews)))
+
+    def value(weights: FloatArray, sign: float) -> GantryValue:
+        a, b = forwards @ weights, backwards @ weights
+        mean = 0.5 * (float(a.mean()) + sign * float(b.mean()))
+        variance = 0.25 * (float(a.var(ddof=1)) / a.size + float(b.var(ddof=1)) / b.size)
+        by_stiffness = moved * abs(float(per_rad @ weights)) if sign > 0 else 0.0
+        half = np.hypot(
+            np.hypot(spread * np.sqrt(variance), threshold.TORQUE_PERCENT), by_stiffness
+        )
+        return GantryValue(value=mean, ci95=(mean - float(half), mean + float(half)))
+
+    first, second = np.array([1.0, 0.0]), np.array([0.0, 1.0])
+    return _Steady(
+        (value(first, 1.0), value(second, 1.0)),
+        (value(first, -1.0), value(second, -1.0)),
+        value(np.array([0.5, -0.5]), 1.0),
+    )
+
+
+def _square_rev(data: Experiments, steady: _Steady, modes: CoupledModes) -> GantryValue | None:
+    """Fighting torque over the stiffness between the axes; None where there is none."""
+    stiffness = _stiffness(modes)
+    if stiffness is None or not data.torque_known:
+        return None
+    # The same share of both rated torques is half the difference of two torques in Nm.
+    rated = 0.5 * sum(data.rated_torque_nm)
+    value = steady.fight.value / 100.0 * rated / stiffness.value / _TURN
+    low, high = _ends(steady.fight)
+    of_torque = 0.5 * (high - low) / 100.0 * rated / stiffness.value / _TURN
+    low, high = _ends(stiffness)
+    of_stiffness = 0.5 * (high - low) / stiffness.value * abs(value)
+    half = float(np.hypot(of_torque, of_stiffness))
+    return GantryValue(value=value, ci95=(value - half, value + half))
+
+
+def _findings(
+    data: Experiments, steady: _Steady, square: GantryValue | None, in_mm: GantryValue | None,
+    modes: CoupledModes, response: CoupledResponse, margins: JointMargins | None,
+    best: Design | None,
+) -> list[GantryFinding]:  # fmt: skip
+    found = [_square_finding(steady, square, in_mm)]
+    if square is None and found[0].code == "out_of_square":
+        code = "no_skew_stiffness" if data.torque_known else "rated_torque_unknown"
+        found.append(GantryFinding(code=code))
+    skew = next((m for m in modes.modes if m.kind == "skew"), None)
+    if skew is not None:
+        values = {"frequency": f"{skew.frequency_hz:.3g}", "damping": f"{100 * skew.damping:.2g}"}
+        found.append(GantryFinding(code="skew_mode", values=values))
+    found += _loop_findings(response, margins, best)
+    if float(np.median(response.distortion)) > threshold.DISTORTED:
+        found.append(GantryFinding(code="distortion"))
+    return found
+
+
+def _square_finding(
+    steady: _Steady, square: GantryValue | None, in_mm: GantryValue | None
+) -> GantryFinding:
+    low, high = _ends(steady.fight)
+    least = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
+    values = {"fight": f"{abs(steady.fight.value):.3g}", "limit": f"{threshold.FIGHT_PERCENT:g}"}
+    if square is None:
+        values["way"] = ""
+    elif in_mm is None:
+        values["way"] = f"{abs(square.value):.3g} rev"
+    else:
+        values["way"] = f"{abs(square.value):.3g} rev ({abs(in_mm.value):.3g} mm)"
+    values["ahead"], values["behind"] = ("1", "2") if steady.fight.value > 0 else ("2", "1")
+    if least > threshold.FIGHT_PERCENT:
+        return GantryFinding(code="out_of_square", values=values)
+    if max(abs(low), abs(high)) <= threshold.FIGHT_PERCENT:
+        return GantryFinding(code="square", values=values)
+    return GantryFinding(code="square_uncertain", values=values)
+
+
+def _loop_findings(
+    response: CoupledResponse, margins: JointMargins | None, best: Design | None
+) -> list[GantryFinding]:
+    if margins is None:
+        return [GantryFinding(code="controllers_unknown")]
+    top = f"{response.frequency_hz[-1]:.3g}"
+    if margins.stable is None:
+        return [GantryFinding(code="margins_beyond_band", values={"top": top})]
+    values = {
+        "ms": f"{margins.ms:.3g}", "ms_high": f"{margins.ms_ci95[1]:.3g}",
+        "hz": f"{margins.ms_hz:.3g}", "goal": f"{threshold.MS:g}",
+        "alone": f"{max(margins.ms_alone):.3g}", "top": top,
+    }  # fmt: skip
+    if not margins.stable:
+        found = [GantryFinding(code="pair_unstable", values=values)]
+    elif margins.ms_ci95[1] <= threshold.MS:
+        found = [GantryFinding(code="pair_sound", values=values)]
+    else:
+        found = [GantryFinding(code="pair_margin_low", values=values)]
+    if best is None:
+        found.append(GantryFinding(code="no_factor"))
+    else:
+        factor = {"factor": f"{best.factor:.2g}", "ms": f"{best.margins.ms_ci95[1]:.3g}"}
+        found.append(GantryFinding(code="factor", values=factor))
+    return found
+
+
+def _entries(response: CoupledResponse) -> tuple[GantryEntry, ...]:
+    g, std = response.response, response.std
+    made = []
+    for i in (0, 1):
+        for j in (0, 1):
+            half = response.spread * std[:, i, j] / np.maximum(np.abs(g[:, i, j]), 1e-300)
+            made.append(
+                GantryEntry(
+                    speed=1 if i == 0 else 2, torque=1 if j == 0 else 2,
+                    magnitude_db=_tuple(magnitude_db(g[:, i, j])),
+                    half_db=_tuple(20.0 / np.log(10.0) * half),
+                    phase_deg=_tuple(phase_deg(g[:, i, j])),
+                    coherence=_tuple(response.coherence[:, i, j]),
+                )
+            )  # fmt: skip
+    return tuple(made)
+
+
+def _margins(found: JointMargins) -> GantryMargins:
+    return GantryMargins(
+        stable=found.stable, ms=found.ms, ms_ci95=found.ms_ci95, ms_hz=found.ms_hz,
+        ms_alone=found.ms_alone, phase_margin_deg=found.phase_margin_deg,
+        crossover_hz=found.crossover_hz,
+    )  # fmt: skip
+
+
+def _stiffness(modes: CoupledModes) -> GantryValue | None:
+    if modes.skew_stiffness_nm_per_rad is None or modes.skew_stiffness_ci95 is None:
+        return None
+    return GantryValue(value=modes.skew_stiffness_nm_per_rad, ci95=modes.skew_stiffness_ci95)
+
+
+def _scaled(found: GantryValue, factor: float) -> GantryValue:
+    low, high = _ends(found)
+    return GantryValue(value=factor * found.value, ci95=(factor * low, factor * high))
+
+
+def _ends(found: GantryValue) -> tuple[float, float]:
+    low, high = found.ci95
+    assert low is not None, "made here with both ends"
+    assert high is not None, "made here with both ends"
+    return low, high
+
+
+def _tuple(values: npt.NDArray[np.floating]) -> tuple[float, ...]:
+    return tuple(float(each) for each in values)

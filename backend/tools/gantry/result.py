@@ -1,0 +1,103 @@
+"""What is known of a gantry."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from backend.tools.tool import Interval, ToolResult
+
+Code = Literal[
+    "square", "out_of_square", "square_uncertain", "no_skew_stiffness", "skew_mode",
+    "pair_sound", "pair_margin_low", "pair_unstable", "margins_beyond_band",
+    "controllers_unknown", "factor", "no_factor", "distortion", "rated_torque_unknown",
+]  # fmt: skip
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class GantryValue(_Part):
+    """A figure with its 95 % interval."""
+
+    value: float
+    ci95: Interval
+
+
+class GantryFinding(_Part):
+    """A verdict; ``values`` are figures with their units for the places in its text."""
+
+    code: Code
+    values: dict[str, str] = {}
+
+
+class GantryMode(_Part):
+    """A resonance of both axes; ``skew_share`` is how much of it is differential, 0 to 1."""
+
+    kind: Literal["common", "skew"]
+    frequency_hz: float
+    frequency_ci95_hz: Interval
+    damping: float
+    damping_ci95: Interval
+    skew_share: float
+
+
+class GantryEntry(_Part):
+    """Response from the torque of axis ``torque`` to the speed of axis ``speed``, line by line."""
+
+    speed: Literal[1, 2]
+    torque: Literal[1, 2]
+    magnitude_db: tuple[float, ...]
+    half_db: tuple[float, ...]
+    phase_deg: tuple[float, ...]
+    coherence: tuple[float, ...]
+
+
+class GantryMargins(_Part):
+    """Of both speed loops together, on the measured lines; ``stable`` None where they do not show
+    it. ``ms_alone`` is the peak of each axis by itself.
+    """
+
+    stable: bool | None
+    ms: float
+    ms_ci95: Interval
+    ms_hz: float
+    ms_alone: tuple[float, float]
+    phase_margin_deg: float | None
+    crossover_hz: float | None
+
+
+class GantryResult(ToolResult):
+    """Axis 1 is the one that the measurement was started on, axis 2 is ``partner``.
+
+    ``holding_percent`` is the torque that each axis needs on the mean of both directions, without
+    friction, and ``fight_percent`` half their difference: what both sides press against each other
+    with. ``out_of_square_rev`` is by how much axis 1 is ahead of where the beam would rest.
+    ``coupling`` is √|G12·G21/(G11·G22)|, 0 without coupling, 1 for one rigid body;
+    ``relative_gain`` that of axis 1, 1 without coupling.
+    """
+
+    tool: Literal["gantry"] = "gantry"
+    partner: str
+    frequency_hz: tuple[float, ...]
+    entries: tuple[GantryEntry, ...]
+    coupling: tuple[float, ...]
+    coupling_half: tuple[float, ...]
+    relative_gain: tuple[float, ...]
+    modes: tuple[GantryMode, ...]
+    inertia_kgm2: GantryValue | None
+    skew_stiffness_nm_per_rad: GantryValue | None
+    holding_percent: tuple[GantryValue, GantryValue]
+    friction_percent: tuple[GantryValue, GantryValue]
+    fight_percent: GantryValue
+    out_of_square_rev: GantryValue | None
+    out_of_square_mm: GantryValue | None
+    largest_skew_rev: float
+    margins: GantryMargins | None
+    gain_factor: float | None
+    findings: tuple[GantryFinding, ...]
+    periods_used: int
+    periods_dropped: int
+    motion_s: float
