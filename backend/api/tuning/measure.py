@@ -12,11 +12,12 @@ from fastapi import APIRouter
 from pydantic import BaseModel
 
 from backend.api import convert
-from backend.api.context import Connection, Controlled, TheBench, TheDrive
+from backend.api.context import Connection, Controlled, Me, TheBench, TheDrive, ThePeople
 from backend.api.health.kept import keep_health
 from backend.api.models import JobInfo
 from backend.api.report import routes as routes_report
 from backend.api.scope.recordings import TheRecordings
+from backend.api.security.gate import require_right
 from backend.api.tuning import design as routes_design
 from backend.api.tuning import measurements as routes_measurements
 from backend.api.tuning import response_import as routes_response_import
@@ -232,11 +233,13 @@ def _add(tool: AnyTool) -> None:
         return await start_tool(bench, connected, tool, request)
 
     async def start_pair(
-        bench: TheBench, connected: Controlled, request: ToolSettings,
+        bench: TheBench, connected: Controlled, request: ToolSettings, people: ThePeople, me: Me,
         connection: Connection = None,
     ) -> JobInfo:  # fmt: skip
         name = str(request.model_dump()["partner"])
         partner = partner_of(bench, connected, name, connection)
+        # The gate knows of the drive in the path alone; a guest may have rights on that one only.
+        require_right(people, me, tool.right, partner.drive.id)
         return await start_tool(bench, connected, tool, request, partner)
 
     # The body is the tool's own settings, which the interface's description shows.
