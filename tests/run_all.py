@@ -38,7 +38,7 @@ REAL_TIME = [
     "tests/api/test_scope_streams.py", "tests/api/test_scope_soak.py",
     "tests/api/test_stop_floods.py", "tests/api/test_scales_taught.py", "tests/docs",
 ]  # fmt: skip
-#: Suites that compute and keep no time: what the pages leave of the machine is enough for them.
+#: Suites that compute and keep no time.
 PATIENT = [
     "tests/profiles", "tests/unit", "tests/virtual/conformance", "tests/virtual/firmware",
     # Measurements and tunings whose buses follow the frames, however late they come.
@@ -108,8 +108,7 @@ TIMED = [
 BUSES = [pytest("EtherCAT tests", *REAL_TIME)]
 PAGES = [pytest("browser tests", "-m", "browser", "tests/browser")]
 PARALLEL = [
-    # Workers write to a pipe: tests of full disks bound the length of files. Next to the pages a
-    # test takes much longer than alone, which is no hanging.
+    # Workers write to a pipe: tests of full disks bound the length of files.
     pytest("patient tests", *TWO, "--timeout=900", *PATIENT),
 ]
 #: Whether the documentation says no more than what has just run.
@@ -119,13 +118,11 @@ MATRIX = [Check("matrix", [sys.executable, "tests/matrix.py", REPORTS])]
 class Runner:
     """Runs checks one by one, and remembers which failed."""
 
-    def __init__(self, out: IO[str], behind: int = 0) -> None:
-        """``behind`` is the nice value of what runs, as a whole, next to other checks."""
+    def __init__(self, out: IO[str]) -> None:
         self.failed: list[str] = []
         self.again: list[Check] = []
         """What failed in suites, to be run once more when nothing else runs."""
         self._out = out
-        self._behind = behind
         self._environment = os.environ | {
             "PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}",
             "PYTHONUNBUFFERED": "1",
@@ -158,7 +155,6 @@ class Runner:
             command, cwd=folder, env=self._environment | {MARK: mark}, stdout=self._out,
             stderr=subprocess.STDOUT, start_new_session=True,
         ) as process, _ended_with_this(process.pid, mark):  # fmt: skip
-            _yield_to_others(process.pid, self._behind)
             try:
                 return process.wait(LIMIT_S)
             except subprocess.TimeoutExpired:
@@ -182,14 +178,6 @@ def _ended_with_this(group: int, mark: str) -> Iterator[None]:
     finally:
         del _running[mark]
         _end(group, mark)
-
-
-def _yield_to_others(session: int, nice: int) -> None:
-    """Lower the share of a whole session, as priorities count within one only (sched(7))."""
-    if nice:
-        # Not every kernel groups by session.
-        with suppress(OSError):
-            Path(f"/proc/{session}/autogroup").write_text(str(nice), "ascii")
 
 
 def _end(group: int, mark: str) -> None:
@@ -251,26 +239,19 @@ def run_quick(runner: Runner) -> None:
 
 
 def run_suites(runner: Runner) -> list[str]:
-    """Run what keeps time alone, then the pages next to what computes; returns who failed twice."""
-    runner.run([*TIMED, *BUSES])
-    with (
-        tempfile.TemporaryFile("w+", encoding="utf-8") as printed,
-        ThreadPoolExecutor() as pool,
-    ):
-        parallel = Runner(printed, behind=10)
-        lane = pool.submit(parallel.run, PARALLEL)
-        runner.run(PAGES)
-        lane.result()
-        printed.seek(0)
-        shutil.copyfileobj(printed, sys.stdout)
-    again = [*runner.again, *parallel.again]
+    """Run one suite after the other; returns who failed twice.
+
+    Two at a time take as long on two processors, and disturb one another.
+    """
+    runner.run([*TIMED, *BUSES, *PAGES, *PARALLEL])
+    again = runner.again
     if again:
         alone = Runner(sys.stdout)
         print("== once more, alone", flush=True)
         alone.run(again, last=True)
         runner.failed += alone.failed
     runner.run(MATRIX)
-    return runner.failed + parallel.failed
+    return runner.failed
 
 
 if __name__ == "__main__":
