@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+import scipy
 
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 from backend.analysis.thresholds import dwell as threshold
@@ -46,7 +46,7 @@ class Followed:
         lag = min(max(lag, 0.0), threshold.ALIKE)
         scatter = float(np.std(away, ddof=1)) / np.sqrt(column.size)
         wider = np.sqrt((1.0 + lag) / (1.0 - lag))
-        return float(student.ppf(0.975, column.size - 1) * scatter * wider)
+        return float(scipy.special.stdtrit(column.size - 1, 0.975) * scatter * wider)
 
     def noise(self, harmonic: int = 0) -> float:
         """Standard deviation of the mean, both parts together."""

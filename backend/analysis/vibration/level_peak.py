@@ -9,9 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.stats import f as fisher
-from scipy.stats import t as student
+import scipy
 
 from backend.analysis.signals.arrays import FloatArray, IntArray
 from backend.analysis.thresholds import level_peak as threshold
@@ -137,14 +135,14 @@ def _described(points: _Points, about: float) -> LevelPeak | None:
     frequency, damping = (float(v) for v in np.exp(best.parameters[:2]))
     height = _height(frequency, damping, near)
     if (
-        evidence < fisher.ppf(1.0 - threshold.CHANCE, best.parameters.size, free)
+        evidence < scipy.special.fdtri(best.parameters.size, free, 1.0 - threshold.CHANCE)
         or not near.f.min() < frequency < near.f.max()
         or not damping < threshold.BROAD
         or height < threshold.HEIGHT
         or not _peaked(near, frequency, damping)
     ):
         return None
-    half = threshold.WIDER * float(student.ppf(0.975, free)) * best.deviation(free)
+    half = threshold.WIDER * float(scipy.special.stdtrit(free, 0.975)) * best.deviation(free)
     ends = (frequency * np.exp(-half), frequency * np.exp(half))
     orders = tuple(int(k) for k in np.unique(near.order))
     return LevelPeak(
@@ -201,7 +199,9 @@ def _solved(near: _Points, across: _Across, about: float, zero: float) -> _Solve
     shift = np.array([np.log(about), 0.0, np.log(about), 0.0])
     low = np.array([-reach, least, -threshold.ZERO_REACH, least])
     high = np.array([reach, most, threshold.ZERO_REACH, most])
-    found = least_squares(left, start, bounds=(shift + low, shift + high), x_scale=0.1)
+    found = scipy.optimize.least_squares(
+        left, start, bounds=(shift + low, shift + high), x_scale=0.1
+    )
     return _Solved(np.asarray(found.x), 2.0 * float(found.cost), np.asarray(found.jac))
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.stats import t as student
+import scipy
 
 from backend.analysis.signals.arrays import BoolArray, FloatArray, IntArray
 from backend.analysis.thresholds import orders as threshold
@@ -170,7 +170,7 @@ def _component(kind: Kind, group: Sequence[Seen]) -> Component:
     # J. Hartung and G. Knapp, 2001: the scatter itself, with Student's t.
     spread = float(np.sum(weight * (value - mean) ** 2)) / (value.size - 1)
     error = np.sqrt(max(spread, 1.0) / float(np.sum(weight)))
-    half = float(student.ppf(0.975, value.size - 1) * error)
+    half = float(scipy.special.stdtrit(value.size - 1, 0.975) * error)
     rps = [one.speed_rps for one in group]
     return Component(
         kind, mean, (mean - half, mean + half), len({one.speed for one in group}),

@@ -9,8 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
-from scipy.optimize import minimize_scalar
+import scipy
 
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 from backend.analysis.thresholds import sinusoids as threshold
@@ -165,7 +164,8 @@ def _sum(
 def _noise(power: FloatArray) -> FloatArray:
     """Mean power [lines] of the noise, by the median of the lines around."""
     width = min(threshold.AROUND, power.size)
-    return np.asarray(np.maximum(median_filter(power, width, mode="nearest") / np.log(2.0), 1e-300))
+    middle = scipy.ndimage.median_filter(power, width, mode="nearest")
+    return np.asarray(np.maximum(middle / np.log(2.0), 1e-300))
 
 
 def _strongest(
@@ -191,5 +191,7 @@ def _refined(signal: FloatArray, clock: FloatArray, frequency_hz: float, line_hz
         return -float(abs(signal @ np.exp(-2j * np.pi * hz * clock)))
 
     ends = (max(frequency_hz - line_hz, 1e-3), frequency_hz + line_hz)
-    found = minimize_scalar(lost, bounds=ends, method="bounded", options={"xatol": 1e-4 * line_hz})
+    found = scipy.optimize.minimize_scalar(
+        lost, bounds=ends, method="bounded", options={"xatol": 1e-4 * line_hz}
+    )
     return float(found.x)

@@ -166,6 +166,8 @@ CAUSES = [
     (HaltCause.SPEED, False),
     (HaltCause.TORQUE, False),
     (HaltCause.FOLLOWING, False),
+    (HaltCause.SKEW, False),
+    (HaltCause.PARTNER, True),
     (HaltCause.EXPIRED, False),
     (HaltCause.LEFT_ENABLED, True),
     (HaltCause.COMMANDED, True),

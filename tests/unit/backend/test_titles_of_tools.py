@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from types import SimpleNamespace
 
 import httpx
 import pytest
@@ -59,9 +60,11 @@ def waiting(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
         await asyncio.Event().wait()
         yield
 
+    partner = SimpleNamespace(drive=SimpleNamespace(id="partner"), axis=None)
+    monkeypatch.setattr(bench.jobs, "_permit", lambda _drive: None)
     for place, put in {
         "exchange_for": exchange,
-        "partner_of": lambda *_args: None,
+        "partner_of": lambda *_args: partner,
         "profile_speed.require_consent": lambda *_args: None,
         "profile_speed.prepared": forever,
         "keeping_mode": forever,
