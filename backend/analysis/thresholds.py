@@ -1320,9 +1320,12 @@ class coupled_response:
     PERIODS = 2
     """[count] Whole periods that each experiment needs for a covariance. Origin:
     tests/unit/analysis/test_coupled_axes.py."""
-    IMAGE_LEFT = 0.2
-    """[ratio] Of the setpoints' images in the sampled torque so much may be left, as the drive's
-    loop is known by its parameters alone. Origin: tests/virtual/tools/test_gantry.py."""
+    SHIFTED = 0.004
+    """[ratio] No line is known better than a shift of its frequency by this makes of it, as no mode
+    is (two deviations of KNOWN_HZ). Origin: tests/virtual/tools/test_gantry.py."""
+    FLOOR = 0.005
+    """[ratio] No entry is known better than this share of it. Origin:
+    tests/virtual/tools/test_gantry.py."""
     REACH = 4
     """[count] Lines on each side over which the distortion is averaged: two realisations alone show
     it with four degrees of freedom a line. Origin: tests/unit/analysis/test_coupled_axes.py."""

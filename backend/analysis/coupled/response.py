@@ -102,17 +102,22 @@ class CoupledResponse:
         variance = np.einsum("ki,kij,kj->k", flat, self.covariance, flat.conj()).real
         return np.asarray(np.sqrt(np.maximum(variance, 0.0) / 2.0))
 
-    def without_images(self, share: FloatArray, controllers: Controllers | None) -> CoupledResponse:
+    def without_images(
+        self, share: FloatArray, beyond: FloatArray, controllers: Controllers | None
+    ) -> CoupledResponse:
         """Without what the sampled torques show of the setpoints' images.
 
         Between two cycles the setpoints go on in a straight line; their image at fs - f is
-        ``share`` [n] of what they are at f, and each loop makes torque of it that a sample cannot
-        tell from that at f. With ``controllers`` it is subtracted: of the sampled torque u',
-        (1 + q/C) u = u' - q y with q = share C*(fs - f), as the setpoint is u/C + y. What may be
-        left of it widens the covariance.
+        ``share`` [n] of what they are at f, those beyond it ``beyond`` [n] at most, and each loop
+        makes torque of them that a sample cannot tell from that at f: of the sampled torque u',
+        (1 + q/C) u = u' - q y with q = share C*(fs - f), as the setpoint is u/C + y. With
+        ``controllers`` that is subtracted. How the loops answer to the images beyond is not known:
+        what they may do, G q (1/C + G) with their q, widens the covariance.
         """
-        g, covariance, left = self.response, self.covariance, np.abs(share)
-        if controllers is not None:
+        g, covariance = self.response, self.covariance
+        if controllers is None:
+            left = np.abs(g) * (np.abs(share) + beyond)[:, None, None]
+        else:
             q = share[:, None] * controllers.at_image.conj()
             p = 1.0 / (1.0 + q / controllers.at_line)
             q = q * p
@@ -121,9 +126,21 @@ class CoupledResponse:
             before = np.eye(2) + g * q[:, None, :]
             each = np.einsum("kil,kmj->kijlm", before, right).reshape(-1, 4, 4)
             covariance = each @ covariance @ np.conj(np.swapaxes(each, 1, 2))
-            left = threshold.IMAGE_LEFT * left
-        own = 2.0 * (left[:, None] * np.abs(g.reshape(-1, 4)) / self.spread) ** 2
+            setpoint = np.eye(2) / controllers.at_line[:, :, None] + g
+            images = np.abs(beyond[:, None] * controllers.at_image)
+            left = np.sqrt(np.abs(g * images[:, None, :]) ** 2 @ np.abs(setpoint) ** 2)
+        own = 2.0 * (left.reshape(-1, 4) / self.spread) ** 2
         return replace(self, response=g, covariance=covariance + own[:, :, None] * np.eye(4))
+
+    def not_better_than_known(self) -> CoupledResponse:
+        """With a covariance that holds a small shift of all frequencies, and a share of each entry:
+        what is left of images and filters is no noise.
+        """
+        g, f = self.response, self.frequency_hz
+        shift = threshold.SHIFTED * f[:, None, None] * np.gradient(g, f, axis=0)
+        left = np.hypot(np.abs(shift), threshold.FLOOR * np.abs(g))
+        own = 2.0 * (left.reshape(-1, 4) / self.spread) ** 2
+        return replace(self, covariance=self.covariance + own[:, :, None] * np.eye(4))
 
     def without_filter(self, rows: ComplexArray) -> CoupledResponse:
         """Without filters [n, 2] that the speed of each axis has passed."""

@@ -125,6 +125,8 @@ def evaluate(data: Experiments, settings: GantrySettings) -> GantryResult:
         modes = find_modes(response)
     except ValueError as error:
         raise NotAllowed("gantry.few-samples") from error
+    # The modes have such limits of their own.
+    response = response.not_better_than_known()
     steady = _steady(data, records, _stiffness(modes))
     margins, best = None, None
     if data.controllers.size > 0:
@@ -197,10 +199,16 @@ def _response(data: Experiments, records: tuple[PairRecord, ...]) -> CoupledResp
     found = estimate(records)
     rate, f = data.shape.sample_rate_hz, found.frequency_hz
     # Of a straight line between setpoints; one that is held for a cycle is late by half of it.
-    share = (f / (rate - f)) ** 2 if data.interpolates else -f / (rate - f)
+    if data.interpolates:
+        share, x = (f / (rate - f)) ** 2, np.pi * f / rate
+        # All images of a straight line together are 1/sinc² - 1 of what is at f.
+        beyond = (x / np.sin(x)) ** 2 - 1.0 - share
+    else:
+        # Those of a held setpoint change their sign from one to the next: less than the second.
+        share, beyond = -f / (rate - f), f / (rate + f)
     known = data.controllers.size > 0
     controllers = Controllers(data.controllers, data.at_image) if known else None
-    return found.without_images(share, controllers).without_filter(data.filters)
+    return found.without_images(share, beyond, controllers).without_filter(data.filters)
 
 
 def _steady(

@@ -152,13 +152,21 @@ def test_images_of_the_setpoints_and_filters_of_the_speed_are_removed():
     filters = 1.0 / (1.0 + 1j * f / 500.0)[:, None] * np.ones(2)
     seen = replace(exact(plant), response=y @ np.linalg.inv(sampled))
     assert np.max(np.abs(seen.response / g - 1.0)) > 0.05
-    plain = seen.without_images(share, Controllers(at_line, at_image))
+    nothing = np.zeros(f.size)
+    plain = seen.without_images(share, nothing, Controllers(at_line, at_image))
     assert np.allclose(plain.response, g, rtol=1e-9)
-    # A fifth of it may be left.
-    left = plain.spread * plain.std[:, 0, 0] / np.abs(g[:, 0, 0]) / share
-    assert left == pytest.approx(np.full(f.size, 0.2), rel=0.01)
-    unknown = seen.without_images(share, None)
+    # Images that were not subtracted stay within the intervals, whatever their phase.
+    for turn in np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 7)):
+        further = sampled + 0.1 * turn * share[:, None, None] * at_image.conj()[:, :, None] * r
+        more = replace(exact(plant), response=y @ np.linalg.inv(further))
+        held = more.without_images(share, 0.1 * share, Controllers(at_line, at_image))
+        off = np.abs((held.response - g).real)
+        assert np.all(off <= 1.05 * np.sqrt(2.0) * held.spread * held.std)
+        assert np.max(off / (held.spread * held.std)) > 0.3
+    unknown = seen.without_images(share, nothing, None)
     assert np.allclose(unknown.response, seen.response)
+    half = unknown.spread * unknown.std[:, 0, 0] / np.abs(seen.response[:, 0, 0])
+    assert half == pytest.approx(share)
     late = replace(exact(plant), response=filters[:, :, None] * g).without_filter(filters)
     assert np.allclose(late.response, g)
 
