@@ -27,6 +27,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     "field.amplitude_percent": ("Amplitude of the torque", "转矩幅值"),
     "field.turn_rpm": ("Slow speed beneath it", "叠加的低速"),
     "field.duration_s": ("Time at full amplitude", "满幅时间"),
+    "unit.frequency_hz": ("Hz", "Hz"),
+    "unit.duration_s": ("s", "s"),
     "unit.amplitude_rpm": ("rpm", "rpm"),
     "unit.amplitude_percent": ("%", "%"),
     "unit.turn_rpm": ("rpm", "rpm"),

@@ -13,7 +13,7 @@ class VibrationSettings(ToolSettings):
     time_limit_s: float = Field(
         default=180.0, gt=0, le=300, description="longest time of all moves together, in s"
     )
-    speeds: int = Field(default=14, ge=5, le=40, description="speeds in each direction")
+    speeds: int = Field(default=10, ge=5, le=40, description="speeds in each direction")
     closer: int = Field(
         default=8, ge=0, le=20,
         description="further speeds about the one at which an order has its highest level",

@@ -13497,7 +13497,7 @@ export interface components {
             /**
              * Speeds
              * @description speeds in each direction
-             * @default 14
+             * @default 10
              */
             speeds: number;
             /**
