@@ -14,6 +14,8 @@ from drivers.virtual.firmware.schedule import Timer
 from drivers.virtual.firmware.states import State
 from profiles.schema import Fault
 
+_LIMIT_SWITCHES = k.SIG_NEGATIVE | k.SIG_POSITIVE
+
 Emergency = tuple[int, int, bytes]
 
 
@@ -186,7 +188,9 @@ class Faults:
         """Warnings of the limit switches come and go with the switches."""
         if not self._warns_of_limits:
             return
-        signals = int(self._axis.s[k.S_SIGNALS])
+        signals = int(self._axis.s.item(k.S_SIGNALS))
+        if not signals & _LIMIT_SWITCHES and not self.alarms.warnings:
+            return  # this is read twice in every cycle
         for warning, switch in zip(
             self._traits.limits.warnings, (k.SIG_NEGATIVE, k.SIG_POSITIVE), strict=True
         ):

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from drivers.virtual.firmware.cia402.terminals import (
-    SWITCHES,
-    Input,
+    InputPin,
     InputUse,
     Output,
     OutputUse,
     TerminalTable,
-    is_virtually_on,
 )
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
@@ -28,6 +26,7 @@ class Terminals:
         self._core = core
         self._control = control
         self._table = table
+        self._pins = tuple(InputPin(each, table, core.od) for each in table.inputs)
         self.external = [False] * len(table.inputs)
         self._before: dict[InputUse, bool] = {}
         self._probe_function = 0
@@ -43,30 +42,20 @@ class Terminals:
     # --- inputs ----------------------------------------------------------------------------
     def level(self, place: int) -> bool:
         """Logic level of an input: after polarity and forcing."""
-        core, terminal = self._core, self._table.inputs[place]
-        if is_virtually_on(terminal, core.od):
-            return True
-        use = self._table.use_of(terminal, core.od)
-        signal = SWITCHES.get(use) if use is not None else None
-        on = self.external[place] or (signal is not None and self._pressed() & signal != 0)
-        return on != (terminal.logic is not None and terminal.logic.inverted(core.od))
+        return self._pins[place].level(self.external[place], self._pressed())
 
     def _pressed(self) -> int:
         """Switches as the mechanics presses them."""
         axis = self._core.axis
-        angle = float(axis.s[k.S_THETA])
-        pressed = k.SIG_NEGATIVE if angle <= axis.p[k.P_LIMIT_NEGATIVE] else 0
-        pressed |= k.SIG_POSITIVE if angle >= axis.p[k.P_LIMIT_POSITIVE] else 0
-        inside = axis.p[k.P_HOME_FROM] <= angle <= axis.p[k.P_HOME_TO]
+        angle, limit = axis.s.item(k.S_THETA), axis.p.item
+        pressed = k.SIG_NEGATIVE if angle <= limit(k.P_LIMIT_NEGATIVE) else 0
+        pressed |= k.SIG_POSITIVE if angle >= limit(k.P_LIMIT_POSITIVE) else 0
+        inside = limit(k.P_HOME_FROM) <= angle <= limit(k.P_HOME_TO)
         return pressed | (k.SIG_HOME if inside else 0)
 
     def active(self, use: InputUse) -> bool:
         """Whether any input with this function is on."""
-        inputs: tuple[Input, ...] = self._table.inputs
-        return any(
-            self._table.use_of(terminal, self._core.od) == use and self.level(place)
-            for place, terminal in enumerate(inputs)
-        )
+        return any(pin.use == use and self.level(place) for place, pin in enumerate(self._pins))
 
     def input_bits(self) -> int:
         """Inputs as bits from the first on."""
@@ -78,9 +67,10 @@ class Terminals:
         if self._core.family.traits.limit_bits_swapped:
             signals = signals & 4 | (signals & 1) << 1 | signals >> 1 & 1
         word = signals
-        for place, terminal in enumerate(self._table.inputs):
-            if terminal.bit is not None:
-                word |= self.level(place) << terminal.bit
+        pressed = self._pressed()
+        for pin, external in zip(self._pins, self.external, strict=True):
+            if pin.bit is not None:
+                word |= pin.level(external, pressed) << pin.bit
         if self._table.probe_bits is not None:
             word |= self.active("probe1") << self._table.probe_bits[0]
             word |= self.active("probe2") << self._table.probe_bits[1]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from drivers.virtual.firmware.cia402.base import Wiring
-from drivers.virtual.firmware.dictionary import ObjectDictionary
+from drivers.virtual.firmware.dictionary import Cell, ObjectDictionary
 from drivers.virtual.firmware.kernel import layout as k
 
 InputUse = Literal[
@@ -120,3 +120,42 @@ def is_virtually_on(terminal: Input, od: ObjectDictionary) -> bool:
         return False
     key, bit = terminal.virtual
     return bool(int(od.number(key)) >> bit & 1)
+
+
+class InputPin:
+    """One input of a drive, its parameters looked up once: it is read in every cycle."""
+
+    __slots__ = ("_fixed", "_function", "_inverted_raw", "_logic", "_logic_bit", "_uses",
+                 "_virtual", "_virtual_bit", "bit")  # fmt: skip
+
+    def __init__(self, terminal: Input, table: TerminalTable, od: ObjectDictionary) -> None:
+        self.bit = terminal.bit
+        key, logic, virtual = terminal.function_key, terminal.logic, terminal.virtual
+        self._function: Cell | None = None if key is None else od.cell(key)
+        self._fixed = terminal.fixed
+        self._uses = table.input_uses
+        self._logic: Cell | None = None if logic is None else od.cell(logic.key)
+        self._logic_bit = None if logic is None else logic.bit
+        self._inverted_raw = 1 if logic is None else logic.inverted_raw
+        self._virtual: Cell | None = None if virtual is None else od.cell(virtual[0])
+        self._virtual_bit = 0 if virtual is None else virtual[1]
+
+    @property
+    def use(self) -> InputUse | None:
+        """What the input does now."""
+        if self._function is None:
+            return self._fixed
+        return self._uses.get(int(self._function.active))
+
+    def level(self, external: bool, pressed: int) -> bool:
+        """Logic level: after polarity and forcing. ``pressed``: switches of the machine."""
+        if self._virtual is not None and int(self._virtual.active) >> self._virtual_bit & 1:
+            return True
+        on = external
+        if not on and pressed:
+            use = self.use
+            on = use is not None and pressed & SWITCHES.get(use, 0) != 0
+        if self._logic is None:
+            return on
+        raw, bit = int(self._logic.active), self._logic_bit
+        return on != (bool(raw >> bit & 1) if bit is not None else raw == self._inverted_raw)
