@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import get_args
 
@@ -14,13 +14,23 @@ from profiles.schema import INTEGER_RANGE, Chapter, Fault, HomingMethod, Paramet
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Something a reviewer must look at."""
+    """Something a reviewer must look at: where, and a message of the catalogue with its facts.
+
+    Words are made where it is shown (`drivers.texts.checks`).
+    """
 
     key: str
-    text: str
+    code: str
+    params: Mapping[str, str | int | float]
 
     def __str__(self) -> str:
-        return f"{self.key}: {self.text}"
+        facts = ", ".join(f"{name}={fact}" for name, fact in self.params.items())
+        return f"{self.key}: {self.code} ({facts})"
+
+
+def found(key: str, code: str, /, **params: str | int | float) -> Finding:
+    """A finding with its facts by name."""
+    return Finding(key, code, params)
 
 
 def check(profile: Profile) -> list[Finding]:
@@ -32,9 +42,9 @@ def check(profile: Profile) -> list[Finding]:
     for parameter in profile.parameters:
         findings += _check_parameter(profile, parameter)
     codes = Counter(fault.code for fault in profile.faults)
-    findings += [Finding(code, "fault code given twice") for code, n in codes.items() if n > 1]
+    findings += [found(code, "profile-check.fault-twice") for code, n in codes.items() if n > 1]
     methods = Counter(method.method for method in profile.homing_methods)
-    findings += [Finding(f"homing {m}", "given twice") for m, n in methods.items() if n > 1]
+    findings += [found(f"{m}", "profile-check.homing-twice") for m, n in methods.items() if n > 1]
     return findings + _check_motion(profile) + _check_chapters(profile)
 
 
@@ -58,19 +68,19 @@ def _check_motion(profile: Profile) -> list[Finding]:
     findings: list[Finding] = []
     if not profile.from_description:
         findings += [
-            Finding(p.key, f"{p.name} can be written and has no motion class: add a motion rule")
+            found(p.key, "profile-check.no-motion-class", name=p.name)
             for p in unclassified(profile)
         ]
     writable = [p.key for p in profile.parameters if p.access != "ro"]
     own = [rule for rule in profile.motion_rules if rule.origin == "profile"]
     for key in writable:
         if sum(rule.covers(key) for rule in own) > 1:
-            findings.append(Finding(key, "two motion rules are about it"))
+            findings.append(found(key, "profile-check.two-motion-rules"))
     places = [place_of(key) for key in writable]
     for rule in profile.motion_rules:
         for text, (first, last) in zip(rule.keys, rule.spans, strict=True):
             if not any(first <= place <= last for place in places):
-                findings.append(Finding(text, "a motion rule about nothing that can be written"))
+                findings.append(found(text, "profile-check.motion-rule-left-over"))
     return findings
 
 
@@ -80,12 +90,12 @@ def _check_chapters(profile: Profile) -> list[Finding]:
     expected = 1
     for chapter in profile.manual_chapters:
         if chapter.first_line != expected:
-            findings.append(Finding(chapter.title, f"should begin at line {expected}"))
+            findings.append(found(chapter.title, "profile-check.chapter-begin", line=expected))
         expected = chapter.last_line + 1
         if not sum(counts_of(profile, chapter).values()) and not chapter.empty:
-            findings.append(Finding(chapter.title, "nothing was taken from it, without a reason"))
+            findings.append(found(chapter.title, "profile-check.chapter-empty"))
     if not profile.manual_chapters and not profile.partial and profile.manual.isdigit():
-        findings.append(Finding(profile.drive, "the chapters of its manual are not listed"))
+        findings.append(found(profile.drive, "profile-check.no-chapters"))
     return findings
 
 
@@ -128,21 +138,35 @@ def _check_parameter(profile: Profile, p: Parameter) -> list[Finding]:
     if isinstance(p.default_raw, (int, float)) and not explained:
         below = low is not None and p.default_raw < low
         if below or (high is not None and p.default_raw > high):
-            findings.append(Finding(p.key, f"default {p.default_raw} outside {low}…{high}"))
+            findings.append(
+                found(
+                    p.key, "profile-check.default-outside", default=p.default_raw,
+                    limits=f"{low}…{high}",
+                )
+            )  # fmt: skip
     bounds = INTEGER_RANGE.get(p.type)
     if bounds is not None:
         for name, value in (("min_raw", p.min_raw), ("max_raw", p.max_raw)):
             if value is not None and not bounds[0] <= value <= bounds[1]:
-                findings.append(Finding(p.key, f"{name} {value} does not fit {p.type}"))
+                findings.append(
+                    found(p.key, "profile-check.does-not-fit", name=name, value=value, type=p.type)
+                )
     outside = [
         code
         for code in p.enum
         if (low is not None and code < low) or (high is not None and code > high)
     ]
     if outside and not explained:
-        findings.append(Finding(p.key, f"enumerated values {outside} outside {low}…{high}"))
+        findings.append(
+            found(
+                p.key, "profile-check.enum-outside", values=", ".join(map(str, outside)),
+                limits=f"{low}…{high}",
+            )
+        )  # fmt: skip
     if not p.source.startswith(f"{profile.manual}:"):
-        findings.append(Finding(p.key, f"source {p.source!r} is not of manual {profile.manual}"))
+        findings.append(
+            found(p.key, "profile-check.other-manual", source=p.source, manual=profile.manual)
+        )
     findings += _check_number(p)
     return findings
 
@@ -156,7 +180,7 @@ def _check_number(p: Parameter) -> list[Finding]:
     expected = f"{0x2000 + group:04X}:{number + 1:02X}"
     if p.key == expected:
         return []
-    return [Finding(p.key, f"{p.number} should be {expected}")]
+    return [found(p.key, "profile-check.number", number=p.number or "", expected=expected)]
 
 
 def coverage(profile: Profile) -> list[str]:

@@ -21,6 +21,7 @@ from backend.commands.session import opened, reporting_errors, show_progress
 from backend.station.description import profile_of_drive
 from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
+from drivers.texts.checks import check_line
 from drivers.texts.imports import failure_text, finding_line, summary_text
 from drivers.texts.message import language, reason_of, text
 from profiles import drive_names, load_profile
@@ -287,7 +288,7 @@ def check(drive: Annotated[str | None, typer.Argument()] = None) -> None:
             covered = ", ".join(overlay_coverage(profile, overlay))
             print_text("printed.overlay", language=translated, covered=covered)
         for finding in findings:
-            print(f"  {finding}")
+            print(f"  {check_line(finding).words(language())}")
         for line in coverage(profile):
             print(f"  {line}")
         failed = failed or bool(findings)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from profiles.check import Finding
+from profiles.check import Finding, found
 from profiles.language.overlay import Overlay, Place
 from profiles.schema import ConfirmStep, Fault, Parameter, Procedure, Profile
 
@@ -148,12 +148,12 @@ def check_overlay(profile: Profile, overlay: Overlay) -> list[Finding]:
     places = {text.place for text in texts}
     english = {text.english for text in texts}
     findings = [
-        Finding(".".join(place), "a translation of something that the profile does not have")
+        found(".".join(place), "profile-check.translation-of-nothing")
         for place in placed
         if place not in places
     ]
     findings += [
-        Finding(repr(text), "a common translation of a text that the profile does not have")
+        found(repr(text), "profile-check.common-translation-of-nothing")
         for text in overlay.common
         if text not in english
     ]
@@ -162,7 +162,7 @@ def check_overlay(profile: Profile, overlay: Overlay) -> list[Finding]:
         now = translation(text, overlay, placed)
         if now is not None and said.setdefault(text.english, now) != now:
             findings.append(
-                Finding(".".join(text.place), f"{text.english!r} has another translation elsewhere")
+                found(".".join(text.place), "profile-check.two-translations", english=text.english)
             )
     return findings
 

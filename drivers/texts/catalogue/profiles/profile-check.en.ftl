@@ -1,0 +1,17 @@
+profile-check_chapter-begin = the chapter should begin at line { $line }
+profile-check_chapter-empty = no record names a line of this chapter, and no reason is given
+profile-check_common-translation-of-nothing = a common translation of a text that the profile does not have
+profile-check_default-outside = default { $default } is outside { $limits }
+profile-check_does-not-fit = { $name } { $value } does not fit { $type }
+profile-check_enum-outside = enumerated values { $values } are outside { $limits }
+profile-check_fault-twice = the fault code is given twice
+profile-check_homing-twice = the homing method is given twice
+profile-check_line = { $place }: { $finding }
+profile-check_motion-rule-left-over = a motion rule covers no writable object
+profile-check_no-chapters = the chapters of the manual are not listed
+profile-check_no-motion-class = { $name } can be written and has no motion class: add a motion rule
+profile-check_number = { $number } should have the key { $expected }
+profile-check_other-manual = source { QUOTED($source) } is not of manual { $manual }
+profile-check_translation-of-nothing = a translation of something that the profile does not have
+profile-check_two-motion-rules = more than one motion rule covers this object
+profile-check_two-translations = { QUOTED($english) } has another translation elsewhere

@@ -1,0 +1,12 @@
+"""What the check of a profile finds, as messages of the catalogue."""
+
+from __future__ import annotations
+
+from drivers.texts.message import Text, text
+from profiles.check import Finding
+
+
+def check_line(finding: Finding) -> Text:
+    """A finding with the place that it is about."""
+    message = Text(finding.code, finding.params)
+    return text("profile-check.line", place=finding.key, finding=message)
