@@ -53,8 +53,8 @@ class Found:
     alias: int | None = None
     hardware: str = ""
     firmware: str = ""
-    state: str = ""
-    notes: tuple[str, ...] = ()
+    state: Text | None = None
+    notes: tuple[Text, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ class LinkQuality:
     lost_frames: int = 0
     wkc_errors: int = 0
     round_trip_ms: float | None = None
-    state: str = ""
+    state: Text | None = None
     details: dict[str, float | int | str] = field(default_factory=dict)
 
 

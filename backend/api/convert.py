@@ -40,7 +40,8 @@ def quality(now: LinkQuality) -> models_bench.Quality:
     """Counters of a link."""
     return models_bench.Quality(
         connected=now.connected,
-        state=now.state,
+        state=words_of(now.state),
+        state_message=message_or_none(now.state),
         transactions=now.transactions,
         timeouts=now.timeouts,
         crc_errors=now.crc_errors,
@@ -324,8 +325,10 @@ def found_drive(bench: Bench, url: str, kind: str, found: Found) -> models_bench
         alias=found.alias,
         hardware=found.hardware,
         firmware=found.firmware,
-        state=found.state,
-        notes=list(found.notes),
+        state=words_of(found.state),
+        state_message=message_or_none(found.state),
+        notes=[note.words(language()) for note in found.notes],
+        note_messages=[message_of(note) for note in found.notes],
         matches=matches(kind, found),
         connected_as=user,
     )

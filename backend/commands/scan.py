@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
 
 from backend.commands.options import Json, Server, Url, server_for
 from backend.commands.printing import print_text, words_of
 from backend.commands.session import opened, run, show_progress
 from backend.station.matching import match_profiles
+from drivers.link import Found
+from drivers.texts.message import language
 from drivers.urls import bus_kind, parse_url
 
 
@@ -61,8 +62,16 @@ async def _found(url: str, server: str | None) -> list[tuple[dict[str, object], 
     async with opened(url) as link:
         return [
             (
-                {name: value for name, value in asdict(f).items() if name in _FOUND},
+                _row(f),
                 {m.profile.drive: m.confidence for m in match_profiles(link.kind, f)},
             )
             for f in await link.scan(show_progress, None)
         ]
+
+
+def _row(found: Found) -> dict[str, object]:
+    """As the server answers it, with the words of the command's language."""
+    return {name: getattr(found, name) for name in _FOUND} | {
+        "state": "" if found.state is None else found.state.words(language()),
+        "notes": [note.words(language()) for note in found.notes],
+    }

@@ -187,8 +187,8 @@ class CanopenLink:
         found += [
             Found(
                 station=record.node,
-                state=record.state_text,
-                notes=("sends heartbeats but does not answer SDO requests",),
+                state=record.nmt_state,
+                notes=(text("canopen.note-heartbeats-only"),),
             )
             for record in silent
             if record.node in numbers and record.node not in heard
@@ -206,8 +206,9 @@ class CanopenLink:
         )
         with self._watch_lock:
             record = self._watch.record(node)
-            record.conflict = "two nodes have this number" if len(answers) > 1 else ""
-            state = record.state_text
+            same = len(answers) > 1
+            record.conflict = text("canopen.state-same-number") if same else None
+            state = record.nmt_state
         return replace(found, state=state)
 
     async def read(self, station: int, address: Address) -> bytes:
@@ -273,7 +274,7 @@ class CanopenLink:
             with self._watch_lock:
                 record = self._watch.record(station)
                 details |= {"boots": record.boots, "emergencies": record.emergencies}
-                state = record.conflict or record.state_text
+                state = record.shown_state
         trips = [c.round_trip_s for c in channels if c.round_trip_s is not None]
         details["late_answers"] = sum(c.late_answers for c in channels)
         details["stray_answers"] = sum(c.strays for c in channels)

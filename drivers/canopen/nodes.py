@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from drivers.canopen.frames import EMERGENCY, HEARTBEAT, NMT_STATES, SDO_REQUEST, SYNC, Frame
 from drivers.link import LinkEvent
-from drivers.texts.message import Param, Text, text
+from drivers.texts.message import Param, Text, prose, text
 
 #: By the upper byte of the error code: its class (CiA 301 table 26).
 _EMERGENCY_CLASSES = {
@@ -102,7 +102,7 @@ class NodeRecord:
     foreign_master_s: float | None = None
     strays_s: list[float] = field(default_factory=list)
     in_use: bool = False
-    conflict: str = ""
+    conflict: Text | None = None
 
     @property
     def period_s(self) -> float | None:
@@ -111,8 +111,18 @@ class NodeRecord:
 
     @property
     def state_text(self) -> str:
-        """NMT state as text, or empty."""
-        return "" if self.state is None else NMT_STATES.get(self.state, f"state {self.state}")
+        """NMT state by its name of CiA 301, its number where it has none, or empty."""
+        return "" if self.state is None else NMT_STATES.get(self.state, f"{self.state}")
+
+    @property
+    def nmt_state(self) -> Text | None:
+        """NMT state for a list of stations; None while it is not known."""
+        return prose(self.state_text) if self.state_text else None
+
+    @property
+    def shown_state(self) -> Text | None:
+        """What a list of stations shows: a conflict of numbers before the NMT state."""
+        return self.conflict or self.nmt_state
 
 
 class NodeWatch:
@@ -216,7 +226,7 @@ class NodeWatch:
         record.open_emergency = code or None
         meaning = emergency_text(code)
         if code == 0x8150:
-            record.conflict = meaning.words()
+            record.conflict = meaning
         if record.emergencies_reported >= _EMERGENCIES_PER_S:
             record.emergencies_untold += 1
             return events
@@ -253,7 +263,7 @@ class NodeWatch:
                 events += self._end_of_storm(record, now_s)
             if record.strays_s and now_s - record.strays_s[-1] > _FORGIVEN_S:
                 record.strays_s.clear()
-                record.conflict = ""
+                record.conflict = None
             if not record.alive or record.last_heartbeat_s is None or record.period_s is None:
                 continue
             limit_s = record.period_s * _LATE_PERIODS + _LATE_EXTRA_S
@@ -310,7 +320,7 @@ class NodeWatch:
             return None
         foreign = record.foreign_master_s
         if foreign is not None and now_s - foreign < _DUPLICATE_WINDOW_S:
-            record.conflict = "another master is talking to this node"
+            record.conflict = text("canopen.state-another-master")
             return LinkEvent("fault", record.node, text("event.another-master", node=record.node))
-        record.conflict = "two nodes have this number"
+        record.conflict = text("canopen.state-same-number")
         return LinkEvent("fault", record.node, text("event.two-nodes-answer", node=record.node))

@@ -20,7 +20,7 @@ from drivers.canopen.url import CanUrl
 from drivers.errors import DriveError, LinkLost
 from drivers.flight.kinds import can_data, can_ring
 from drivers.link import LinkEvent
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 
 _IDLE_S = 0.05
 _FIRST_RETRY_S = 0.2
@@ -72,9 +72,9 @@ class CanPort:
         return self._bus is not None
 
     @property
-    def why_not(self) -> str:
-        """Why it is not connected, or empty."""
-        return "" if self._why is None else self._why.message
+    def why_not(self) -> Text | None:
+        """Why it is not connected, or None."""
+        return None if self._why is None else self._why.text
 
     def open(self) -> None:
         """Open the adapter and start receiving. Blocks. Raises LinkLost."""

@@ -9,6 +9,7 @@ from drivers.canopen.channel import SdoChannel
 from drivers.codec import text_of
 from drivers.errors import DriveError, LinkLost
 from drivers.link import Found
+from drivers.texts.message import Text, text
 
 _WINDOW_S = 0.12
 _SERVO = 402
@@ -35,21 +36,18 @@ def probe(channels: Sequence[SdoChannel]) -> dict[int, list[bytes]]:
 
 def identify(channel: SdoChannel, answers: Sequence[bytes], timeout_s: float) -> Found:
     """Read the identity of a node that answered; objects it does not have stay None or empty."""
-    notes: list[str] = []
+    notes: list[Text] = []
     if len(answers) > 1:
-        notes.append(
-            f"{len(answers)} nodes answer as number {channel.node}: switch all but one off and "
-            "give them other numbers before writing anything"
-        )
+        notes.append(text("canopen.note-same-number", node_count=len(answers), node=channel.node))
     device_type = _device_type(channel, answers[0], timeout_s)
     if device_type is not None and device_type & 0xFFFF != _SERVO:
-        notes.append(f"device profile {device_type & 0xFFFF}, not a CiA 402 drive")
+        notes.append(text("canopen.note-no-drive", device_profile=device_type & 0xFFFF))
 
     def number(index: int, subindex: int) -> int | None:
         data = _read(channel, index, subindex, timeout_s)
         return None if data is None else int.from_bytes(data, "little")
 
-    def text(index: int) -> str:
+    def shown(index: int) -> str:
         data = _read(channel, index, 0, timeout_s) or b""
         return readable(data)
 
@@ -60,9 +58,9 @@ def identify(channel: SdoChannel, answers: Sequence[bytes], timeout_s: float) ->
         product_code=number(0x1018, 2),
         revision=number(0x1018, 3),
         serial=number(0x1018, 4) or None,
-        name=text(0x1008),
-        hardware=text(0x1009),
-        firmware=text(0x100A),
+        name=shown(0x1008),
+        hardware=shown(0x1009),
+        firmware=shown(0x100A),
         notes=tuple(notes),
     )
 

@@ -9,6 +9,7 @@ import sys
 from dataclasses import dataclass
 
 from drivers.computer import scheduling
+from drivers.texts.message import Text, text
 
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
 _PR_SET_PDEATHSIG = 1
@@ -17,10 +18,10 @@ _PRIORITY = 40
 
 @dataclass(frozen=True, slots=True)
 class RealTime:
-    """What was granted; ``notes`` say as text what was not, and how to get it."""
+    """What was granted; ``notes``: what was not, and how to get it."""
 
     fifo_priority: int
-    notes: tuple[str, ...]
+    notes: tuple[Text, ...]
     memory_locked: bool = False
 
 
@@ -31,23 +32,17 @@ def claim(*, wanted: bool = True) -> RealTime:
     Note that a SCHED_FIFO thread may never spin: the kernel throttles it for 50 ms a second.
     """
     if not wanted:
-        return RealTime(0, notes=("real-time scheduling was not asked for",))
-    notes = []
+        return RealTime(0, notes=(text("computer.real-time-not-asked"),))
+    notes: list[Text] = []
     libc = ctypes.CDLL(None, use_errno=True)
     scheduling.fine_timers()
     priority = _PRIORITY if scheduling.real_time(_PRIORITY) else 0
     if not priority:
         scheduling.short_slice()
-        notes.append(
-            "the system grants no real-time scheduling (SCHED_FIFO), so single cycles may be some"
-            " milliseconds late on a busy computer; CAP_SYS_NICE or an rtprio limit grants it"
-        )
+        notes.append(text("computer.no-real-time"))
     locked = libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) == 0
     if not locked:
-        notes.append(
-            "the system does not let this process lock its memory; CAP_IPC_LOCK or a larger"
-            " memlock limit does"
-        )
+        notes.append(text("computer.memory-not-locked"))
     # A pause of the garbage collector is a late cycle; the loop creates no reference cycles.
     scheduling.spare_collector()
     gc.disable()

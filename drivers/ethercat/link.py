@@ -31,7 +31,7 @@ from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.listing import Item, fitted, object_of, read_list
 from drivers.flight.segment import SegmentRecorder
 from drivers.link import Address, Cyclic, Found, Link, LinkEvent, LinkQuality, Progress, Unsubscribe
-from drivers.texts.message import Text, text
+from drivers.texts.message import Text, prose, text
 from profiles.schema import LinkKind, Profile
 
 _SCHEME = "ethercat://"
@@ -194,7 +194,7 @@ class EthercatLink:
             retries=int(details["mailbox_repeats"]),
             lost_frames=int(cyclic.get("lost_frames", 0)),
             wkc_errors=int(cyclic.get("wkc_errors", 0)),
-            state=str(here["words"]) if here else self._host.why.words(),
+            state=Text.from_wire(here["text"]) if here else self._host.why,
             details=details,
         )
 
@@ -254,7 +254,7 @@ class EthercatLink:
         return exchange_from(self._status.get("cyclic", {}))
 
     @property
-    def real_time(self) -> tuple[str, ...]:
+    def real_time(self) -> tuple[Text, ...]:
         """What the host process was granted and denied, in sentences."""
         return self._host.granted
 
@@ -388,8 +388,12 @@ class EthercatLink:
 
 def _found(item: Message) -> Found:
     parent = item["parent"]
-    behind = "the computer" if parent == 0 else f"station {parent}, port {item['parent_port']}"
-    notes = (f"connected behind {behind}", *item["notes"])
+    behind = (
+        text("ethercat.note-behind-computer")
+        if parent == 0
+        else text("ethercat.note-behind-station", station=parent, port=item["parent_port"])
+    )
+    notes = (behind, *(Text.from_wire(note) for note in item["notes"]))
     return Found(
         station=item["station"],
         vendor_id=item["vendor_id"],
@@ -400,7 +404,7 @@ def _found(item: Message) -> Found:
         alias=item["alias"],
         hardware=item["hardware"],
         firmware=item["firmware"],
-        state=item["state"],
+        state=prose(item["state"]),
         notes=notes,
     )
 

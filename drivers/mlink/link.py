@@ -15,6 +15,7 @@ from drivers.modbus.layout import BlockLimits
 from drivers.modbus.link import RegisterLink
 from drivers.modbus.port import LineSettings
 from drivers.modbus.registers import Place, words_of
+from drivers.texts.message import Text, text
 from profiles.schema import DataType, LinkKind, Profile
 
 #: Longest value that the package moves: two registers.
@@ -103,22 +104,21 @@ class MlinkLayout:
     def describe(self, station: int, values: Sequence[int | None]) -> Found:
         """See `drivers.modbus.layout.Layout.describe`."""
         status, mode, vendor, product, revision, serial, slave_address = values
-        notes = []
+        notes: list[Text] = []
         if vendor is None:
-            notes.append("the identity object 1018h is not readable: confirm the drive's type")
+            notes.append(text("mlink.note-no-identity"))
         if mode is not None:
-            notes.append(
-                f"mode of operation {int.from_bytes(bytes((mode,)), 'little', signed=True)}"
-            )
+            signed = int.from_bytes(bytes((mode,)), "little", signed=True)
+            notes.append(text("mlink.note-mode", mode=signed))
         if slave_address not in (None, station):
-            notes.append(f"2105h says address {slave_address}: it changes at the next power-on")
+            notes.append(text("mlink.note-next-address", address=slave_address))
         return Found(
             station,
             vendor_id=vendor,
             product_code=product,
             revision=revision,
             serial=serial,
-            state="" if status is None else f"status word {status:#06x}",
+            state=None if status is None else text("mlink.state", status=f"{status:#06x}"),
             notes=tuple(notes),
         )
 

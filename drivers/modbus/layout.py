@@ -9,6 +9,7 @@ from typing import Protocol
 from drivers.errors import NotAllowed
 from drivers.link import Address, Found
 from drivers.modbus.registers import Place, WordOrder, words_of
+from drivers.texts.message import text
 from profiles.schema import LinkKind, Profile
 
 
@@ -82,8 +83,10 @@ class TableLayout:
 
     def describe(self, station: int, values: Sequence[int | None]) -> Found:
         """See `Layout.describe`."""
-        answer = "refuses register 0" if values[0] is None else f"register 0 holds {values[0]}"
-        return Found(
-            station,
-            notes=(f"{answer}; Modbus RTU has no identity: choose the drive's profile",),
+        held = values[0]
+        answer = (
+            text("modbus.note-register-refused")
+            if held is None
+            else text("modbus.note-register-holds", value=held)
         )
+        return Found(station, notes=(answer, text("modbus.note-no-identity")))

@@ -191,7 +191,7 @@ class Line:
             framing_errors=sum(c.framing_errors for c in picked),
             retries=sum(c.retries for c in picked),
             round_trip_ms=sum(times) / len(times) if times else None,
-            state="open" if self.is_open else "no adapter",
+            state=text("link.open" if self.is_open else "link.no-adapter"),
             details={
                 "baudrate": self.settings.baudrate,
                 "parity": self._parity,

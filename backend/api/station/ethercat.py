@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from backend.api import convert
 from backend.api.context import Connection, Controlled, TheBench
-from backend.api.errors import NotFound
+from backend.api.errors import NotFound, message_of, words_of
 from backend.api.models import JobInfo
 from backend.api.station.models_ethercat import (
     AliasRequest,
@@ -69,7 +69,7 @@ async def ethercat_segment(bench: TheBench, url: Annotated[str, Query()]) -> Eth
     return EthercatSegment(
         url=url,
         connected=quality.connected,
-        state=quality.state,
+        state=words_of(quality.state),
         problem=problem,
         stations=[
             _station(bench, url, seen, survey, clocks=figures is not None and figures.dc)
@@ -77,7 +77,8 @@ async def ethercat_segment(bench: TheBench, url: Annotated[str, Query()]) -> Eth
         ],
         late_frames=int(quality.details["late_frames"]),
         host_restarts=int(quality.details["host_restarts"]),
-        real_time=list(link.real_time),
+        real_time=[note.words(language()) for note in link.real_time],
+        real_time_messages=[message_of(note) for note in link.real_time],
         private_network=link.private_network,
         exchange=None if figures is None else _exchange(figures),
         permissions=report,
@@ -339,7 +340,8 @@ def _station(
             for number, port in enumerate(seen.ports)
         ],
         findings=[f.text.words(language()) for f in own if f.port is None],
-        notes=list(seen.notes),
+        notes=[note.words(language()) for note in seen.notes],
+        note_messages=[message_of(note) for note in seen.notes],
         foe=bool(spec and spec.foe),
     )
 

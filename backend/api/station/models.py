@@ -57,6 +57,7 @@ class Quality(Message):
 
     connected: bool
     state: str
+    state_message: MessageInfo | None = Field(default=None, description="of state")
     transactions: int
     timeouts: int
     crc_errors: int
@@ -130,7 +131,9 @@ class FoundDrive(Message):
     hardware: str
     firmware: str
     state: str
+    state_message: MessageInfo | None = Field(default=None, description="of state")
     notes: list[str]
+    note_messages: list[MessageInfo] = Field(description="of notes")
     matches: list[ProfileMatch]
     connected_as: str | None = Field(description="id of the drive that already uses this station")
 

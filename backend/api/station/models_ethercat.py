@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from backend.api.models import Message
+from backend.tools.wire_message import MessageInfo
 
 
 class SegmentPort(Message):
@@ -46,6 +47,7 @@ class SegmentStation(Message):
     ports: list[SegmentPort]
     findings: list[str] = Field(description="what its counters accuse that is no cable")
     notes: list[str]
+    note_messages: list[MessageInfo] = Field(description="of notes")
     foe: bool = Field(description="its profile says that it takes firmware by FoE")
 
 
@@ -96,6 +98,7 @@ class EthercatSegment(Message):
     late_frames: int = Field(description="frames that came back after they were given up")
     host_restarts: int
     real_time: list[str]
+    real_time_messages: list[MessageInfo] = Field(description="of real_time")
     private_network: bool
     exchange: SegmentExchange | None
     permissions: EthercatPermissions | None = Field(description="None in a private network")

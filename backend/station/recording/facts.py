@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from backend.axis.fault_history import PastFault, history_of, read_history
@@ -15,10 +15,16 @@ from backend.parameters import set_file as parameter_set
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from drivers.errors import DriveError
+from drivers.link import LinkQuality
 from drivers.texts.answers import sentence
 
 #: A mute drive must not keep the samples of the others waiting.
 GEARING_TIMEOUT_S = 2.0
+
+
+def _figures(now: LinkQuality) -> dict[str, object]:
+    """Counters of a link as plain values."""
+    return asdict(replace(now, state=None)) | sentence("state", now.state)
 
 
 def identity(bench: Bench, connected: ConnectedDrive) -> dict[str, Any]:
@@ -141,7 +147,7 @@ def links(bench: Bench, connected_drives: Sequence[ConnectedDrive]) -> list[dict
             "drive": connected.drive.id,
             "url": bench.buses.url_of(port),
             "station": port.station,
-            **asdict(port.link.quality(port.station)),
+            **_figures(port.link.quality(port.station)),
         }
         for connected in connected_drives
         for port in connected.drive.ports

@@ -7,7 +7,7 @@ Source: ETG.2000 v1.0.10; ETG.1000.4 clauses 6.3 (watchdog), 6.7 (sync managers)
 from __future__ import annotations
 
 import struct
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 from drivers.errors import NotAllowed, ProtocolError, Rejected
 from drivers.ethercat.process.protocol import Message
@@ -15,6 +15,7 @@ from drivers.ethercat.process.station import Station
 from drivers.ethercat.wire import coe
 from drivers.ethercat.wire.registers import read_again
 from drivers.ethercat.wire.steps import Steps, Write
+from drivers.texts.message import Text, text
 from profiles.bring_up import BringUp, ClockMode, InitCommand
 from profiles.motion.classify import standard_rule
 from profiles.schema import Profile
@@ -58,7 +59,7 @@ class StationBringUp:
     complete_access: bool | None = None
     safeop_op_ms: int | None = None
     mailbox_ms: int | None = None
-    notes: tuple[str, ...] = ()
+    notes: tuple[Text, ...] = ()
 
 
 def station_bring_up(profile: Profile | None, cycle_ns: int) -> StationBringUp:
@@ -101,32 +102,36 @@ def _sync1_ns(mode: ClockMode | None, sync0_ns: int) -> int:
     return max((max(slower, 1) - 1) * sync0_ns + mode.sync1.shift_ns, 0)
 
 
-def withheld(command: InitCommand) -> str:
-    """Why a command of the file is not written by this tool; empty where it is.
+def withheld(command: InitCommand) -> Text | None:
+    """Why a command of the file is not written by this tool; None where it is.
 
     The mode may be set, as the axis is not enabled before Operational; a control word, a target
     or a forced output may not: the maker's file must not move the axis. The assignment of process
     data is written as they are chosen.
     """
     if any(command.index in each for each in _MAPPING):
-        return "the process data are written as they are chosen"
+        return text("ethercat.withheld-process-data")
     if command.transition not in (*BEFORE_MAPPING, *BEFORE_OP):
-        return "only commands on the way up to Operational are written"
+        return text("ethercat.withheld-transition")
     rule = standard_rule(f"{command.index:04X}:{command.subindex:02X}")
     if rule is None or rule.motion != "energises" or command.index == _MODE_OF_OPERATION:
-        return ""
-    return f"it could move the axis ({rule.reason})"
+        return None
+    return text("ethercat.withheld-could-move", reason=rule.reason)
 
 
-def _commands(rules: BringUp) -> tuple[tuple[Command, ...], tuple[str, ...]]:
-    sent, notes = [], []
+def _commands(rules: BringUp) -> tuple[tuple[Command, ...], tuple[Text, ...]]:
+    sent: list[Command] = []
+    notes: list[Text] = []
     for each in rules.init_commands:
         reason = withheld(each)
         if reason:
+            key = f"{each.index:04X}:{each.subindex:02X}"
             notes.append(
-                f"the command {each.transition} {each.index:04X}:{each.subindex:02X} of its file is"
-                f" not written: {reason}"
-            )
+                text(
+                    "ethercat.note-command-not-written",
+                    transition=each.transition, parameter=key, reason=reason,
+                )
+            )  # fmt: skip
             continue
         sent.append(
             Command(
@@ -139,7 +144,7 @@ def _commands(rules: BringUp) -> tuple[tuple[Command, ...], tuple[str, ...]]:
 
 def to_wire(rules: StationBringUp) -> Message:
     """As a plain map."""
-    return asdict(rules)
+    return asdict(replace(rules, notes=())) | {"notes": [each.to_wire() for each in rules.notes]}
 
 
 def from_wire(message: Message | None) -> StationBringUp | None:
@@ -149,7 +154,7 @@ def from_wire(message: Message | None) -> StationBringUp | None:
     fields = dict(message)
     fields["commands"] = tuple(Command(**each) for each in message["commands"])
     fields["controls"] = tuple((number, value) for number, value in message["controls"])
-    fields["notes"] = tuple(message["notes"])
+    fields["notes"] = tuple(Text.from_wire(each) for each in message["notes"])
     return StationBringUp(**fields)
 
 

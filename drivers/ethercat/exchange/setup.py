@@ -233,9 +233,8 @@ def initial_outputs(station: Station, entries: Sequence[Entry]) -> Steps[list[in
                 data = yield from coe.upload(station.box, entry.index, entry.subindex)
                 (value,) = struct.unpack("<" + entry.code, data)
             except (Rejected, struct.error):
-                station.notes.append(
-                    f"{entry.index:04X}:{entry.subindex:02X} cannot be read and starts at 0"
-                )
+                key = f"{entry.index:04X}:{entry.subindex:02X}"
+                station.notes.append(text("ethercat.note-starts-at-zero", parameter=key))
         values.append(value)
     return values
 

@@ -57,7 +57,13 @@ class Host:
         self.operations.granted = granted
         try:
             self.operations.open()
-            self.send({"event": "ready", "fifo": granted.fifo_priority, "notes": granted.notes})
+            self.send(
+                {
+                    "event": "ready",
+                    "fifo": granted.fifo_priority,
+                    "notes": [note.to_wire() for note in granted.notes],
+                }
+            )
         except DriveError as error:
             self.send({"event": "failed", "error": protocol.error_to_wire(error)})
             self._flush()

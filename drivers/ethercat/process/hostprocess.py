@@ -42,7 +42,7 @@ class HostProcess:
         self._options = tuple(options)
         self.restarts = 0
         self.why, self._opened = text("ethercat.process-not-opened"), False
-        self.granted: tuple[str, ...] = ()
+        self.granted: tuple[Text, ...] = ()
         self.ring: Ring | None = None
         self._interface = interface
         self._launcher = tuple(launcher)
@@ -225,7 +225,7 @@ class HostProcess:
     def _take_event(self, message: Message) -> None:
         ready = self._ready
         if message["event"] == "ready":
-            self.granted = tuple(message["notes"])
+            self.granted = tuple(Text.from_wire(note) for note in message["notes"])
             if ready is not None and not ready.done():
                 ready.set_result(None)
         elif message["event"] == "failed":

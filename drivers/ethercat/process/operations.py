@@ -131,7 +131,7 @@ class Operations:
         def one(number: int) -> Done:
             def identified(_result: object, error: DriveError | None) -> None:
                 if error is not None:
-                    self.roster.stations[number - 1].notes.append(error.message)
+                    self.roster.stations[number - 1].notes.append(error.text)
                 left.discard(number)
                 share = 1 - len(left) / len(chosen)
                 known = len(chosen) - len(left)
@@ -155,7 +155,8 @@ class Operations:
             "product_code": station.product_code, "revision": station.revision,
             "serial": station.serial, "name": station.name, "alias": station.alias,
             "hardware": station.hardware, "firmware": station.firmware,
-            "state": state_name(station.al_state), "notes": list(station.notes),
+            "state": state_name(station.al_state),
+            "notes": [note.to_wire() for note in station.notes],
             "parent": parent, "parent_port": port, "dc": station.distributed_clock,
         }  # fmt: skip
 

@@ -312,7 +312,7 @@ class Roster:
         if managers is None:
             # Not a device without mailbox: one that does not answer. It is accepted when it does.
             self._search_due = True
-            station.notes.append("it did not answer while it was being found")
+            station.notes.append(text("ethercat.note-not-answered"))
         else:
             self._managers[number] = managers
             out_at, out_size, in_at, in_size = struct.unpack("<HH4xHH4x", managers)
@@ -359,7 +359,7 @@ class Roster:
                 s.number: {
                     "lost": s.lost,
                     "al": s.al_state,
-                    "words": "no answer" if s.lost else self.al_text(s).words(),
+                    "text": (text("link.no-answer") if s.lost else self.al_text(s)).to_wire(),
                     "repeats": s.mailbox.repeats if s.mailbox is not None else 0,
                 }
                 for s in self.stations

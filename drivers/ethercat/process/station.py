@@ -13,7 +13,7 @@ from drivers.ethercat.wire.al_status import ERROR_BIT, AlState, al_status_text, 
 from drivers.ethercat.wire.mailbox import Mailbox
 from drivers.ethercat.wire.registers import GONE_S, TRIES, read_again
 from drivers.ethercat.wire.steps import Pause, Read, Steps, Write
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 
 AL_CONTROL, AL_STATUS = 0x120, 0x130
 _SYNC_MANAGERS, _NO_MAILBOXES = 0x800, 0x0016
@@ -54,7 +54,7 @@ class Station:
     """Layouts of whole objects that were found equal to single reads, with their lengths."""
     describes: bool = True
     """It has the SDO information service, as far as is known."""
-    notes: list[str] = field(default_factory=list)
+    notes: list[Text] = field(default_factory=list)
     ports: esc.PortCounters | None = None
     wiring: esc.PortCounters | None = None
     """Its ports when last every station answered: what is behind a cable that is cut now."""
@@ -212,19 +212,14 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
     try:
         station.serial, right = yield from sii.identity(clock)
         if not right:
-            station.notes.append(
-                "the checksum of its EEPROM is wrong: after the next start it may ignore it"
-            )
+            station.notes.append(text("ethercat.note-eeprom-checksum"))
     except DriveError as error:
-        station.notes.append(error.message)
+        station.notes.append(error.text)
     if station.mailbox is None:
         yield from al_status(station)
         station.badly_found |= yield from sii.has_mailbox(clock)
-        station.notes.append(
-            "it was found only in part: the segment is searched again"
-            if station.badly_found
-            else "no mailbox: only process data"
-        )
+        part = "ethercat.note-found-in-part" if station.badly_found else "ethercat.note-no-mailbox"
+        station.notes.append(text(part))
         return
     try:
         yield from to_preop(station, clock)
@@ -232,12 +227,12 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
         if reported is not None and len(reported) == 4:
             station.serial = int.from_bytes(reported, "little") or station.serial
         for key, index in (("name", 0x1008), ("hardware", 0x1009), ("firmware", 0x100A)):
-            text = yield from _try_read(station, index, 0)
-            if text is not None:
-                setattr(station, key, text_of(text) or getattr(station, key))
+            data = yield from _try_read(station, index, 0)
+            if data is not None:
+                setattr(station, key, text_of(data) or getattr(station, key))
         yield from _compare_identity(station)
     except DriveError as error:
-        station.notes.append(error.message)
+        station.notes.append(error.text)
 
 
 def to_preop(station: Station, clock: Callable[[], float]) -> Steps[None]:
@@ -258,18 +253,15 @@ def to_preop(station: Station, clock: Callable[[], float]) -> Steps[None]:
 
 def _compare_identity(station: Station) -> Steps[None]:
     """1018h and the SII should agree; where they do not, the user is informed."""
-    for sub, label, ours in (
-        (1, "vendor", station.vendor_id),
-        (2, "product code", station.product_code),
-        (3, "revision", station.revision),
+    for sub, code, ours in (
+        (1, "ethercat.note-other-vendor", station.vendor_id),
+        (2, "ethercat.note-other-product", station.product_code),
+        (3, "ethercat.note-other-revision", station.revision),
     ):
         data = yield from _try_read(station, 0x1018, sub)
         reported = None if data is None else int.from_bytes(data, "little")
         if reported is not None and reported != ours:
-            station.notes.append(
-                f"{label} is {reported:#x} in 1018h but {ours:#x} in the EEPROM: "
-                "the EEPROM may be of another firmware"
-            )
+            station.notes.append(text(code, reported=f"{reported:#x}", eeprom=f"{ours:#x}"))
 
 
 def _try_read(station: Station, index: int, subindex: int) -> Steps[bytes | None]:

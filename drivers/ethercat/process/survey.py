@@ -33,7 +33,7 @@ class SurveyedStation:
     distributed_clock: bool
     clock_ahead_ns: int | None
     ports: tuple[Port, ...]
-    notes: tuple[str, ...]
+    notes: tuple[Text, ...]
 
     @property
     def state(self) -> str:
@@ -104,7 +104,7 @@ def _station(item: Message, ports: PortCounters | None) -> SurveyedStation:
     return SurveyedStation(
         **{name: value for name, value in item.items() if name not in taken},
         distributed_clock=item["dc"],
-        notes=tuple(item["notes"]),
+        notes=tuple(Text.from_wire(note) for note in item["notes"]),
         ports=() if ports is None else ports.ports,
     )
 

@@ -12,6 +12,7 @@ import pytest
 from drivers.canopen.link import CanopenLink
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed, NotAsked, Rejected
 from drivers.link import Address, LinkEvent
+from drivers.texts.message import text
 from drivers.virtual.wires.canopen import CanopenNode
 from tests.wire.canopen.conftest import Bench, until
 from tests.wire.canopen.small_device import SmallDevice
@@ -204,7 +205,7 @@ async def test_two_nodes_with_one_number_are_noticed_by_a_scan(
 ) -> None:
     bench.wire.do(lambda: bench.wire.nodes.append(CanopenNode(SmallDevice(), 5, time.monotonic_ns)))
     found = await link.scan(lambda *_: None, [4, 5])
-    assert "2 nodes answer as number 5" in found[0].notes[0]
+    assert found[0].notes[0] == text("canopen.note-same-number", node_count=2, node=5)
 
 
 async def test_two_nodes_with_one_number_are_noticed_in_operation(
@@ -217,7 +218,7 @@ async def test_two_nodes_with_one_number_are_noticed_in_operation(
     for _ in range(4):
         await link.read(5, STATUS)
     await until(lambda: any("two nodes answer as number 5" in e.text.words() for e in events))
-    assert link.quality(5).state == "two nodes have this number"
+    assert link.quality(5).state == text("canopen.state-same-number")
 
 
 async def test_a_restart_is_noticed(bench: Bench, link: CanopenLink) -> None:

@@ -25,6 +25,7 @@ from drivers.canopen.url import INTERFACES, parse_canopen_url
 from drivers.errors import LinkLost, NotAllowed, OutOfRange, Rejected
 from drivers.halt import HaltCause, Halted
 from drivers.link import Address, CyclicSignal
+from drivers.texts.message import text
 from drivers.virtual.wires.can_wire import CanWire
 from drivers.virtual.wires.slcan import SlcanSide
 
@@ -203,9 +204,9 @@ def test_answers_that_nobody_asked_for_are_two_nodes_only_while_they_come() -> N
     assert "two nodes answer as number 5" in reported.text.words()
     assert watch.stray_answer(5, 50.0) is None, "reported once"
     watch.overdue(100.0)
-    assert record.conflict == "two nodes have this number"
+    assert record.conflict == text("canopen.state-same-number")
     watch.overdue(110.1)
-    assert record.conflict == "", "none for a minute"
+    assert record.conflict is None, "none for a minute"
     assert watch.stray_answer(5, 111.0) is None
     assert watch.stray_answer(5, 112.0) is not None, "reported again"
 

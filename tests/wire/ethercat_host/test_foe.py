@@ -83,7 +83,7 @@ class Loading:
     async def works(self) -> None:
         """The drive is in PREOP and its mailboxes are those of PREOP again."""
         assert await self.bus.link.read(1, STATUS) == b"\x50\x02"
-        await until(lambda: "PREOP" in self.bus.link.quality(1).state, 30.0)
+        await until(lambda: "PREOP" in str(self.bus.link.quality(1).state), 30.0)
 
 
 @pytest.fixture

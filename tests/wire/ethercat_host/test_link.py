@@ -18,6 +18,7 @@ from drivers.errors import Busy, DriveError, LinkLost, LinkTimeout, NotAllowed, 
 from drivers.ethercat.link import EthercatLink
 from drivers.ethercat.wire.al_status import AlState
 from drivers.link import Address
+from drivers.texts.message import prose, text
 from drivers.virtual.wires.netns import Namespace, child_environment
 from tests.support.machine import OwnTime
 from tests.wire.ethercat_host.conftest import Rig, repeated, until
@@ -45,9 +46,9 @@ async def test_scan_tells_identity_place_and_state(rig: Rig) -> None:
         assert (first.vendor_id, first.product_code, first.revision) == (0xABCD, 0x1234, 0x10002)
         assert first.serial == 77, "1018:04 goes before the EEPROM"
         assert first.name == "DICT-1 drive"
-        assert first.state == "PREOP"
-        assert first.notes[0] == "connected behind the computer"
-        assert second.notes[0] == "connected behind station 1, port 1"
+        assert first.state == prose("PREOP")
+        assert first.notes[0] == text("ethercat.note-behind-computer")
+        assert second.notes[0] == text("ethercat.note-behind-station", station=1, port=1)
         assert steps == [0.5, 1.0]
         only = await bus.link.scan(quiet, stations=[2])
         assert [f.station for f in only] == [2]
@@ -237,7 +238,7 @@ async def test_a_heap_of_late_frames_is_never_taken_for_answers(rig: Rig) -> Non
             with contextlib.suppress(DriveError):
                 await bus.link.read(1, STATUS)
         rig.do("peace")
-        await until(lambda: not bus.link.quality(1).state.startswith("no answer"), 30.0)
+        await until(lambda: bus.link.quality(1).state != text("link.no-answer"), 30.0)
         for number in range(1, 20):
             value = number.to_bytes(2, "little")
             await bus.link.write(1, RECORD[1], value)

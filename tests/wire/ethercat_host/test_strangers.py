@@ -22,6 +22,7 @@ from drivers.ethercat.link import EthercatLink
 from drivers.ethercat.process.station import Station, identify
 from drivers.ethercat.wire.steps import Read, Steps, Write
 from drivers.link import Address, CyclicSignal, Envelope, Trajectory
+from drivers.texts.message import prose
 from drivers.virtual.wires.netns import Namespace
 from profiles.schema import PdoSet, PdoSpec, Profile
 from tests.wire.ethercat_host.conftest import Bus, until
@@ -75,12 +76,12 @@ async def test_couplers_and_plain_slaves_share_the_segment_with_a_drive(bus: Bus
         coupler, outputs, servo, *_ = await bus.link.scan(lambda _s, _t: None)
         assert [f.vendor_id for f in (coupler, outputs, servo)] == [0xBAD] * 3
         for plain in (coupler, outputs):
-            assert any("no mailbox" in note for note in plain.notes)
+            assert any(note.code == "ethercat.note-no-mailbox" for note in plain.notes)
             assert plain.serial is None
         assert servo.name == "ODD-1 drive"
         assert servo.serial == 0xC0FFEE
-        assert servo.state == "PREOP", "the error it was left with has been acknowledged"
-        assert "connected behind station 2" in servo.notes[0]
+        assert servo.state == prose("PREOP"), "the error it was left with has been acknowledged"
+        assert servo.notes[0].params["station"] == 2
         with pytest.raises(NotAllowed, match="has no mailbox"):
             await bus.link.read(1, RECORD[0])
     finally:
@@ -144,7 +145,7 @@ async def test_a_drive_with_a_bare_eeprom_is_read_whole_and_moved_by_nobody(bus:
     try:
         bare = (await bus.link.scan(lambda _s, _t: None))[BARE - 1]
         assert (bare.name, bare.serial, bare.state) == ("ODD-1 drive", 0xC0FFEE, "PREOP")
-        assert any("checksum of its EEPROM is wrong" in note for note in bare.notes)
+        assert any(note.code == "ethercat.note-eeprom-checksum" for note in bare.notes)
         described = await bus.link.enumerate(BARE, lambda _s, _t: None)
         objects = {d.index: d for d in described if isinstance(d, ObjectInfo)}
         entries = {(d.index, d.subindex): d for d in described if isinstance(d, EntryDescription)}

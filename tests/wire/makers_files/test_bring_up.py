@@ -13,6 +13,7 @@ from drivers.cia402 import State
 from drivers.ethercat.exchange.mapping import plan_station
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Address, CyclicSignal, ScopeBlock
+from drivers.texts.message import prose
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import Namespace, unavailable
 from profiles.importer import import_file
@@ -55,9 +56,9 @@ async def brought(
         # A search that lost frames on a busy computer is made again, as the page offers.
         for _ in range(5):
             found = await link.scan(lambda _share, _text: None)
-            if [each.state for each in found] == ["PREOP"]:
+            if [each.state for each in found] == [prose("PREOP")]:
                 break
-        assert [each.state for each in found] == ["PREOP"], found
+        assert [each.state for each in found] == [prose("PREOP")], found
         yield link, segment
     finally:
         await link.close()

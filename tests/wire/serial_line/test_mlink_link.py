@@ -14,6 +14,7 @@ from drivers.link import Address, Found, LinkQuality
 from drivers.mlink.link import MlinkLayout, ambiguous_objects, register_of
 from drivers.modbus.line_url import line_settings
 from drivers.modbus.link import RegisterLink
+from drivers.texts.message import text
 from drivers.urls import parse_url
 from drivers.virtual.wires.modbus import Trouble
 from profiles.schema import DataType
@@ -158,11 +159,11 @@ async def test_scan_identifies_what_answers(port: Path, opened: OpenLink) -> Non
         found = await link.scan(lambda fraction, _text: said.append(fraction), range(1, 6))
     assert found[0] == Found(
         2, vendor_id=0x954, product_code=7, revision=2, serial=42,
-        state="status word 0x0250", notes=("mode of operation -1",),
+        state=text("mlink.state", status="0x0250"), notes=(text("mlink.note-mode", mode=-1),),
     )  # fmt: skip
     assert found[1].station == 4
     assert found[1].vendor_id is None
-    assert "identity object 1018h is not readable" in found[1].notes[0]
+    assert found[1].notes[0].code == "mlink.note-no-identity"
     assert said == sorted(said)
     assert said[-1] == 1.0
 
@@ -309,4 +310,4 @@ async def test_quality_before_opening() -> None:
     )
     quality: LinkQuality = link.quality()
     assert not quality.connected
-    assert quality.state == "no adapter"
+    assert quality.state == text("link.no-adapter")

@@ -12,6 +12,7 @@ from drivers.link import Address, Found
 from drivers.modbus.framing import EXCEPTION_TEXTS
 from drivers.modbus.layout import TableLayout
 from drivers.modbus.link import RegisterLink, _again
+from drivers.texts.message import text
 from drivers.virtual.wires.modbus import Trouble
 from profiles.schema import DataType
 
@@ -113,8 +114,8 @@ async def test_scan_takes_a_refusal_for_a_drive(port: Path, opened: OpenLink) ->
         found = await link.scan(lambda *_: None, (1, 2, 3))
     assert [f.station for f in found] == [1, 2]
     assert isinstance(found[0], Found)
-    assert "refuses register 0" in found[0].notes[0]
-    assert "register 0 holds 5" in found[1].notes[0]
+    assert found[0].notes[0] == text("modbus.note-register-refused")
+    assert found[1].notes[0] == text("modbus.note-register-holds", value=5)
 
 
 def test_texts_of_the_manual() -> None:

@@ -5823,6 +5823,11 @@ export interface components {
             problem: string;
             /** Real Time */
             real_time: string[];
+            /**
+             * Real Time Messages
+             * @description of real_time
+             */
+            real_time_messages: components["schemas"]["MessageInfo"][];
             /** State */
             state: string;
             /** Stations */
@@ -6260,6 +6265,11 @@ export interface components {
             matches: components["schemas"]["ProfileMatch"][];
             /** Name */
             name: string;
+            /**
+             * Note Messages
+             * @description of notes
+             */
+            note_messages: components["schemas"]["MessageInfo"][];
             /** Notes */
             notes: string[];
             /** Product Code */
@@ -6270,6 +6280,11 @@ export interface components {
             serial: number | null;
             /** State */
             state: string;
+            /**
+             * @description of state
+             * @default null
+             */
+            state_message: components["schemas"]["MessageInfo"] | null;
             /** Station */
             station: number;
             /** Url */
@@ -10287,6 +10302,8 @@ export interface components {
             round_trip_ms: number | null;
             /** State */
             state: string;
+            /** @description of state */
+            state_message?: components["schemas"]["MessageInfo"] | null;
             /** Timeouts */
             timeouts: number;
             /** Transactions */
@@ -11628,6 +11645,11 @@ export interface components {
             foe: boolean;
             /** Name */
             name: string;
+            /**
+             * Note Messages
+             * @description of notes
+             */
+            note_messages: components["schemas"]["MessageInfo"][];
             /** Notes */
             notes: string[];
             /** Ports */

@@ -1,7 +1,10 @@
 computer_ethercat-not-available-servodeck = EtherCAT on { $value } is not available: servodeck runs EtherCAT on Linux only
     .remedy = run servodeck on a computer with Linux at the machine and open its page from here; Modbus, MLink and CANopen by slcan work on this one
+computer_memory-not-locked = the system does not let this process lock its memory; CAP_IPC_LOCK or a larger memlock limit grants it
+computer_no-real-time = the system grants no real-time scheduling (SCHED_FIFO), so single cycles may be some milliseconds late on a busy computer; CAP_SYS_NICE or an rtprio limit grants it
 computer_not-available-looks-linux = { $what } is not available: it reads information that only Linux provides
     .remedy = run it on the computer with Linux at the machine
+computer_real-time-not-asked = real-time scheduling was not requested
 computer_serial-port-no-file = a serial port has no file descriptor on Windows
 computer_shared-memory-not-available = shared memory for { $value } is not available: servodeck runs EtherCAT on Linux only
     .remedy = run servodeck on a computer with Linux at the machine

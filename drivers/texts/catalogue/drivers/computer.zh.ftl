@@ -1,7 +1,10 @@
 computer_ethercat-not-available-servodeck = { $value } 上不能使用 EtherCAT：servodeck 仅在 Linux 上运行 EtherCAT
     .remedy = 请在机器旁的 Linux 计算机上运行 servodeck，并从此处打开其页面；本机可使用 Modbus、MLink 和 slcan 的 CANopen
+computer_memory-not-locked = 系统不允许本进程锁定内存；CAP_IPC_LOCK 或更大的 memlock 限值可授予该权限
+computer_no-real-time = 系统未授予实时调度（SCHED_FIFO），计算机繁忙时个别周期可能延迟数毫秒；CAP_SYS_NICE 或 rtprio 限值可授予该权限
 computer_not-available-looks-linux = { $what } 不可用：它读取 Linux 关于自身的信息
     .remedy = 请在机器旁装有 Linux 的计算机上运行
+computer_real-time-not-asked = 未请求实时调度
 computer_serial-port-no-file = Windows 上的串口没有文件描述符
 computer_shared-memory-not-available = 不能为 { $value } 使用共享内存：servodeck 仅在 Linux 上运行 EtherCAT
     .remedy = 请在机器旁的 Linux 计算机上运行 servodeck

@@ -6,3 +6,7 @@ mlink_no-object-mlink-reaches = { $address } is not an object: MLink reaches obj
     .remedy = name the object by index and subindex
 mlink_no-register-number-mlink = { NUM($index, format: "04X") }:{ NUM($subindex, format: "02X") } has no register number on MLink
     .remedy = use EtherCAT for this object
+mlink_note-mode = mode of operation { $mode }
+mlink_note-next-address = 2105h holds address { $address }: it takes effect at the next power-on
+mlink_note-no-identity = the identity object 1018h is not readable: confirm the drive's type
+mlink_state = status word { $status }

@@ -6,3 +6,7 @@ mlink_no-object-mlink-reaches = { $address } 不是对象：MLink 只能访问�
     .remedy = 请用索引和子索引指定对象
 mlink_no-register-number-mlink = { NUM($index, format: "04X") }:{ NUM($subindex, format: "02X") } 在 MLink 上没有寄存器号
     .remedy = 此对象请使用 EtherCAT
+mlink_note-mode = 操作模式 { $mode }
+mlink_note-next-address = 2105h 的地址为 { $address }：下次上电后生效
+mlink_note-no-identity = 标识对象 1018h 不可读：请确认驱动器型号
+mlink_state = 状态字 { $status }

@@ -22,6 +22,9 @@ modbus_no-serial-port = there is no serial port { $device }
 modbus_not-fit-16-bit = { $value } does not fit a 16-bit register
 modbus_not-open = { $url } is not open
     .remedy = connect the bus first
+modbus_note-no-identity = Modbus RTU has no identity: choose the drive's profile
+modbus_note-register-holds = register 0 holds { $value }
+modbus_note-register-refused = the station refuses register 0
 modbus_nothing-answered-settings = nothing answered at any of these settings
 modbus_parity-must-none-even = parity={ $value } must be N (none), E (even) or O (odd)
 modbus_register-holds-no = register { NUM($start, format: "#06x") } holds { $registers }h, which is no { $type }

@@ -22,6 +22,9 @@ modbus_no-serial-port = 没有串口 { $device }
 modbus_not-fit-16-bit = { $value } 超出 16 位寄存器范围
 modbus_not-open = { $url } 未打开
     .remedy = 请先连接总线
+modbus_note-no-identity = Modbus RTU 没有标识：请选择驱动器的描述文件
+modbus_note-register-holds = 寄存器 0 的值为 { $value }
+modbus_note-register-refused = 该站拒绝读取寄存器 0
 modbus_nothing-answered-settings = 所有这些设置下均无应答
 modbus_parity-must-none-even = parity={ $value } 须为 N（无）、E（偶）或 O（奇）
 modbus_register-holds-no = 寄存器 { NUM($start, format: "#06x") } 为 { $registers }h，不是 { $type }

@@ -100,7 +100,6 @@ export const bench = {
   'quality.state': ['State', '状态'],
   'quality.is.open': ['open', '已打开'],
   'quality.is.not open': ['not open', '未打开'],
-  'quality.is.no adapter': ['no adapter', '无适配器'],
   'quality.is.yes': ['yes', '是'],
   'quality.is.no': ['no', '否'],
   'quality.is.unknown': ['unknown', '未知'],

@@ -1,5 +1,6 @@
 import type { Quality } from '../../api/schema'
 import { known, useT } from '../../i18n'
+import { Said } from '../../widgets/Said'
 import { figures } from './figures'
 
 const COUNTERS = [
@@ -15,12 +16,17 @@ const COUNTERS = [
 /** Counters of a link since it was opened; what is wrong stands out. */
 export function QualityTable({ quality }: { quality: Quality }) {
   const t = useT()
-  const state = quality.state || (quality.connected ? 'open' : 'not open')
   return (
     <dl className="counters">
       <div>
         <dt>{t('quality.state')}</dt>
-        <dd>{known(t, 'quality.is', state)}</dd>
+        <dd>
+          {quality.state ? (
+            <Said message={quality.state_message} words={quality.state} />
+          ) : (
+            t(quality.connected ? 'quality.is.open' : 'quality.is.not open')
+          )}
+        </dd>
       </div>
       {COUNTERS.map((name) => (
         <div key={name} className={name !== 'transactions' && quality[name] > 0 ? 'warn-text' : ''}>

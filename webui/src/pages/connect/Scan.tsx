@@ -8,6 +8,7 @@ import { type T, useT } from '../../i18n'
 import { setJob, useDrives, useJob, useJobs } from '../../live/store'
 import { JobNote } from '../../widgets/JobNote'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { Said } from '../../widgets/Said'
 import { useAction } from '../../widgets/useAction'
 import { isSerial, LineSearch } from './LineSearch'
 import { NotListedButton } from './NotListed'
@@ -161,12 +162,15 @@ function Found({ found }: { found: FoundDrive }) {
     <div className="found">
       <p>
         <strong>{t('connect.station', { station: found.station })}</strong>{' '}
-        {found.name || t('connect.nameless')} <span className="dim">{found.state}</span>
+        {found.name || t('connect.nameless')}{' '}
+        <span className="dim">
+          <Said message={found.state_message} words={found.state} />
+        </span>
       </p>
       <p className="dim num">{identity(t, found) || t('connect.noIdentity')}</p>
-      {found.notes.map((note) => (
+      {found.notes.map((note, place) => (
         <p key={note} className="dim">
-          {note}
+          <Said message={found.note_messages[place]} words={note} />
         </p>
       ))}
       {used ? (

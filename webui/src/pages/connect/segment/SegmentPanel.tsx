@@ -4,6 +4,7 @@ import { useState } from 'react'
 import { api, ask } from '../../../api/client'
 import { useT } from '../../../i18n'
 import { ProblemNote } from '../../../widgets/ProblemNote'
+import { Said } from '../../../widgets/Said'
 import { useAction } from '../../../widgets/useAction'
 import { Lateness } from './Lateness'
 import { places } from './layout'
@@ -80,8 +81,10 @@ export function SegmentPanel({ url }: { url: string }) {
         <details>
           <summary>{t('segment.realTime')}</summary>
           <ul>
-            {segment.real_time.map((note) => (
-              <li key={note}>{note}</li>
+            {segment.real_time.map((note, place) => (
+              <li key={note}>
+                <Said message={segment.real_time_messages[place]} words={note} />
+              </li>
             ))}
           </ul>
         </details>

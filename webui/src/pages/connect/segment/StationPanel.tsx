@@ -6,6 +6,7 @@ import { useT } from '../../../i18n'
 import { setJob } from '../../../live/store'
 import { JobNote } from '../../../widgets/JobNote'
 import { ProblemNote } from '../../../widgets/ProblemNote'
+import { Said } from '../../../widgets/Said'
 import { useAction } from '../../../widgets/useAction'
 import { Eeprom } from './Eeprom'
 
@@ -74,9 +75,9 @@ export function StationPanel({ url, station }: { url: string; station: SegmentSt
           </tbody>
         </table>
       </div>
-      {station.notes.map((note) => (
+      {station.notes.map((note, place) => (
         <p key={note} className="dim">
-          {note}
+          <Said message={station.note_messages[place]} words={note} />
         </p>
       ))}
       <Alias key={station.station} url={url} station={station} />

@@ -39,6 +39,7 @@ const station = (
   ports: [0, 1, 2, 3].map((each) => port(each)),
   findings: [],
   notes: [],
+  note_messages: [],
   foe: false,
   ...change,
 })
