@@ -144,7 +144,7 @@ async def test_a_drive_with_a_bare_eeprom_is_read_whole_and_moved_by_nobody(bus:
     await bus.link.open()
     try:
         bare = (await bus.link.scan(lambda _s, _t: None))[BARE - 1]
-        assert (bare.name, bare.serial, bare.state) == ("ODD-1 drive", 0xC0FFEE, "PREOP")
+        assert (bare.name, bare.serial, bare.state) == ("ODD-1 drive", 0xC0FFEE, prose("PREOP"))
         assert any(note.code == "ethercat.note-eeprom-checksum" for note in bare.notes)
         described = await bus.link.enumerate(BARE, lambda _s, _t: None)
         objects = {d.index: d for d in described if isinstance(d, ObjectInfo)}
