@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from backend.commands.tools import lines_of
-from backend.tools.gantry.result import GantryResult
 from backend.tools.gantry.run import TOOL
 from backend.tools.tool import Run
 from drivers.cia402 import State
 from drivers.errors import MotionHalted, NotAllowed, OutOfRange
 from drivers.halt import HaltCause
+from drivers.virtual.defects import OUT_OF_SQUARE_RAD
 from drivers.virtual.mechanics import gantry_response
 from drivers.virtual.wires.netns import Namespace
 from tests.unit.analysis.gantry_plant import Gantry
@@ -29,6 +29,7 @@ from tests.virtual.tools.set_ups.gantry import (
     RATED,
     SQUARE,
     Two,
+    codes,
     gantry,
     measured,
     motor,
@@ -36,10 +37,6 @@ from tests.virtual.tools.set_ups.gantry import (
 )
 
 pytestmark = pytest.mark.timeout(600)
-
-
-def codes(found: GantryResult) -> list[str]:
-    return [each.code for each in found.findings]
 
 
 def between(found: Any, truth: float) -> bool:
@@ -95,18 +92,21 @@ async def test_a_square_gantry(namespace: Namespace) -> None:
 
 async def test_a_gantry_out_of_square_is_named_with_its_way(namespace: Namespace) -> None:
     """Brakes hold the beam where both motors show the same, which is not where it rests."""
-    spec = SQUARE.model_copy(update={"square_error_rad": 0.12})
-    async with gantry(namespace, spec, brake=True) as two:
+    spec = SQUARE.model_copy(update={"square_error_rad": OUT_OF_SQUARE_RAD})
+    async with gantry(namespace, SQUARE, brake=True, defects=("out_of_square",)) as two:
         found = await measured(two)
     stiffness = static_stiffness(spec)
     # Axis 1 would rest ahead of axis 2, so that it is behind where both show the same.
     assert codes(found)[0] == "out_of_square"
-    assert between(found.fight_percent, -100 * stiffness * 0.12 / RATED)
+    assert between(found.fight_percent, -100 * stiffness * OUT_OF_SQUARE_RAD / RATED)
     assert found.out_of_square_rev is not None
-    assert between(found.out_of_square_rev, -0.12 / math.tau)
+    assert between(found.out_of_square_rev, -OUT_OF_SQUARE_RAD / math.tau)
     assert found.out_of_square_mm is not None
-    assert between(found.out_of_square_mm, -0.12 / math.tau * 10.0)
-    assert "Axis 2 is ahead of axis 1" in "\n".join(lines_of(TOOL, found))
+    assert between(found.out_of_square_mm, -OUT_OF_SQUARE_RAD / math.tau * 10.0)
+    words = "\n".join(lines_of(TOOL, found))
+    assert "The gantry is out of square" in words
+    assert "Axis 2 is ahead of axis 1" in words
+    assert "Correct the reference (homing offset) of one axis by that" in words
 
 
 async def stands(two: Two) -> None:

@@ -25,17 +25,14 @@ from drivers.virtual.firmware.factory import make_device
 from profiles.loader import load_profile
 from tests.virtual.tools.direct import STATION, DirectLink, direct
 from tests.virtual.tools.rig import At, settings_of, silent
-from tests.virtual.tools.set_ups.shaping import ASKED, ROUGH, FloatArray, Load, arm, shape
-
-
-def zero_crossings_hz(speed: FloatArray) -> float:
-    """Frequency of what is left of a signal, by its mean spacing of rising crossings at 1 kHz."""
-    about = speed - np.mean(speed)
-    rising = np.flatnonzero((about[:-1] < 0.0) & (about[1:] >= 0.0)).astype(float)
-    exact = rising + about[rising.astype(int)] / (
-        about[rising.astype(int)] - about[rising.astype(int) + 1]
-    )
-    return 1000.0 / float(np.mean(np.diff(exact)))
+from tests.virtual.tools.set_ups.shaping import (
+    ASKED,
+    ROUGH,
+    Load,
+    arm,
+    shape,
+    zero_crossings_hz,
+)
 
 
 @pytest.mark.parametrize(

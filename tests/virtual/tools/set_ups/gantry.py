@@ -21,6 +21,7 @@ from backend.tools.measuring.temporary import make_effective
 from backend.tools.sweep.profile_speed import prepared
 from backend.tools.tool import Run
 from drivers.ethercat.link import EthercatLink
+from drivers.virtual.defects import Defect
 from drivers.virtual.mechanics import GantrySpec, MechanicsSpec
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import Namespace
@@ -76,15 +77,18 @@ class Two:
 
 @asynccontextmanager
 async def gantry(
-    namespace: Namespace, spec: GantrySpec = SQUARE, *, brake: bool = False
-) -> AsyncIterator[Two]:
+    namespace: Namespace, spec: GantrySpec = SQUARE, *, brake: bool = False,
+    defects: tuple[Defect, ...] = (),
+) -> AsyncIterator[Two]:  # fmt: skip
+    """The beam between both drives; ``defects`` are those that the first axis has in the file."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "bench.json"
         mechanics = motor(brake).model_dump(exclude_defaults=True)
-        axes = [
+        axes: list[dict[str, Any]] = [
             {"name": name, "drive": "mms7", "on": URL, "station": n, "mechanics": mechanics}
             for n, name in enumerate(spec.axes, 1)
         ]
+        axes[0]["defects"] = list(defects)
         bench = {"axis": axes, "gantry": [spec.model_dump(mode="json")]}
         file.write_text(json.dumps(bench), "utf-8")
         arguments = [
@@ -129,3 +133,7 @@ async def measured(two: Two, asked: GantrySettings = ASKED, **more: Any) -> Gant
 def static_stiffness(spec: GantrySpec) -> float:
     joints = spec.joint_stiffness_nm_per_rad / 2
     return joints * spec.yaw_stiffness_nm_per_rad / (joints + spec.yaw_stiffness_nm_per_rad)
+
+
+def codes(found: GantryResult) -> list[str]:
+    return [each.code for each in found.findings]

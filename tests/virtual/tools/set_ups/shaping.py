@@ -90,3 +90,13 @@ async def shape(
 
 
 ROUGH = {"coulomb": 0.03, "backlash": 0.002, "second_hz": 60.0}
+
+
+def zero_crossings_hz(speed: FloatArray) -> float:
+    """Frequency of what is left of a signal, by its mean spacing of rising crossings at 1 kHz."""
+    about = speed - np.mean(speed)
+    rising = np.flatnonzero((about[:-1] < 0.0) & (about[1:] >= 0.0)).astype(float)
+    exact = rising + about[rising.astype(int)] / (
+        about[rising.astype(int)] - about[rising.astype(int) + 1]
+    )
+    return 1000.0 / float(np.mean(np.diff(exact)))
