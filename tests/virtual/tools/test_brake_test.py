@@ -12,12 +12,14 @@ from collections.abc import Mapping
 
 import pytest
 
+from backend.commands.tools import lines_of
 from backend.tools.brake.run import TOOL
 from backend.tools.brake.settings import BrakeSettings
 from backend.tools.sweep import profile_speed
 from backend.tools.tool import Run
 from drivers.cia402 import State
 from drivers.errors import Busy, NotAllowed, OutOfRange
+from drivers.virtual.defects import SLIPS, planted
 from drivers.virtual.firmware.kernel import layout as k
 from tests.virtual.tools.can_rig import can_bench, incremental
 from tests.virtual.tools.direct import direct
@@ -62,11 +64,15 @@ async def test_a_good_brake_holds_and_its_windup_is_no_slip(
 async def test_a_worn_brake_is_found_and_the_torque_is_gone_in_time(
     drive: str, asked: BrakeSettings, settings: Mapping[str, int]
 ) -> None:
-    worn_nm = 0.6 * RATED_NM
-    spec = braked(worn_nm, windup_rev=WINDUP_REV, supplied=asked is ASKED)
+    worn_nm = SLIPS * RATED_NM
+    good = braked(2.0 * RATED_NM, windup_rev=WINDUP_REV, supplied=asked is ASKED)
+    spec = planted(good, "brake_slips")
     found, _ = await on(drive, spec, asked, settings)
     truth = 100.0 * (worn_nm + COULOMB_NM) / RATED_NM
     assert found.verdict == "slipped"
+    words = lines_of(TOOL, found)[0]
+    assert words.startswith(f"The brake slipped at {found.torque_percent:.3g} %")
+    assert "secure the load, and have the brake repaired or replaced" in words
     assert found.torque_percent == pytest.approx(truth, rel=0.05)
     assert len(found.ways) == 2
     for way in found.ways:

@@ -12,11 +12,13 @@ from typing import Any
 
 import pytest
 
+from backend.commands.tools import lines_of
 from backend.tools.first_power.result import FirstPowerResult
 from backend.tools.first_power.run import TOOL
 from backend.tools.first_power.settings import FirstPowerSettings
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
+from drivers.virtual.defects import planted
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.settings import GainSet, LoopSettings
@@ -71,15 +73,22 @@ async def test_a_motor_that_is_connected_right(drive: str) -> None:
 
 
 async def test_shifted_phases_turn_the_shaft_against_the_torque() -> None:
-    found, _ = await on("mms7", motor(PhaseSpec(order="shifted")))
+    found, _ = await on("mms7", planted(motor(), "phases_shifted"))
     assert finding(found, "phases") == ("failed", "reversed")
     assert found.verdict == "failed"
+    words = "\n".join(lines_of(TOOL, found))
+    assert "the phases are shifted" in words
+    assert "Do not close a loop over this motor yet" in words
+    assert "Turn the shaft by hand to learn which it is" in words
 
 
 @pytest.mark.parametrize(("drive", "at_rev"), [("mms7", 0.0), ("ep3e", 0.05), ("r6l", 0.025)])
 async def test_exchanged_phases_lock_the_shaft(drive: str, at_rev: float) -> None:
-    found, _ = await on(drive, motor(PhaseSpec(order="exchanged")), at_rev=at_rev)
+    found, _ = await on(drive, planted(motor(), "phases_exchanged"), at_rev=at_rev)
     assert finding(found, "phases") == ("failed", "locks")
+    words = "\n".join(lines_of(TOOL, found))
+    assert "Two motor phases are exchanged" in words
+    assert "Exchange two phases or invert the feedback, and repeat" in words
 
 
 async def test_where_exchanged_phases_make_no_torque_the_next_step_is_named() -> None:
@@ -90,7 +99,7 @@ async def test_where_exchanged_phases_make_no_torque_the_next_step_is_named() ->
 
 
 async def test_an_inverted_encoder_that_commutates_locks_too() -> None:
-    found, _ = await on("m6l", motor(inverted=True))
+    found, _ = await on("m6l", planted(motor(), "feedback_inverted"))
     assert finding(found, "phases") == ("failed", "locks")
 
 
@@ -101,10 +110,13 @@ async def test_a_wrong_angle_beyond_a_quarter_turn_reverses_the_torque() -> None
 
 async def test_a_hand_turn_tells_an_inverted_encoder_from_shifted_phases() -> None:
     hall = PhaseSpec(commutation="hall")
-    found, _ = await by_hand(motor(hall, inverted=True), 1.0, HAND)
+    found, _ = await by_hand(planted(motor(hall), "feedback_inverted"), 1.0, HAND)
     assert finding(found, "counts") == ("passed", "ok")
     assert finding(found, "direction") == ("failed", "backwards")
     assert finding(found, "phases") == ("failed", "feedback_inverted")
+    words = "\n".join(lines_of(TOOL, found))
+    assert "turning forwards counts down" in words
+    assert "invert the feedback in the drive" in words
     found, _ = await by_hand(motor(PhaseSpec(order="shifted")), 1.01, HAND)
     assert finding(found, "direction") == ("passed", "ok")
     assert finding(found, "phases") == ("failed", "phases_reversed")
@@ -127,9 +139,13 @@ async def test_wrong_counts_are_found_before_anything_is_energised(share: float)
 
 
 async def test_a_closed_brake_moves_nothing() -> None:
-    found, _ = await on("r6l", motor(brake=True))
+    found, _ = await on("r6l", planted(motor(), "brake_closed"))
     assert finding(found, "brake") == ("open", "not_seen")
     assert finding(found, "phases") == ("open", "no_motion")
+    assert found.verdict == "incomplete"
+    words = "\n".join(lines_of(TOOL, found))
+    assert "The brake is closed" in words
+    assert "Listen whether the brake opens" in words
 
 
 async def test_nothing_moves_without_a_statement_of_what_hangs() -> None:

@@ -11,6 +11,7 @@ from backend.health.compare import compare
 from backend.health.records import HealthRecords
 from backend.health.words import message_of
 from backend.store.database import Store
+from drivers.virtual.defects import LOOSE, WORN, planted
 from tests.virtual.tools.set_ups.health import (
     ASKED,
     AXIS,
@@ -30,12 +31,12 @@ async def test_a_loose_coupling_and_a_worn_belt_are_found(tmp_path: Path) -> Non
     runs = records.add(AXIS, ASKED, healthy.rounds, {"a.sdmeas": "0" * 64}, "Ann")
     records.sign(AXIS.key, runs, "Ann")
 
-    loose = await checked(axis_of(stiffness=0.7), 2)
+    loose = await checked(planted(axis_of(), "coupling_loose"), 2)
     records.add(AXIS, ASKED, loose.rounds, {"b.sdmeas": "1" * 64}, "Ben")
     found = changed(records.condition(AXIS).findings)
     records._store.close()
     assert set(found) == {"resonance 1"}, "friction is what it was"
-    assert found["resonance 1"].change == pytest.approx(np.sqrt(0.7) - 1, abs=0.02)
+    assert found["resonance 1"].change == pytest.approx(np.sqrt(LOOSE) - 1, abs=0.02)
     words = message_of(found["resonance 1"])
     assert "as with a stiffness changed by -" in words.words("en")
     step = words.remedy()
@@ -43,11 +44,11 @@ async def test_a_loose_coupling_and_a_worn_belt_are_found(tmp_path: Path) -> Non
     assert "check the coupling" in step.words("en")
     assert "联轴器" in step.words("zh")
 
-    worn = await checked(axis_of(friction=1.2), 2, response=False)
+    worn = await checked(planted(axis_of(), "belt_worn"), 2, response=False)
     found = changed(compare(healthy.rounds, worn.rounds))
     assert set(found) == {"friction 1"}
     assert found["friction 1"].direction == "higher"
-    assert found["friction 1"].change == pytest.approx(0.2, abs=0.04)
+    assert found["friction 1"].change == pytest.approx(WORN - 1.0, abs=0.04)
     step = message_of(found["friction 1"]).remedy()
     assert step is not None
     assert "belt" in step.words("en")

@@ -97,6 +97,7 @@ printed_own-certificate = {"  "}the certificate is the station's own; compare it
 printed_parameters-in-file = { $file }: { $count } parameters
 printed_parameters-of-list = { $file }: { $count } parameters, { $unused } lines not used
 printed_password-set = set
+printed_planted-defect = {"  "}{ $axis } has a planted defect: { $defect }
 printed_profile-checked = { $name }: { $parameters } parameters, { $faults } faults, { $findings } findings
 printed_profile-head = { $title } ({ $drive }), manual { $manual }
 printed_profile-imported = { $title }: { $count } parameters, { $summary }

@@ -94,6 +94,7 @@ printed_own-certificate = {"  "}证书由本站自行签发；请核对一次其
 printed_parameters-in-file = { $file }：{ $count } 个参数
 printed_parameters-of-list = { $file }：{ $count } 个参数，{ $unused } 行未使用
 printed_password-set = 已设置
+printed_planted-defect = {"  "}{ $axis } 已设置缺陷：{ $defect }
 printed_profile-checked = { $name }：{ $parameters } 个参数，{ $faults } 个故障，{ $findings } 处问题
 printed_profile-head = { $title }（{ $drive }），手册 { $manual }
 printed_profile-imported = { $title }：{ $count } 个参数，{ $summary }
