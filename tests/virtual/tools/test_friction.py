@@ -26,6 +26,7 @@ from tests.virtual.tools.set_ups.friction import (
     ASKED,
     FRICTION,
     RATED_NM,
+    RIPPLE,
     RIPPLED,
     SMOOTH,
     largest_error,
@@ -95,7 +96,9 @@ async def test_friction_without_stribeck_and_ripple_has_none() -> None:
         found = await mapped(b.axis, b.session)
     assert found.stribeck_percent is None
     assert {"stribeck_not_seen", "ripple_not_seen"} <= codes(found)
+    assert "compensation_in_controller" not in codes(found)
     assert found.harmonics == ()
+    assert found.compensation_csv() is None
     assert found.viscous_percent_per_rpm is not None
     # 3e-4 Nm·s/rad in % of 1.27 Nm per rpm.
     expected = 3e-4 * 2 * np.pi / 60.0 / RATED_NM * 100.0
@@ -174,6 +177,7 @@ async def test_kept_raw_data_give_the_same_map_and_lost_samples_do_not_bend_it()
         found = await _kept(b, kept)
     again = TOOL.reevaluate(kept["arrays"], kept["meta"])  # type: ignore[arg-type]
     assert again == found
+    compensates(found)
     with pytest.raises(ValueError, match="not the raw data"):
         TOOL.reevaluate({}, {})
 
@@ -193,6 +197,25 @@ async def test_kept_raw_data_give_the_same_map_and_lost_samples_do_not_bend_it()
     assert isinstance(found, FrictionResult)
     assert largest_error(found, RIPPLED) < 0.02
     assert {1, 24} <= {each.order_per_rev for each in found.harmonics} <= {1, 24, 48}
+
+
+def compensates(found: FrictionResult) -> None:
+    """The table takes the ripple of the mechanics away, by place and by sign."""
+    rows = [line.split(",") for line in str(found.compensation_csv()).splitlines()]
+    assert rows[0] == ["position_rev", "torque_percent", "forward_percent", "backward_percent"]
+    place, torque = np.array([[float(each) for each in row[:2]] for row in rows[1:]]).T
+    assert (place[0], place[-1]) == (
+        pytest.approx(0.5 / 360, abs=1e-6),
+        pytest.approx(1 - 0.5 / 360),
+    )
+    truth = (
+        RIPPLE.revolution_nm * np.sin(2 * np.pi * place + RIPPLE.phase_rad)
+        + RIPPLE.cogging_nm * np.sin(24 * 2 * np.pi * place + RIPPLE.phase_rad)
+        + RIPPLE.cogging_second_nm * np.sin(48 * 2 * np.pi * place + RIPPLE.phase_rad)
+    )
+    left = torque - 100.0 * truth / RATED_NM
+    assert np.std(left) < 0.15 * np.std(100.0 * truth / RATED_NM)
+    assert "compensation_in_controller" in codes(found)
 
 
 async def _kept(b: DirectBench, kept: dict[str, object]) -> FrictionResult:

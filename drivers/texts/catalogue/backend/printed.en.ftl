@@ -68,6 +68,7 @@ printed_motion-class = { $key } { $name }: { $motion }
 printed_motion-class-safe = { $key } { $name }: { $motion }, safe in motion
 printed_motion-classes = {"  "}motion classes: { $counts }; { $unclassified } not classified
 printed_moves-it-now = note: { $drive }: { $held_by } moves it now and has set temporary values
+printed_no-compensation-table = { $file } is not written: no ripple was found
 printed_no-drive-answers = no drive answers: check { $check }
 printed_no-fault-active = no fault is active
 printed_no-frame-back = {"  "}no frame came back: is a drive connected and switched on?

@@ -65,6 +65,7 @@ printed_motion-class = { $key } { $name }：{ $motion }
 printed_motion-class-safe = { $key } { $name }：{ $motion }，运动中可安全写入
 printed_motion-classes = {"  "}运动类别：{ $counts }；{ $unclassified } 个未分类
 printed_moves-it-now = 注意：{ $drive }：{ $held_by } 正在使其运动并已临时更改参数值
+printed_no-compensation-table = 未写入 { $file }：未发现转矩脉动
 printed_no-drive-answers = 没有驱动器应答：请检查 { $check }
 printed_no-fault-active = 当前没有故障
 printed_no-frame-back = {"  "}没有帧返回：驱动器是否已连接并上电？
