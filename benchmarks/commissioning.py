@@ -314,12 +314,14 @@ async def _item(name: str, small: bool) -> Figures:
 
 
 def measured(names: Iterable[str], small: bool = False) -> dict[str, Figures]:
-    """The figures of these items, each with an event loop of its own."""
+    """The figures of these items, each with an event loop of its own; printed as they come."""
     found = {}
     for name in names:
         begun = time.perf_counter()
         found[name] = asyncio.run(_item(name, small))
         print(f"{name}: {time.perf_counter() - begun:.0f} s", flush=True)
+        for each in found[name]:
+            print(f"  {each.name}: {each.value} ({each.aim or 'no aim'})", flush=True)
     return found
 
 
