@@ -84,7 +84,7 @@ COMMANDS = {
         "The axis moves.",
     ),
     "friction": (
-        "tools:friction",
+        "friction:friction",
         "Map friction over speed and torque over position, both directions. The axis moves.",
     ),
     "load-side": (

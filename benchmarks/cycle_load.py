@@ -14,8 +14,8 @@ from tests.support.warm_motor import RATED_RISE_K
 from tests.unit.analysis.test_duty import CASES, LOSSES_W, MOTORS, RATED_RPM, machine
 
 
-def main() -> int:
-    """Print a line for each case; 0 where all aims are met."""
+def judged() -> tuple[int, int, int]:
+    """Print a line for each case; cases in the stated range, not contradicted, and in all."""
     inside = right = cases = 0
     print(
         "motor          peak %   °C    too warm after      stated (min)         rise of permitted"
@@ -43,6 +43,12 @@ def main() -> int:
                 f"{name:13} {peak:7.0f} {ambient:4.0f} {_minutes(truth):>17}"
                 f" {_minutes(earliest):>10} … {_minutes(latest):6} {low:12.2f} … {high:.2f}"
             )
+    return inside, right, cases
+
+
+def main() -> int:
+    """0 where all aims are met."""
+    inside, right, cases = judged()
     return not print_verdict(
         [
             Aim(f"in the stated range: {inside} of {cases}", inside == cases),

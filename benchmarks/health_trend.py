@@ -79,8 +79,8 @@ def opened_s(url: str, folder: Path) -> tuple[float, float, int, int]:
     return taken, used, len(data), sum(len(each.runs) for each in found)
 
 
-def measured(name: str, url: str, folder: Path) -> bool:
-    """Fill a database, open its trend three times and print it; whether the aim is met."""
+def longest_s(name: str, url: str, folder: Path) -> float:
+    """Fill a database, open its trend three times and print it; the longest time in s."""
     store = Store(folder, url)
     fill(store)
     store.close()
@@ -90,26 +90,32 @@ def measured(name: str, url: str, folder: Path) -> bool:
         times.append(taken)
         print(f"{name}: {taken:.2f} s, of which the processor worked {used:.2f} s")
     print(f"{name}: {rounds} rounds of {AXES} axes, {size / 1e6:.1f} MB of JSON")
-    return max(times) < AIM_S
+    return max(times)
 
 
-def main() -> int:
-    """Both databases; 1 where the aim is missed."""
-    met = []
+def opened() -> dict[str, float]:
+    """The longest time in s of each database that is installed."""
+    times = {}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder)
-        met.append(measured("SQLite", f"sqlite:///{path / 'trend.db'}", path))
+        times["SQLite"] = longest_s("SQLite", f"sqlite:///{path / 'trend.db'}", path)
         programs = binaries()
         if programs is None:
             print("PostgreSQL is not installed: not measured")
         else:
             server = Postgres(programs)
             try:
-                met.append(measured("PostgreSQL", server.new_database(), path))
+                times["PostgreSQL"] = longest_s("PostgreSQL", server.new_database(), path)
             finally:
                 server.remove()
-    print(f"aim: under {AIM_S:g} s: {'met' if all(met) else 'missed'}")
-    return 0 if all(met) else 1
+    return times
+
+
+def main() -> int:
+    """Both databases; 1 where the aim is missed."""
+    met = max(opened().values()) < AIM_S
+    print(f"aim: under {AIM_S:g} s: {'met' if met else 'missed'}")
+    return 0 if met else 1
 
 
 if __name__ == "__main__":

@@ -76,6 +76,10 @@ def demo(
     host: Host = "127.0.0.1",
     port: Port = 8420,
     bench: Annotated[Path | None, typer.Option(help="bench file (TOML)")] = None,
+    defect: Annotated[
+        list[str] | None,
+        typer.Option(help='plant a defect, as "Feed screw=coupling_loose"; may be repeated'),
+    ] = None,
     config: Config = None,
     open_: Open = False,
     database: Database = None,
@@ -94,7 +98,12 @@ def demo(
         with tempfile.TemporaryDirectory(prefix="servodeck-") as folder:
             state = state_folder(config) if config else Path(folder) / "state"
             print_text("printed.starting-virtual")
-            with DemoBench(bench, Path(folder) / "wires", state / "nvm", steady=True) as drives:
+            wires = Path(folder) / "wires"
+            with DemoBench(
+                bench, wires, state / "nvm", steady=True, defects=defect or ()
+            ) as drives:
+                for axis, what in drives.planted:
+                    print_text("printed.planted-defect", axis=axis, defect=what)
                 for url, real in drives.addresses.items():
                     print_text("printed.wire-is", url=url, real=str(real))
                 for problem in drives.problems:

@@ -179,7 +179,6 @@ def _settings(tool: AnyTool, given: dict[str, Any]) -> Any:
 inertia = command_of(BY_KIND["inertia"])
 sweep = command_of(BY_KIND["sweep"])
 step = command_of(BY_KIND["step"])
-friction = command_of(BY_KIND["friction"])
 brake_test = command_of(BY_KIND["brake-test"])
 load_side = command_of(BY_KIND["load-side"])
 gantry = command_of(BY_KIND["gantry"])

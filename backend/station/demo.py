@@ -20,9 +20,10 @@ from drivers.computer.processes import SESSIONS
 from drivers.errors import DriveError, LinkLost, NotAllowed
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Found, Link
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 from drivers.urls import link_for
-from drivers.virtual.bench import STANDARD_BENCH, AxisSpec, BenchSpec, load_bench
+from drivers.virtual.bench import STANDARD_BENCH, AxisSpec, BenchSpec, load_bench, write_bench
+from drivers.virtual.defects import DEFECT_WORDS
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import Namespace, NamespaceUnavailable
 
@@ -42,6 +43,7 @@ class DemoBench:
 
     ``segment_options`` go to the EtherCAT segments (see drivers.virtual.wires.ethercat). With
     ``steady`` a cycle that comes late because the computer is busy is not late for the drives.
+    ``defects`` are planted in addition to those of the file, each as ``AXIS=DEFECT``.
 
     Use as a context manager; leaving it ends all virtual drives.
     """
@@ -54,11 +56,16 @@ class DemoBench:
         *,
         segment_options: Sequence[str] = (),
         steady: bool = False,
+        defects: Sequence[str] = (),
     ) -> None:
         self._steady = steady
         self._segment_options = tuple(segment_options)
         self._file = bench or STANDARD_BENCH
         self._folder = folder
+        if defects:
+            folder.mkdir(parents=True, exist_ok=True)
+            write_bench(self._file, defects, folder / "bench.json")
+            self._file = folder / "bench.json"
         self._nvm = nvm
         self._host: subprocess.Popen[str] | None = None
         self._asking = threading.Lock()  # an answer belongs to the command sent before it
@@ -76,6 +83,13 @@ class DemoBench:
     def names(self) -> dict[tuple[str, int], str]:
         """What the bench file calls its drives, by bus URL and station of each port."""
         return {port: axis.name for axis in self.spec.axis for port in axis.ports}
+
+    @property
+    def planted(self) -> tuple[tuple[str, Text], ...]:
+        """Names of axes, and the words of a defect that each of them has."""
+        return tuple(
+            (axis.name, DEFECT_WORDS[defect]) for axis in self.spec.axis for defect in axis.defects
+        )
 
     def start(self) -> None:
         """Start the virtual drives and wait until their wires exist.

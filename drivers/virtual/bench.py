@@ -11,6 +11,7 @@
     also_station = 1
     connected = true                   # the demo connects it at its start
     moves = {kind = "screw", lead_mm = 10}    # what the page shows it to move
+    defects = ["coupling_loose"]       # of drivers.virtual.defects
     [axis.mechanics.motor]
     …
 
@@ -24,13 +25,23 @@ from __future__ import annotations
 import json
 import tomllib
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts import limits
 from drivers.urls import parse_url
+from drivers.virtual.defects import (
+    DEFECTS,
+    OF_GANTRY,
+    OF_LOAD,
+    OUT_OF_SQUARE_RAD,
+    Defect,
+    planted,
+)
 from drivers.virtual.mechanics.gantry import GantrySpec
 from drivers.virtual.mechanics.rough import RoughTorqueSpec
 from drivers.virtual.mechanics.spec import MechanicsSpec, standard_mechanics
@@ -57,7 +68,9 @@ class AxisSpec(BaseModel):
     connected: bool = False
     #: What the shaft drives, as `backend.scales.gear_calculator.Mechanics` is written.
     moves: dict[str, str | int | float] = Field(default_factory=dict)
+    #: As the file has them; `load_bench` plants the defects.
     mechanics: MechanicsSpec = Field(default_factory=standard_mechanics)
+    defects: tuple[Defect, ...] = ()
 
     @property
     def serial_number(self) -> int:
@@ -101,12 +114,7 @@ def load_bench(path: Path = STANDARD_BENCH) -> BenchSpec:
         NotAllowed: the file is missing or wrong; the message names the field.
     """
     try:
-        text = path.read_text("utf-8")
-        content = json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
-        for axis in content.get("axis", []):
-            if isinstance(axis.get("mechanics"), str):
-                mechanics_file = path.parent / axis["mechanics"]
-                axis["mechanics"] = tomllib.loads(mechanics_file.read_text("utf-8"))
+        content = _content(path)
         bench = BenchSpec.model_validate(content)
     except ValidationError as error:
         first = error.errors()[0]
@@ -128,7 +136,67 @@ def load_bench(path: Path = STANDARD_BENCH) -> BenchSpec:
         _check_ports(axis, path)
     for gantry in bench.gantry:
         _check_gantry(gantry, bench, path)
-    return bench
+    return _with_defects(bench, path)
+
+
+def write_bench(path: Path, defects: Sequence[str], target: Path) -> None:
+    """Write a bench as JSON with further defects, each as ``AXIS=DEFECT``.
+
+    Raises:
+        NotAllowed: the file is missing or wrong, no axis has this name, or it is no defect.
+    """
+    load_bench(path)
+    content = _content(path)
+    axes = {axis["name"]: axis for axis in content["axis"]}
+    for each in defects:
+        name, _, defect = each.rpartition("=")
+        if name not in axes or defect not in DEFECTS:
+            raise NotAllowed(
+                "virtual.no-such-defect",
+                value=each,
+                limit=", ".join(DEFECTS),
+                path=str(path),
+                axes=", ".join(axes),
+            )
+        axes[name].setdefault("defects", []).append(defect)
+    target.write_text(json.dumps(content), "utf-8")
+
+
+def _content(path: Path) -> dict[str, Any]:
+    """What a bench file says, with the mechanics of files next to it."""
+    text = path.read_text("utf-8")
+    content: dict[str, Any] = json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
+    for axis in content.get("axis", []):
+        if isinstance(axis.get("mechanics"), str):
+            mechanics_file = path.parent / axis["mechanics"]
+            axis["mechanics"] = tomllib.loads(mechanics_file.read_text("utf-8"))
+    return content
+
+
+def _with_defects(bench: BenchSpec, path: Path) -> BenchSpec:
+    """The bench with the defects of its axes in their mechanics and beams."""
+    axes, beams = [], list(bench.gantry)
+    for axis in bench.axis:
+        mechanics = axis.mechanics
+        for defect in axis.defects:
+            if defect in OF_LOAD and not mechanics.load:
+                raise _no_place(path, axis.name, defect, "load")
+            mechanics = planted(mechanics, defect)
+            if defect in OF_GANTRY:
+                place = next((n for n, beam in enumerate(beams) if axis.name in beam.axes), None)
+                if place is None:
+                    raise _no_place(path, axis.name, defect, "gantry")
+                bent = {"square_error_rad": OUT_OF_SQUARE_RAD}
+                beams[place] = beams[place].model_copy(update=bent)
+        axes.append(axis.model_copy(update={"mechanics": mechanics}))
+    return bench.model_copy(update={"axis": tuple(axes), "gantry": tuple(beams)})
+
+
+def _no_place(path: Path, name: str, defect: Defect, lacks: str) -> NotAllowed:
+    return NotAllowed(
+        "virtual.bench-file-defect-needs", value=defect, path=str(path), drive_name=name,
+        lacks=lacks,
+    )  # fmt: skip
 
 
 def _wrong(path: Path, why: str) -> NotAllowed:

@@ -160,6 +160,9 @@ def evaluate(data: Map, settings: FrictionSettings, facts: AxisFacts) -> Frictio
     findings.append(Finding(code="standstill_not_measured", value=slowest, unit="rpm"))
     speeds, curve = model.curve()
     angle, forward, backward = _by_angle(slow if ripple is not None else [])
+    harmonics = _harmonics(own)
+    if harmonics:
+        findings.append(Finding(code="compensation_in_controller"))
     return FrictionResult(
         rated_torque_nm=facts.rated_torque_nm if facts.torque_known else None,
         points=tuple(points), curve_speed_rpm=speeds, curve_percent=curve,
@@ -167,9 +170,10 @@ def evaluate(data: Map, settings: FrictionSettings, facts: AxisFacts) -> Frictio
         viscous_percent_per_rpm=_estimate(model.value(2)),
         stribeck_percent=_estimate(model.value(3)) if model.reached else None,
         stribeck_speed_rpm=_estimate(model.stribeck_speed()) if model.reached else None,
-        load_percent=_estimate(model.value(0)), harmonics=_harmonics(own),
+        load_percent=_estimate(model.value(0)), harmonics=harmonics,
         ripple_speed_rpm=data.ripple_rpm if ripple is not None else None,
         ripple_angle_deg=angle, ripple_forward_percent=forward, ripple_backward_percent=backward,
+        compensation_percent=_compensation(harmonics, angle),
         findings=(Finding(code="mapped", value=float(len(points))), *findings),
         motion_s=data.position_rad.size / data.sample_rate_hz,
     )  # fmt: skip
@@ -390,6 +394,18 @@ def _harmonics(ripple: _Ripple | None) -> tuple[Harmonic, ...]:
             )
         )  # fmt: skip
     return tuple(sorted(found, key=lambda each: -each.amplitude_percent))
+
+
+def _compensation(harmonics: Sequence[Harmonic], angle_deg: Sequence[float]) -> tuple[float, ...]:
+    """The sum of the harmonics at these angles [n] in %; nothing without a harmonic."""
+    if not harmonics:
+        return ()
+    angle = np.radians(np.asarray(angle_deg))
+    total = np.zeros(angle.size)
+    for each in harmonics:
+        phase = np.radians(each.phase_deg)
+        total += each.amplitude_percent * np.sin(each.order_per_rev * angle + phase)
+    return tuple(float(each) for each in total)
 
 
 def _by_angle(

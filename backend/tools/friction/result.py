@@ -21,7 +21,10 @@ Code = Literal[
     "fastest_by_travel",
     "slowest_by_time",
     "model_misfit",
+    "compensation_in_controller",
 ]
+#: Of the table for a controller.
+COMPENSATION_COLUMNS = ("position_rev", "torque_percent", "forward_percent", "backward_percent")
 
 
 class _Part(BaseModel):
@@ -90,5 +93,30 @@ class FrictionResult(ToolResult):
     ripple_angle_deg: tuple[float, ...] = Field(description="[n] over one motor revolution")
     ripple_forward_percent: tuple[float | None, ...] = Field(description="[n] about its mean")
     ripple_backward_percent: tuple[float | None, ...] = Field(description="[n] about its mean")
+    compensation_percent: tuple[float, ...] = Field(
+        default=(),
+        description="[n] torque that the ripple needs, by its harmonics: for a controller that "
+        "adds it to the torque command; empty where no ripple was found",
+    )
     findings: tuple[Finding, ...]
     motion_s: float
+
+    def compensation_csv(self) -> str | None:
+        """The table over one motor revolution: place in rev, then torques in % of rated torque.
+
+        Both directions are about their mean, as measured; a field is empty where no sample is.
+        None without a ripple.
+        """
+        if not self.compensation_percent:
+            return None
+        columns = (
+            tuple(angle / 360.0 for angle in self.ripple_angle_deg),
+            self.compensation_percent,
+            self.ripple_forward_percent,
+            self.ripple_backward_percent,
+        )
+        rows = [
+            ",".join("" if each is None else f"{each:.6f}" for each in row)
+            for row in zip(*columns, strict=True)
+        ]
+        return "\n".join([",".join(COMPENSATION_COLUMNS), *rows, ""])

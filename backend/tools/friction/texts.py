@@ -88,6 +88,13 @@ TEXTS: dict[str, tuple[str, str]] = {
         "points.",
         "实测点与模型最多相差 {value} {unit}；曲线经过实测点。",
     ),
+    "finding.compensation_in_controller": (
+        "No object is known by which this drive compensates this ripple. The table over one motor "
+        "revolution can be saved (CSV) for a controller that adds it to the torque command.",
+        "未知该驱动器有补偿此转矩脉动的对象。可将电机一圈的补偿表保存为 CSV，"
+        "供能将其叠加到转矩指令的控制器使用。",
+    ),
+    "save_table": ("Save the compensation table (CSV)", "保存补偿表 (CSV)"),
 }
 _TURN_RPM = 9.549296585513721
 """rpm per rad/s."""

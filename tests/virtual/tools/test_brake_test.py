@@ -12,73 +12,29 @@ from collections.abc import Mapping
 
 import pytest
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
-from backend.tools.brake.result import BrakeResult
+from backend.commands.tools import lines_of
 from backend.tools.brake.run import TOOL
 from backend.tools.brake.settings import BrakeSettings
 from backend.tools.sweep import profile_speed
 from backend.tools.tool import Run
 from drivers.cia402 import State
 from drivers.errors import Busy, NotAllowed, OutOfRange
+from drivers.virtual.defects import SLIPS, planted
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.mechanics import MechanicsSpec
 from tests.virtual.tools.can_rig import can_bench, incremental
-from tests.virtual.tools.direct import DirectBench, direct
-from tests.virtual.tools.rig import At, mechanics, settings_of, silent
-
-RATED_NM, COULOMB_NM = 1.27, 0.03
-#: One revolution per the torque that a hub of this twist slips at.
-WINDUP_REV = 0.004
-ASKED = BrakeSettings(rated_torque_nm=RATED_NM, nothing_hangs=True, ramp_s=0.6)
-CUT = ASKED.model_copy(update={"brake_supply_cut": True})
-#: P01.17 and DO1's function: a brake, and the output for it (000:1360).
-M6L = {"2001:12": 1, "2003:10": 18}
-
-
-def braked(
-    holds_nm: float, *, windup_rev: float = 0.0, supplied: bool = True, gravity_nm: float = 0.0
-) -> MechanicsSpec:
-    spec = mechanics((1e-4, 60.0, 0.006), coulomb=COULOMB_NM, gravity=gravity_nm)
-    motor = spec.motor.model_copy(
-        update={
-            "brake": True, "brake_nm": holds_nm, "brake_output": True,
-            "brake_windup_rad": 2 * math.pi * windup_rev, "brake_supplied": supplied,
-        }
-    )  # fmt: skip
-    return spec.model_copy(update={"motor": motor})
-
-
-async def brake_of(
-    axis: Axis,
-    session: CyclicSession,
-    asked: BrakeSettings = ASKED,
-    kept: dict[str, object] | None = None,
-) -> BrakeResult:
-    """As a job or the command line does it; what is read from files is the same."""
-
-    def keep(name: str, arrays: Mapping[str, object], meta: dict[str, object]) -> None:
-        if kept is not None:
-            kept.update(name=name, arrays=arrays, meta=meta)
-
-    async with profile_speed.prepared(axis, session, asked.envelope, True):
-        found = await TOOL.run(Run(axis, session, silent(), keep), asked)
-    return BrakeResult.model_validate(found.model_dump(mode="json"))
-
-
-async def on(
-    drive: str,
-    spec: MechanicsSpec,
-    asked: BrakeSettings = ASKED,
-    settings: Mapping[str, int] | None = None,
-) -> tuple[BrakeResult, DirectBench]:
-    async with direct(spec, drive=drive, settings=settings) as bench:
-        mode = bench.axis.drive.require("mode")
-        before = await settings_of(bench.axis.drive, mode)
-        found = await brake_of(bench.axis, bench.session, asked)
-        assert await settings_of(bench.axis.drive, mode) == before
-        assert await bench.axis.state() is not State.OPERATION_ENABLED
-        return found, bench
+from tests.virtual.tools.direct import direct
+from tests.virtual.tools.rig import At, settings_of, silent
+from tests.virtual.tools.set_ups.brake import (
+    ASKED,
+    COULOMB_NM,
+    CUT,
+    M6L,
+    RATED_NM,
+    WINDUP_REV,
+    brake_of,
+    braked,
+    on,
+)
 
 
 @pytest.mark.parametrize(
@@ -108,11 +64,15 @@ async def test_a_good_brake_holds_and_its_windup_is_no_slip(
 async def test_a_worn_brake_is_found_and_the_torque_is_gone_in_time(
     drive: str, asked: BrakeSettings, settings: Mapping[str, int]
 ) -> None:
-    worn_nm = 0.6 * RATED_NM
-    spec = braked(worn_nm, windup_rev=WINDUP_REV, supplied=asked is ASKED)
+    worn_nm = SLIPS * RATED_NM
+    good = braked(2.0 * RATED_NM, windup_rev=WINDUP_REV, supplied=asked is ASKED)
+    spec = planted(good, "brake_slips")
     found, _ = await on(drive, spec, asked, settings)
     truth = 100.0 * (worn_nm + COULOMB_NM) / RATED_NM
     assert found.verdict == "slipped"
+    words = lines_of(TOOL, found)[0]
+    assert words.startswith(f"The brake slipped at {found.torque_percent:.3g} %")
+    assert "secure the load, and have the brake repaired or replaced" in words
     assert found.torque_percent == pytest.approx(truth, rel=0.05)
     assert len(found.ways) == 2
     for way in found.ways:

@@ -8,71 +8,35 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import pytest
 
-from backend.axis.cyclic_mode import keeping_mode
+from backend.commands.tools import lines_of
 from backend.tools.first_power.result import FirstPowerResult
 from backend.tools.first_power.run import TOOL
 from backend.tools.first_power.settings import FirstPowerSettings
-from backend.tools.tool import Run
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
+from drivers.virtual.defects import planted
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.settings import GainSet, LoopSettings
 from drivers.virtual.mechanics import MechanicsSpec, PhaseSpec
 from tests.virtual.tools.direct import DirectBench, direct
-from tests.virtual.tools.rig import At, mechanics, settings_of, silent
-
-RATED_NM = 1.27
-ASKED = FirstPowerSettings(rated_torque_nm=RATED_NM, nothing_hangs=True)
-RIGHT = PhaseSpec()
-#: Four pole pairs: exchanged phases have one sign over 1/16 rev.
-FAMILIES = ("mms7", "r6l", "ep3e", "m6l")
-
-
-def motor(
-    phases: PhaseSpec = RIGHT, *, inverted: bool = False, counted: float = 1.0,
-    brake: bool = False, gravity: float = 0.0,
-) -> MechanicsSpec:  # fmt: skip
-    spec = mechanics((1e-4, 60.0, 0.006), gravity=gravity)
-    encoder = spec.encoder.model_copy(update={"inverted": inverted, "counted_share": counted})
-    turned = spec.motor.model_copy(update={"brake": brake, "brake_supplied": not brake})
-    return spec.model_copy(update={"phases": phases, "encoder": encoder, "motor": turned})
-
-
-async def first_power(
-    bench: DirectBench,
-    asked: FirstPowerSettings = ASKED,
-    progress: At | None = None,
-    kept: dict[str, Any] | None = None,
-) -> FirstPowerResult:
-    """As a job or the command line does it; what is read from files is the same."""
-
-    def keep(name: str, arrays: Mapping[str, object], meta: dict[str, object]) -> None:
-        if kept is not None:
-            kept.update(name=name, arrays=arrays, meta=meta)
-
-    steps = silent() if progress is None else progress.progress
-    async with keeping_mode(bench.axis, bench.session):
-        found = await TOOL.run(Run(bench.axis, bench.session, steps, keep), asked)
-    return FirstPowerResult.model_validate(found.model_dump(mode="json"))
-
-
-def shaft(bench: DirectBench) -> VirtualAxis:
-    return bench.link.device.core.axis
-
-
-def shaft_rev(bench: DirectBench) -> float:
-    """The true angle of the shaft, whatever its encoder counts."""
-    return float(shaft(bench)._x[0]) / (2 * math.pi)
-
-
-def finding(result: FirstPowerResult, name: str) -> tuple[str, str]:
-    return next((each.status, each.finding) for each in result.checks if each.name == name)
+from tests.virtual.tools.rig import At, settings_of
+from tests.virtual.tools.set_ups.first_power import (
+    ASKED,
+    FAMILIES,
+    HAND,
+    RATED_NM,
+    by_hand,
+    finding,
+    first_power,
+    motor,
+    shaft,
+    shaft_rev,
+)
 
 
 async def on(
@@ -109,15 +73,22 @@ async def test_a_motor_that_is_connected_right(drive: str) -> None:
 
 
 async def test_shifted_phases_turn_the_shaft_against_the_torque() -> None:
-    found, _ = await on("mms7", motor(PhaseSpec(order="shifted")))
+    found, _ = await on("mms7", planted(motor(), "phases_shifted"))
     assert finding(found, "phases") == ("failed", "reversed")
     assert found.verdict == "failed"
+    words = "\n".join(lines_of(TOOL, found))
+    assert "the phases are shifted" in words
+    assert "Do not close a loop over this motor yet" in words
+    assert "Turn the shaft by hand to learn which it is" in words
 
 
 @pytest.mark.parametrize(("drive", "at_rev"), [("mms7", 0.0), ("ep3e", 0.05), ("r6l", 0.025)])
 async def test_exchanged_phases_lock_the_shaft(drive: str, at_rev: float) -> None:
-    found, _ = await on(drive, motor(PhaseSpec(order="exchanged")), at_rev=at_rev)
+    found, _ = await on(drive, planted(motor(), "phases_exchanged"), at_rev=at_rev)
     assert finding(found, "phases") == ("failed", "locks")
+    words = "\n".join(lines_of(TOOL, found))
+    assert "Two motor phases are exchanged" in words
+    assert "Exchange two phases or invert the feedback, and repeat" in words
 
 
 async def test_where_exchanged_phases_make_no_torque_the_next_step_is_named() -> None:
@@ -128,7 +99,7 @@ async def test_where_exchanged_phases_make_no_torque_the_next_step_is_named() ->
 
 
 async def test_an_inverted_encoder_that_commutates_locks_too() -> None:
-    found, _ = await on("m6l", motor(inverted=True))
+    found, _ = await on("m6l", planted(motor(), "feedback_inverted"))
     assert finding(found, "phases") == ("failed", "locks")
 
 
@@ -137,26 +108,15 @@ async def test_a_wrong_angle_beyond_a_quarter_turn_reverses_the_torque() -> None
     assert finding(found, "phases") == ("failed", "reversed")
 
 
-async def by_hand(
-    spec: MechanicsSpec, turned_rev: float, asked: FirstPowerSettings, drive: str = "r6l"
-) -> tuple[FirstPowerResult, DirectBench]:
-    """A person turns the shaft when asked to."""
-    async with direct(spec, drive=drive) as bench:
-        turn = At("by hand", lambda: shaft(bench).place(2 * math.pi * turned_rev), 0.06)
-        found = await first_power(bench, asked, turn)
-        assert turn.done
-        return found, bench
-
-
-HAND = ASKED.model_copy(update={"hand_turn": True, "hand_time_s": 10.0})
-
-
 async def test_a_hand_turn_tells_an_inverted_encoder_from_shifted_phases() -> None:
     hall = PhaseSpec(commutation="hall")
-    found, _ = await by_hand(motor(hall, inverted=True), 1.0, HAND)
+    found, _ = await by_hand(planted(motor(hall), "feedback_inverted"), 1.0, HAND)
     assert finding(found, "counts") == ("passed", "ok")
     assert finding(found, "direction") == ("failed", "backwards")
     assert finding(found, "phases") == ("failed", "feedback_inverted")
+    words = "\n".join(lines_of(TOOL, found))
+    assert "turning forwards counts down" in words
+    assert "invert the feedback in the drive" in words
     found, _ = await by_hand(motor(PhaseSpec(order="shifted")), 1.01, HAND)
     assert finding(found, "direction") == ("passed", "ok")
     assert finding(found, "phases") == ("failed", "phases_reversed")
@@ -179,9 +139,13 @@ async def test_wrong_counts_are_found_before_anything_is_energised(share: float)
 
 
 async def test_a_closed_brake_moves_nothing() -> None:
-    found, _ = await on("r6l", motor(brake=True))
+    found, _ = await on("r6l", planted(motor(), "brake_closed"))
     assert finding(found, "brake") == ("open", "not_seen")
     assert finding(found, "phases") == ("open", "no_motion")
+    assert found.verdict == "incomplete"
+    words = "\n".join(lines_of(TOOL, found))
+    assert "The brake is closed" in words
+    assert "Listen whether the brake opens" in words
 
 
 async def test_nothing_moves_without_a_statement_of_what_hangs() -> None:

@@ -6,75 +6,34 @@ Friction falls by 1 - tanh there, and by exp(-(v/vs)^δ) in the tool's model: ne
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
 from backend.tools.friction.result import FrictionResult
 from backend.tools.friction.run import TOOL
-from backend.tools.friction.settings import FrictionSettings
 from backend.tools.measuring.recording import bridged
-from backend.tools.sweep import profile_speed
 from backend.tools.tool import Run
-from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.link import ScopeBlock
-from drivers.virtual.mechanics import FrictionSpec, MechanicsSpec, RippleSpec, friction_nm
+from drivers.virtual.mechanics import FrictionSpec
 from drivers.virtual.wires.netns import Namespace
-from tests.virtual.tools.can_rig import can_bench, incremental
 from tests.virtual.tools.direct import DirectBench, direct
-from tests.virtual.tools.rig import At, bench, mechanics, settings_of, silent
-
-RATED_NM = 1.27
-FRICTION = FrictionSpec(
-    viscous_nms=3e-4, coulomb_nm=0.04, static_nm=0.06, stribeck_rad_s=4.0, stribeck_law="tanh"
+from tests.virtual.tools.rig import At, bench, settings_of, silent
+from tests.virtual.tools.set_ups.friction import (
+    ASKED,
+    FRICTION,
+    RATED_NM,
+    RIPPLE,
+    RIPPLED,
+    SMOOTH,
+    largest_error,
+    mapped,
+    true_percent,
+    under,
 )
-RIPPLE = RippleSpec(
-    revolution_nm=0.004, cogging_nm=0.012, cogging_second_nm=0.005, cogging_per_rev=24,
-    phase_rad=0.4,
-)  # fmt: skip
-SMOOTH = mechanics((1e-4, 60.0, 0.006)).model_copy(update={"friction": FRICTION})
-RIPPLED = SMOOTH.model_copy(update={"ripple": RIPPLE})
-ASKED = FrictionSettings(
-    travel_limit=3.0, speed_limit=1200.0, torque_limit=80.0, time_limit_s=50.0, speeds=6,
-    slowest_rpm=10.0, rated_torque_nm=RATED_NM,
-)  # fmt: skip
-
-
-async def mapped(
-    axis: Axis, session: CyclicSession, asked: FrictionSettings = ASKED,
-    progress: Progress | None = None,
-) -> FrictionResult:  # fmt: skip
-    """As a job or the command line does it."""
-    async with profile_speed.prepared(axis, session, asked.envelope, True):
-        found = await TOOL.run(Run(axis, session, progress or silent()), asked)
-    return FrictionResult.model_validate(found.model_dump(mode="json"))
-
-
-@asynccontextmanager
-async def under(drive: str, spec: MechanicsSpec) -> AsyncIterator[tuple[Axis, CyclicSession]]:
-    if drive == "ds_c":
-        async with can_bench(incremental(spec), pace=40.0) as b:
-            yield b.axis, b.session
-    else:
-        async with direct(spec, drive=drive) as d:
-            yield d.axis, d.session
-
-
-def true_percent(spec: MechanicsSpec, rpm: object) -> np.ndarray:
-    speed = np.asarray(rpm, float) * 2 * np.pi / 60.0
-    return friction_nm(spec, speed) / RATED_NM * 100.0
-
-
-def largest_error(found: FrictionResult, spec: MechanicsSpec) -> float:
-    truth = true_percent(spec, found.curve_speed_rpm)
-    return float(np.max(np.abs(np.array(found.curve_percent) / truth - 1.0)))
 
 
 def codes(found: FrictionResult) -> set[str]:
@@ -137,7 +96,9 @@ async def test_friction_without_stribeck_and_ripple_has_none() -> None:
         found = await mapped(b.axis, b.session)
     assert found.stribeck_percent is None
     assert {"stribeck_not_seen", "ripple_not_seen"} <= codes(found)
+    assert "compensation_in_controller" not in codes(found)
     assert found.harmonics == ()
+    assert found.compensation_csv() is None
     assert found.viscous_percent_per_rpm is not None
     # 3e-4 Nm·s/rad in % of 1.27 Nm per rpm.
     expected = 3e-4 * 2 * np.pi / 60.0 / RATED_NM * 100.0
@@ -216,6 +177,7 @@ async def test_kept_raw_data_give_the_same_map_and_lost_samples_do_not_bend_it()
         found = await _kept(b, kept)
     again = TOOL.reevaluate(kept["arrays"], kept["meta"])  # type: ignore[arg-type]
     assert again == found
+    compensates(found)
     with pytest.raises(ValueError, match="not the raw data"):
         TOOL.reevaluate({}, {})
 
@@ -235,6 +197,25 @@ async def test_kept_raw_data_give_the_same_map_and_lost_samples_do_not_bend_it()
     assert isinstance(found, FrictionResult)
     assert largest_error(found, RIPPLED) < 0.02
     assert {1, 24} <= {each.order_per_rev for each in found.harmonics} <= {1, 24, 48}
+
+
+def compensates(found: FrictionResult) -> None:
+    """The table takes the ripple of the mechanics away, by place and by sign."""
+    rows = [line.split(",") for line in str(found.compensation_csv()).splitlines()]
+    assert rows[0] == ["position_rev", "torque_percent", "forward_percent", "backward_percent"]
+    place, torque = np.array([[float(each) for each in row[:2]] for row in rows[1:]]).T
+    assert (place[0], place[-1]) == (
+        pytest.approx(0.5 / 360, abs=1e-6),
+        pytest.approx(1 - 0.5 / 360),
+    )
+    truth = (
+        RIPPLE.revolution_nm * np.sin(2 * np.pi * place + RIPPLE.phase_rad)
+        + RIPPLE.cogging_nm * np.sin(24 * 2 * np.pi * place + RIPPLE.phase_rad)
+        + RIPPLE.cogging_second_nm * np.sin(48 * 2 * np.pi * place + RIPPLE.phase_rad)
+    )
+    left = torque - 100.0 * truth / RATED_NM
+    assert np.std(left) < 0.15 * np.std(100.0 * truth / RATED_NM)
+    assert "compensation_in_controller" in codes(found)
 
 
 async def _kept(b: DirectBench, kept: dict[str, object]) -> FrictionResult:

@@ -8,149 +8,40 @@ from __future__ import annotations
 import asyncio
 import json
 import math
-import tempfile
-from collections.abc import AsyncIterator
-from contextlib import AsyncExitStack, asynccontextmanager
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
 from backend.commands.tools import lines_of
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
-from backend.tools.gantry.result import GantryResult
 from backend.tools.gantry.run import TOOL
-from backend.tools.gantry.settings import GantrySettings
-from backend.tools.measuring.temporary import make_effective
-from backend.tools.sweep.profile_speed import prepared
 from backend.tools.tool import Run
 from drivers.cia402 import State
 from drivers.errors import MotionHalted, NotAllowed, OutOfRange
-from drivers.ethercat.link import EthercatLink
 from drivers.halt import HaltCause
-from drivers.virtual.mechanics import GantrySpec, MechanicsSpec, gantry_response
-from drivers.virtual.wires.ethercat.launch import VirtualSegment
+from drivers.virtual.defects import OUT_OF_SQUARE_RAD
+from drivers.virtual.mechanics import gantry_response
 from drivers.virtual.wires.netns import Namespace
-from profiles.loader import load_profile
-from tests.support.granted import set_up
 from tests.unit.analysis.gantry_plant import Gantry
-from tests.virtual.tools.rig import URL, At, settings_of, silent
+from tests.virtual.tools.rig import At, silent
+from tests.virtual.tools.set_ups.gantry import (
+    ASKED,
+    RATED,
+    SQUARE,
+    Two,
+    codes,
+    gantry,
+    measured,
+    motor,
+    static_stiffness,
+)
 
 pytestmark = pytest.mark.timeout(600)
-
-RATED = 1.27
-ASKED = GantrySettings(
-    partner="R",
-    travel_limit=3.0,
-    speed_limit=600.0,
-    torque_limit=60.0,
-    lead_mm=10.0,
-    resolution_hz=4.0,
-)
-SQUARE = GantrySpec(
-    axes=("L", "R"), inertia_kgm2=2e-4, yaw_inertia_kgm2=4e-5, off_centre=0.15,
-    joint_stiffness_nm_per_rad=25.0, joint_damping_nms_per_rad=3e-3,
-    yaw_stiffness_nm_per_rad=4.0, yaw_damping_nms_per_rad=2e-3,
-)  # fmt: skip
-
-
-def motor(brake: bool = False) -> MechanicsSpec:
-    return MechanicsSpec.model_validate({
-        "motor": {
-            "inertia_kgm2": 5e-5, "rated_torque_nm": RATED, "rated_speed_rpm": 3000,
-            "brake": brake,
-        },
-        "friction": {"viscous_nms": 2e-4, "coulomb_nm": 0.03},
-        "encoder": {"noise_counts": 4},
-    })  # fmt: skip
-
-
-@dataclass
-class Two:
-    axes: tuple[Axis, Axis]
-    session: CyclicSession
-    segment: VirtualSegment
-
-    async def positions(self) -> list[float]:
-        return [(await a.units()).position(await a.position_raw()) for a in self.axes]
-
-    async def settings(self) -> list[dict[str, object]]:
-        return [await settings_of(axis.drive, "6060:00") for axis in self.axes]
-
-    def run(self, **more: Any) -> Run:
-        given = {"progress": silent(), **more}
-        return Run(self.axes[0], self.session, partner=self.axes[1], **given)
-
-
-@asynccontextmanager
-async def gantry(
-    namespace: Namespace, spec: GantrySpec = SQUARE, *, brake: bool = False
-) -> AsyncIterator[Two]:
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "bench.json"
-        mechanics = motor(brake).model_dump(exclude_defaults=True)
-        axes = [
-            {"name": name, "drive": "mms7", "on": URL, "station": n, "mechanics": mechanics}
-            for n, name in enumerate(spec.axes, 1)
-        ]
-        bench = {"axis": axes, "gantry": [spec.model_dump(mode="json")]}
-        file.write_text(json.dumps(bench), "utf-8")
-        arguments = [
-            "--bench", str(file), "--on", URL, "--sdo-ms", "0.2", "--eeprom-us", "5", "--lockstep",
-        ]  # fmt: skip
-        with VirtualSegment.start("ec0s", arguments, namespace) as segment:
-            link = EthercatLink("ec0m", url=URL, launcher=namespace.command([]), lockstep=1.2)
-            await link.open()
-            try:
-                profile = load_profile("mms7")
-                await link.scan(lambda _share, _text: None)
-                found = []
-                for station, name in enumerate(spec.axes, 1):
-                    link.attach(station, profile)
-                    port = Port(link, station, profile.link("ethercat"))
-                    axis = Axis(Drive(name.lower(), name, profile, [port]))
-                    # 80 Hz with the inertia of one motor: loops that a cycle of 1 ms shows whole.
-                    await set_up(axis, {"2005:03": 800})
-                    await make_effective(axis)
-                    found.append(axis)
-                session = CyclicSession(link, [axis.drive for axis in found])
-                await session.start(1e-3)
-                for axis in found:
-                    axis.session = session
-                try:
-                    yield Two((found[0], found[1]), session, segment)
-                finally:
-                    await session.stop()
-            finally:
-                await link.close()
-
-
-async def measured(two: Two, asked: GantrySettings = ASKED, **more: Any) -> GantryResult:
-    async with AsyncExitStack() as held:
-        for axis in two.axes:
-            held.enter_context(axis.granted("gantry", asked.envelope))
-            await held.enter_async_context(prepared(axis, two.session, asked.envelope, False))
-        found = await TOOL.run(two.run(**more), asked)
-    return GantryResult.model_validate(found.model_dump(mode="json"))
-
-
-def codes(found: GantryResult) -> list[str]:
-    return [each.code for each in found.findings]
 
 
 def between(found: Any, truth: float) -> bool:
     low, high = found.ci95
     return bool(low <= truth <= high)
-
-
-def static_stiffness(spec: GantrySpec) -> float:
-    joints = spec.joint_stiffness_nm_per_rad / 2
-    return joints * spec.yaw_stiffness_nm_per_rad / (joints + spec.yaw_stiffness_nm_per_rad)
 
 
 async def test_a_square_gantry(namespace: Namespace) -> None:
@@ -201,18 +92,21 @@ async def test_a_square_gantry(namespace: Namespace) -> None:
 
 async def test_a_gantry_out_of_square_is_named_with_its_way(namespace: Namespace) -> None:
     """Brakes hold the beam where both motors show the same, which is not where it rests."""
-    spec = SQUARE.model_copy(update={"square_error_rad": 0.12})
-    async with gantry(namespace, spec, brake=True) as two:
+    spec = SQUARE.model_copy(update={"square_error_rad": OUT_OF_SQUARE_RAD})
+    async with gantry(namespace, SQUARE, brake=True, defects=("out_of_square",)) as two:
         found = await measured(two)
     stiffness = static_stiffness(spec)
     # Axis 1 would rest ahead of axis 2, so that it is behind where both show the same.
     assert codes(found)[0] == "out_of_square"
-    assert between(found.fight_percent, -100 * stiffness * 0.12 / RATED)
+    assert between(found.fight_percent, -100 * stiffness * OUT_OF_SQUARE_RAD / RATED)
     assert found.out_of_square_rev is not None
-    assert between(found.out_of_square_rev, -0.12 / math.tau)
+    assert between(found.out_of_square_rev, -OUT_OF_SQUARE_RAD / math.tau)
     assert found.out_of_square_mm is not None
-    assert between(found.out_of_square_mm, -0.12 / math.tau * 10.0)
-    assert "Axis 2 is ahead of axis 1" in "\n".join(lines_of(TOOL, found))
+    assert between(found.out_of_square_mm, -OUT_OF_SQUARE_RAD / math.tau * 10.0)
+    words = "\n".join(lines_of(TOOL, found))
+    assert "The gantry is out of square" in words
+    assert "Axis 2 is ahead of axis 1" in words
+    assert "Correct the reference (homing offset) of one axis by that" in words
 
 
 async def stands(two: Two) -> None:

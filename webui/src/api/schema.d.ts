@@ -6320,6 +6320,12 @@ export interface components {
          *     Parameters are None where the data cannot say them; ``findings`` say why.
          */
         FrictionResult: {
+            /**
+             * Compensation Percent
+             * @description [n] torque that the ripple needs, by its harmonics: for a controller that adds it to the torque command; empty where no ripple was found
+             * @default []
+             */
+            compensation_percent: number[];
             coulomb_percent: components["schemas"]["Estimate"] | null;
             /** Curve Percent */
             curve_percent: number[];
@@ -13663,7 +13669,7 @@ export interface components {
              * Code
              * @enum {string}
              */
-            code: "mapped" | "standstill_not_measured" | "stribeck_not_seen" | "stribeck_not_reached" | "few_speeds" | "ripple_not_asked" | "ripple_needs_revolution" | "ripple_not_seen" | "uneven_speeds" | "fastest_by_travel" | "slowest_by_time" | "model_misfit";
+            code: "mapped" | "standstill_not_measured" | "stribeck_not_seen" | "stribeck_not_reached" | "few_speeds" | "ripple_not_asked" | "ripple_needs_revolution" | "ripple_not_seen" | "uneven_speeds" | "fastest_by_travel" | "slowest_by_time" | "model_misfit" | "compensation_in_controller";
             /**
              * Unit
              * @default

@@ -1,4 +1,4 @@
-import { useComputedColorScheme } from '@mantine/core'
+import { Button, useComputedColorScheme } from '@mantine/core'
 import { useEffect, useMemo, useState } from 'react'
 import { api, ask } from '../../api/client'
 import { asFriction } from '../../api/results'
@@ -6,13 +6,16 @@ import type { FrictionResult, FrictionSettings } from '../../api/schema'
 import { useT } from '../../i18n'
 import { setJob } from '../../live/store'
 import { CurvesPlot } from '../../plots/CurvesPlot'
+import { Icon } from '../../widgets/Icon'
 import { JobNote } from '../../widgets/JobNote'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
+import { offerDownload } from '../files/sets'
 import type { Limits } from '../response/limits'
 import { useToolJob } from '../response/useToolJob'
+import { compensationCsv } from './friction'
 import { amount, engineering, interval } from './steps'
 import { complete, fieldsOf, initialValues, ToolForm, useTool, type Values } from './ToolForm'
 
@@ -133,6 +136,14 @@ export function FrictionMap({ result, text }: { result: FrictionResult; text: Te
           label={text('over_angle')}
           dark={dark}
         />
+      )}
+      {result.compensation_percent.length > 0 && (
+        <Button
+          leftSection={<Icon name="download" size={14} />}
+          onClick={() => offerDownload('compensation.csv', [compensationCsv(result)], 'text/csv')}
+        >
+          {text('save_table')}
+        </Button>
       )}
       <div className="scroll-table">
         <table className="reported-values" aria-label={text('title')}>
