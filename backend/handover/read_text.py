@@ -155,7 +155,7 @@ def ros2(written: str, profile: Profile, slave: int | None) -> Iterator[Listed]:
     """A slave file of ethercat_driver_ros2, or a bus.yml of ros2_canopen."""
     # Aliases make a small file as large as a bomb, and deep nesting takes a parser minutes. No
     # slave file has either.
-    depth = nodes = 0
+    depth = count = 0
     for event in yaml.parse(written, yaml.CSafeLoader):
         if isinstance(event, yaml.AliasEvent):
             raise BadRow(text("handover.yaml-aliases"))
@@ -163,8 +163,8 @@ def ros2(written: str, profile: Profile, slave: int | None) -> Iterator[Listed]:
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > _MOST_YAML_LEVELS:
             raise BadRow(text("handover.yaml-levels", levels=_MOST_YAML_LEVELS))
-        nodes += isinstance(event, yaml.NodeEvent)
-        if nodes > _MOST_YAML_NODES:
+        count += isinstance(event, yaml.NodeEvent)
+        if count > _MOST_YAML_NODES:
             raise BadRow(text("handover.yaml-nodes", nodes=_MOST_YAML_NODES))
     content = yaml.load(written, yaml.CSafeLoader)
     rows = content.get("sdo") if isinstance(content, dict) else None
