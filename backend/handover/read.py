@@ -9,7 +9,9 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterable, Iterator
+from itertools import islice
 from textwrap import shorten
+from typing import TypeVar
 from xml.etree.ElementTree import Element, ParseError
 
 import yaml
@@ -44,8 +46,11 @@ from profiles.importer import (
 from profiles.importer.values import default_value
 from profiles.schema import INTEGER_RANGE, DataType, Profile
 
+_Row = TypeVar("_Row")
 MAX_BYTES = 8_000_000
 _MAX_WRITES = 20_000
+#: Of XML, twice what 20 000 writes have in a list of ENI with eight elements each.
+_MAX_TAGS = 640_000
 _CCS_DOWNLOAD = 1
 _UPWARD = ("IP", "PS", "SO")
 _COMMANDS = ".//CoE/InitCmds/InitCmd"
@@ -102,21 +107,28 @@ def _by_contents(data: bytes, profile: Profile, name: str, slave: int | None) ->
     report = ImportReport()
     head = data[:4096].lstrip(b"\xef\xbb\xbf\xff\xfe\0 \t\r\n")
     if head.startswith(b"<"):
+        if data.count(b"<") > _MAX_TAGS:
+            raise BadSet("handover.more-tags", name=name, max_tags=_MAX_TAGS)
         return _xml(decode_xml(data, name, report), profile, name, slave)
     if is_dcf(data):
         return _dcf(data, profile, name)
-    if concise := read_text.concise_dcf(data):
+    if concise := read_text.concise_dcf(data, _MAX_WRITES + 1):
         return ControllerList("dcf", concise)
     words = decode_text(data, name, report)
     if table := read_text.table_of(words):
         form, separator = table
         rows = read_text.codesys if form == "codesys" else read_text.csv_table
-        return ControllerList(form, tuple(rows(words, separator)))
+        return ControllerList(form, tuple(_first(rows(words, separator))))
     if read_text.is_script(words):
-        return ControllerList("igh", tuple(_of_slave(read_text.igh(words), slave)))
-    if re.search(r"^\s*(sdo|vendor_id|nodes)\s*:", words, re.M):
+        return ControllerList("igh", tuple(_of_slave(_first(read_text.igh(words)), slave)))
+    if re.search(r"^[^\S\n]*(sdo|vendor_id|nodes)[^\S\n]*:", words, re.M):
         return ControllerList("ros2", tuple(read_text.ros2(words, profile, slave)))
     raise BadSet("handover.no-start-up-list", name=name)
+
+
+def _first(rows: Iterator[_Row]) -> Iterator[_Row]:
+    """The rows up to the first that is too many: what lies behind it is not worth its time."""
+    return islice(rows, _MAX_WRITES + 1)
 
 
 def _of_slave(downloads: Iterable[read_text.Download], slave: int | None) -> list[Listed]:

@@ -37,11 +37,15 @@ _WITH_WORD = {"t": "type", "p": "position", "a": "alias", "m": "master", "d": "d
 _HEADINGS = {"codesys": "line", "csv": "key"}
 _ENTRY = struct.Struct("<HBI")
 _MOST_YAML_LEVELS = 20
+#: Of a slave file with 20 000 writes, each a map of four fields.
+_MOST_YAML_NODES = 200_000
+#: No line that writes one value is longer; `shlex` takes the square of a word's length.
+_LONGEST_LINE = 10_000
 
 
 def is_script(content: str) -> bool:
     """Whether a line of it writes by ``ethercat download``."""
-    return any(_DOWNLOAD.match(line) for line in _lines(content))
+    return "ethercat" in content and any(_DOWNLOAD.match(line) for line in _lines(content))
 
 
 def table_of(content: str) -> tuple[str, str] | None:
@@ -92,6 +96,8 @@ def igh(script: str) -> Iterator[Download]:
         if match is None:
             continue
         place = line_of(line)
+        if len(content) > _LONGEST_LINE:
+            raise BadRow(text("handover.row-download-form", place=place))
         options, plain = _words(f"{match['options'] or ''} {match['rest']}", place)
         kind = options.get("type", "")
         if len(plain) != 3 or kind not in _SIZE or kind in ("float", "double"):
@@ -110,13 +116,16 @@ def _as_in_c(word: str, place: Text) -> int:
 def _lines(content: str) -> list[str]:
     """Lines of a shell script; one that ends with a backslash goes on in the next."""
     lines: list[str] = []
+    parts: list[str] = []
     for line in content.splitlines():
-        if lines and lines[-1].endswith("\\"):
-            lines[-1] = lines[-1][:-1] + line
+        if line.endswith("\\"):
+            parts.append(line[:-1])
             lines.append("")  # keeps the numbers of the lines behind it
-            lines[-2:] = [lines[-1], lines[-2]]
         else:
-            lines.append(line)
+            lines.append("".join([*parts, line]))
+            parts = []
+    if parts:
+        lines[-1] = "".join(parts)
     return lines
 
 
@@ -146,7 +155,7 @@ def ros2(written: str, profile: Profile, slave: int | None) -> Iterator[Listed]:
     """A slave file of ethercat_driver_ros2, or a bus.yml of ros2_canopen."""
     # Aliases make a small file as large as a bomb, and deep nesting takes a parser minutes. No
     # slave file has either.
-    depth = 0
+    depth = count = 0
     for event in yaml.parse(written, yaml.CSafeLoader):
         if isinstance(event, yaml.AliasEvent):
             raise BadRow(text("handover.yaml-aliases"))
@@ -154,6 +163,9 @@ def ros2(written: str, profile: Profile, slave: int | None) -> Iterator[Listed]:
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > _MOST_YAML_LEVELS:
             raise BadRow(text("handover.yaml-levels", levels=_MOST_YAML_LEVELS))
+        count += isinstance(event, yaml.NodeEvent)
+        if count > _MOST_YAML_NODES:
+            raise BadRow(text("handover.yaml-nodes", nodes=_MOST_YAML_NODES))
     content = yaml.load(written, yaml.CSafeLoader)
     rows = content.get("sdo") if isinstance(content, dict) else None
     if rows is None and isinstance(content, dict):
@@ -205,18 +217,20 @@ def _whole(row: dict[Any, Any], field: str, place: Text) -> int:
     return value
 
 
-def concise_dcf(data: bytes) -> tuple[Listed, ...] | None:
-    """Writes of 1F22h (CiA 302-2): a count, then index, subindex, size and data of each.
+def concise_dcf(data: bytes, most: int) -> tuple[Listed, ...] | None:
+    """The first ``most`` writes of 1F22h (CiA 302-2): a count, then index, subindex, size and data
+    of each.
 
     None where the bytes are none: only a stream that ends with its last entry is one.
     """
     if len(data) < 4:
         return None
     count = int.from_bytes(data[:4], "little")
-    at, found = 4, []
+    at = 4
+    found: list[tuple[int, int, bytes]] = []
     if count > len(data) // (_ENTRY.size + 1):
         return None
-    for entry in range(1, count + 1):
+    for _ in range(count):
         if at + _ENTRY.size > len(data):
             return None
         index, subindex, size = _ENTRY.unpack_from(data, at)
@@ -225,5 +239,11 @@ def concise_dcf(data: bytes) -> tuple[Listed, ...] | None:
         at += size
         if len(value) != size or not size or index < 0x1000:
             return None
-        found.append(Listed(index, subindex, value, "", text("handover.place-entry", entry=entry)))
-    return tuple(found) if at == len(data) and found else None
+        if len(found) < most:
+            found.append((index, subindex, value))
+    if at != len(data) or not found:
+        return None
+    return tuple(
+        Listed(index, subindex, value, "", text("handover.place-entry", entry=entry))
+        for entry, (index, subindex, value) in enumerate(found, 1)
+    )

@@ -8,6 +8,7 @@ import struct
 from datetime import UTC, datetime
 
 from backend.handover.model import AxisHandover, StartupWrite
+from backend.store.spreadsheet import as_text
 from profiles.importer import export_dcf
 from profiles.schema import Parameter, Raw
 
@@ -41,9 +42,8 @@ def line_of(text: str) -> str:
 
 
 def _cell(text: str) -> str:
-    """A cell that no spreadsheet takes for a formula."""
-    text = line_of(text)
-    return f"'{text}" if text[:1] in ("=", "+", "-", "@") else text
+    """A cell of one line that no spreadsheet takes for a formula."""
+    return as_text(line_of(text))
 
 
 def codesys(axis: AxisHandover) -> bytes:
@@ -71,7 +71,7 @@ def csv_table(axis: AxisHandover) -> bytes:
         table.writerow([
             write.key, f"0x{write.index:04X}", f"0x{write.subindex:02X}", write.type,
             len(write.data), write.raw, write.data.hex(" "), write.transition,
-            parameter.to_value(write.raw), parameter.unit, _cell(write.name),
+            parameter.to_value(write.raw), _cell(parameter.unit), _cell(write.name),
         ])  # fmt: skip
     return text.getvalue().encode("utf-8-sig")
 

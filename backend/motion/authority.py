@@ -71,6 +71,16 @@ class MotionAuthority:
         live = [g for g in self._live(drive) if not g.standing and g.keys is None]
         return live[-1] if live else None
 
+    def drives_of(self, session: str) -> set[str]:
+        """Axes of which this session, token or invitation has a live grant, of whatever kind."""
+        if not session:
+            return set()
+        return {
+            drive
+            for drive in self._records
+            if any(grant.session == session for grant in self._live(drive))
+        }
+
     def held(self, drive: str, key: str | None = None) -> Grant | None:
         """The grant of this axis that the calling work holds; also one that was ended meanwhile.
 

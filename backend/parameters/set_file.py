@@ -18,6 +18,7 @@ from backend.drive.drive import Drive
 from backend.drive.readings import Reading
 from backend.motion.alternatives import refused
 from backend.motion.classes import motion_of
+from backend.parameters.toml_keys import deepest_key
 from drivers.errors import DriveError, NotAllowed
 from profiles.schema import Parameter, Profile, Raw
 
@@ -25,6 +26,8 @@ FORMAT = "servodeck parameter set"
 VERSION = 1
 SUFFIX = ".sdset"
 MAX_BYTES = 4_000_000
+#: The format has no dotted key at all; this leaves room for tables that a later version adds.
+_DEEPEST_KEY = 8
 
 Status = Literal[
     "differs", "same", "not_in_drive", "not_in_file", "invalid", "read_only", "energises"
@@ -166,7 +169,10 @@ def parse(data: bytes, name: str = "the file") -> ParameterSet:
     if len(data) > MAX_BYTES:
         raise BadSet("sets.larger-bytes", name=name, max_bytes=MAX_BYTES)
     try:
-        content = tomllib.loads(data.decode("utf-8"))
+        written = data.decode("utf-8")
+        if deepest_key(written) > _DEEPEST_KEY:
+            raise BadSet("sets.no-parameter-set-servodeck", name=name)
+        content = tomllib.loads(written)
     except (ValueError, RecursionError) as error:  # also of dates and of numbers without end
         raise BadSet("sets.damaged-no-parameter-set", name=name, cause=str(error)) from error
     if content.get("format") != FORMAT:

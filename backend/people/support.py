@@ -239,6 +239,8 @@ class Support:
     ) -> Invitation:
         """Let a guest do more for a while; replaces an earlier grant.
 
+        One that lacks a right to move or the axis of the earlier one ends what the guest moves.
+
         Raises:
             NotAllowed: the guest is not here, or the invitation does not allow it.
         """
@@ -257,7 +259,17 @@ class Support:
                 value=time_s,
                 limit=limits.between(10, LONGEST_GRANT_S, "s"),
             )
+        before = self.running(found)
         found.grant = Grant(rights, self._ticks() + time_s, drive, by)
+        if before is not None and (
+            before.rights & MOVING - rights or drive not in (None, before.drive)
+        ):
+            # What moves now may be what the new grant does not contain.
+            why = "the grant was replaced by another"
+            if found.id in self._holds:
+                self._drop_hold(found.id, why)
+            else:
+                self._disable(found, why)
         self._changed()
         return found
 

@@ -8,8 +8,12 @@ tampered with, STOP is pressed at any moment, of one axis or of all. What must h
 
 - STOP's answer equals the shaft: who is said to stand stands, and goes on standing; who is said
   to move moves; "unreachable" is a drive whose mailbox is mute.
-- No axis turns without a grant: after STOP nothing moves again by itself, and an axis that turns
-  although nobody here moves it is reported within a second of turning, and no other is.
+- No axis turns without a grant: an axis that the server moves has one, and one that is moved past
+  it has none; after STOP nothing moves again by itself, and an axis that turns although nobody here
+  moves it is reported within a second of turning, and no other is.
+
+The bytes of a bus are not in it: the link hands objects to the virtual drive. They are in
+``python -m benchmarks.chaos``.
 """
 
 from __future__ import annotations
@@ -28,7 +32,7 @@ from benchmarks.stopping.rig import Rig, rig
 REPORTED_S = 1.0 + 0.1
 _STANDS_RPM, _TURNS_RPM = 3.0, 12.0
 _EPISODES = 4
-#: Motions that no job of the server knows.
+#: Motions of the server's own jobs, which hold a grant; all others come from past it.
 _SERVERS = frozenset({"jog", "jog by process data"})
 
 
@@ -89,8 +93,17 @@ class Mix:
         if motion == "jog by process data" and self.random.random() < 0.3:
             bench.link.lose_process_data()
         await asyncio.sleep(self.random.choice([0.0, 0.01, 0.1, 0.5]))
+        self._judge_grant(bench, motion)
         verdict = await self._stop(bench, motion)
         return verdict == "stopped" and not bench.link.lost_data and await self._tidy(bench)
+
+    def _judge_grant(self, bench: Rig, motion: str) -> None:
+        """Of an axis that turns at this moment, before STOP is pressed."""
+        if bench.link.mute or bench.link.lost_data or bench.shaft_rpm < _TURNS_RPM:
+            return  # a motion that has lost its drive ends its grant, and the drive goes on
+        grant = bench.bench.authority.grant_of(bench.connected.drive.id)
+        if (grant is not None) is not (motion in _SERVERS):
+            self.found(bench, f"{motion}: turns {'with' if grant else 'without'} a grant")
 
     async def _stop(self, bench: Rig, motion: str) -> str:
         body = {} if self.random.random() < 0.5 else {"drive": bench.connected.drive.id}

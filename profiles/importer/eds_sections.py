@@ -15,8 +15,10 @@ _LINE = re.compile(r"\r\r\n|\r\n|\n|\r")
 OBJECT = re.compile(r"(?:0x)?([0-9a-f]{4})h?$")
 SUBOBJECT = re.compile(r"(?:0x)?([0-9a-f]{4})h?\s*_?sub\s*_?(?:0x)?([0-9a-f]{1,2})$")
 COMPACT = re.compile(r"(?:0x)?([0-9a-f]{4})(name|value|denotation)$")
-#: An editor's remark behind a value: text may hold both, numbers and words of the standard cannot.
-_REMARK = re.compile(r"\s*(?:;|//).*$")
+#: Begins an editor's remark behind a value: text may hold both, numbers and words of the standard
+#: cannot. The white space in front is not in the pattern: a search for it takes the square of its
+#: length, and a file may have a megabyte of it.
+_REMARK = re.compile(r";|//")
 
 
 @dataclass(slots=True)
@@ -32,7 +34,9 @@ class Section:
 
     def word(self, *names: str) -> str:
         """The same without a remark behind it, for numbers and words of the standard."""
-        return _REMARK.sub("", self.get(*names))
+        value = self.get(*names)
+        remark = _REMARK.search(value)
+        return value if remark is None else value[: remark.start()].rstrip()
 
 
 def read_sections(text: str, name: str, report: ImportReport) -> dict[str, Section]:

@@ -77,7 +77,7 @@ _UNIT_CODES = {
 }  # fmt: skip
 
 _UNIT_IN_NAME = re.compile(r"[\[({（]\s*(?:unit\s*:?\s*)?([^\])}）]{1,12}?)\s*[\])}）]\s*$", re.I)
-_NODE_ID = re.compile(r"\$?\s*NODE[-_ ]?ID", re.I)
+_NODE_ID = re.compile(r"NODE[-_ ]?ID", re.I)
 _LONGEST_NUMBER = 40
 #: Fields of ESI and EDS files with an upper limit.
 _MAXIMA = ("MaxValue", "MaxData", "HighLimit")
@@ -147,7 +147,9 @@ def node_relative(text: str, place: str, report: ImportReport) -> int | None:
     """What is added to the node-ID in ``$NODEID+0x200``; None where the text does not name it."""
     if not _NODE_ID.search(text):
         return None
-    rest = _NODE_ID.sub("", text).strip().strip("+").strip()
+    *before, last = _NODE_ID.split(text)
+    rest = "".join(part.rstrip().removesuffix("$") for part in before) + last
+    rest = rest.strip().strip("+").strip()
     number = parse_number(rest or "0", place, report)
     return int(number) if number is not None and number >= 0 else None
 

@@ -114,6 +114,20 @@ def test_restoring_what_can_move_an_axis_takes_the_right_to_move(server: Guarded
         server.call(lambda key=key: drive.pending_restores.settle([key]))
 
 
+@pytest.mark.parametrize("motion", ["none", "at_enable", "energises"])
+def test_to_open_an_object_to_the_parameter_table_takes_the_right_to_move(
+    server: GuardedServer, motion: str
+) -> None:
+    """A class that lets an object be written as a parameter would be a way round the authority."""
+    rights = (Right.LOOK, Right.PARAMETERS, Right.STATION)
+    where, body = "/profiles/mms7/parameters/2108:01/motion", {"motion": motion, "reason": "attack"}
+    without = server.token(Role.ADMINISTRATOR, *rights).ask("PUT", where, json=body)
+    assert (without.status_code == 403) is (motion != "energises"), without.text
+    mover = server.token(Role.ADMINISTRATOR, *rights, Right.MOTION)
+    allowed = mover.ask("PUT", where, json=body)
+    assert allowed.status_code == 409, allowed.text  # its class stands in the manual's profile
+
+
 def test_no_request_replaces_a_quick_stop_by_torque_zero(server: GuardedServer) -> None:
     """`Envelope.torque_off_only` is set by the brake test, which has seen before that the brake
     holds, and by the first power, whose pulses end after degrees and may close no loop."""

@@ -11,6 +11,7 @@ import pytest
 from backend.api.tuning import measure
 from backend.people.errors import Forbidden
 from backend.people.rights import Right, Role
+from drivers.errors import NotAllowed
 from tests.support.guarded import GuardedServer
 
 LIMITS = {
@@ -43,3 +44,31 @@ def test_the_partner_needs_the_right_too(
     assert answer.status_code == 403, answer.text
     assert asked == [(Right.MEASURE, "y")]
     assert guarded.call(lambda: guarded.bench.jobs.moving("x")) is None
+
+
+def bench_of(*known: tuple[str, str]) -> tuple[SimpleNamespace, list[SimpleNamespace]]:
+    """A bench of drives on one bus by identifier and name, all free."""
+    link = object()
+    drives = [
+        SimpleNamespace(
+            drive=SimpleNamespace(id=ident, name=name, ports=[SimpleNamespace(link=link)])
+        )
+        for ident, name in known
+    ]
+    free = SimpleNamespace(require=lambda *_given: None, require_idle=lambda *_given: None)
+    bench = SimpleNamespace(
+        connected_drives={each.drive.id: each for each in drives}, leases=free, motion=free
+    )
+    return bench, drives
+
+
+def test_no_axis_is_guessed_where_two_have_the_name_of_the_partner() -> None:
+    bench, (left, *_others) = bench_of(("left", "L"), ("right", "R"), ("right-2", "R"))
+    with pytest.raises(NotAllowed) as refused:
+        measure.partner_of(bench, left, "R", None)  # type: ignore[arg-type]
+    assert "right, right-2" in refused.value.message
+
+
+def test_an_identifier_names_its_drive_whatever_others_are_called() -> None:
+    bench, (left, right, _other) = bench_of(("left", "L"), ("r", "R"), ("other", "r"))
+    assert measure.partner_of(bench, left, "r", None) is right  # type: ignore[arg-type, comparison-overlap]

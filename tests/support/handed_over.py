@@ -23,7 +23,7 @@ from profiles.schema import INTEGER_RANGE, Parameter, Profile, Raw
 
 MAKERS = Path(__file__).resolve().parents[1] / "data" / "makers"
 MAKERS_FILES = ("maker_a.xml", "maker_b.eds", "maker_c.xml")
-OWN_FAMILIES = ("mms7", "m6l", "r6l", "ep3e", "ds_c")
+OWN_FAMILIES = ("mms7", "m6l", "r6l", "ep3e", "ds_c", "el7")
 EVERY = (*OWN_FAMILIES, *MAKERS_FILES)
 SAVED = datetime(2026, 3, 4, 5, 6, tzinfo=UTC)
 VENDOR, PRODUCT, REVISION = 0x0000_0A88, 0x0010_0001, 7

@@ -7,10 +7,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path
 
-from backend.api.context import TheBench
+from backend.api.context import Me, TheBench, ThePeople
 from backend.api.errors import NotFound
+from backend.api.security.gate import require_right
 from backend.api.station.models_description import PROFILE_NAME, MotionClass, MotionClassRequest
 from backend.audit.asked import note_before
+from backend.people.rights import Right
 from backend.station.bench import Bench
 from drivers.errors import NotAllowed
 from drivers.texts.message import reason_of, text
@@ -60,9 +62,16 @@ async def motion_class(profile: ProfileName, key: Key) -> MotionClass:
 
 @router.put(_PATH)
 async def set_motion_class(
-    bench: TheBench, profile: ProfileName, key: Key, request: MotionClassRequest
-) -> MotionClass:
-    """Say what writing an object of an imported profile does, on one's own responsibility."""
+    bench: TheBench, people: ThePeople, me: Me, profile: ProfileName, key: Key,
+    request: MotionClassRequest,
+) -> MotionClass:  # fmt: skip
+    """Say what writing an object of an imported profile does, on one's own responsibility.
+
+    Another class than ``energises`` takes the right to move as well.
+    """
+    if request.motion != "energises":
+        # It opens the parameter table to the object: only who may move an axis may say so.
+        require_right(people, me, Right.MOTION, None)
     await asyncio.to_thread(_note, profile, key)
     try:
         parameter = await asyncio.to_thread(

@@ -59,7 +59,7 @@ async def _set(bench: Bench, drive: Drive, file: str, version: int | None) -> Pa
         if error.kind not in ("not-allowed", "not-found"):
             raise
         raise NotFound(error.text, value=file, remedy=error.remedy_text) from error
-    content = parameter_set.parse(data, file)
+    content = await asyncio.to_thread(parameter_set.parse, data, file)
     if content.profile != drive.profile.drive:
         raise NotAllowed(
             "api-handover.drive",

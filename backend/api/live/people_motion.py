@@ -83,6 +83,8 @@ class PeopleMotions:
             for job in self._bench.jobs.all()
             if _moves(job) and job.drive and _session_of(job) == session
         }
+        # What the guest left enabled or overrules, whether or not they took control of the axis.
+        drives |= self._bench.authority.drives_of(session)
         for page in guests:
             drives |= {d for d in self._bench.leases.held_by(page.id) if self._is_enabled(d)}
             if self._support.running(invitation) is None:

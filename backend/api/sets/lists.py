@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from datetime import UTC, datetime
 from typing import Annotated, Literal
 
@@ -85,7 +86,10 @@ async def store_list(
         data += chunk
         if len(data) > MAX_BYTES:
             raise BadSet("api-sets.larger-bytes", file=file, max_bytes=MAX_BYTES)
-    content, found = import_list(bytes(data), _family(profile), file, datetime.now(UTC))
+    # On a thread: STOP of others does not wait while a large list is read.
+    content, found = await asyncio.to_thread(
+        import_list, bytes(data), _family(profile), file, datetime.now(UTC)
+    )
     stored = await bench.records.store.call(bench.sets.store, file, content, overwrite=overwrite)
     line = text("journal.set-imported", file=stored, count=len(found.readings))
     bench.journal.add(line)

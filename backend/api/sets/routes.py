@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Collection, Iterable
 from typing import Annotated
 
@@ -79,7 +80,7 @@ async def _existing(bench: Bench, file: str, version: int | None = None) -> byte
 
 
 async def _parsed(bench: Bench, file: str, version: int | None) -> ParameterSet:
-    return parameter_set.parse(await _existing(bench, file, version), file)
+    return await asyncio.to_thread(parameter_set.parse, await _existing(bench, file, version), file)
 
 
 @router.get("/sets/{file}", response_class=Response)

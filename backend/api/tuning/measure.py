@@ -54,14 +54,21 @@ def partner_of(
     """The other axis of a machine, by its name or identifier; nobody else may have control of it.
 
     Raises:
-        NotAllowed: there is none, it is on another bus, or somebody else has control.
+        NotAllowed: there is none, several have this name, it is on another bus, or somebody else
+            has control.
         Busy: it is moved.
     """
-    named = [m for m in bench.connected_drives.values() if name in (m.drive.name, m.drive.id)]
+    known = list(bench.connected_drives.values())
+    named = [m for m in known if m.drive.id == name]
+    named = named or [m for m in known if m.drive.name == name]
     links = {port.link for port in connected.drive.ports}
     found = [m for m in named if m is not connected and links & {p.link for p in m.drive.ports}]
     if not found:
         raise NotAllowed("station.no-partner", drive=connected.drive.name, value=name)
+    if len(found) > 1:
+        # To guess would move an axis that nobody meant.
+        ids = ", ".join(each.drive.id for each in found)
+        raise NotAllowed("station.partners-of-one-name", value=name, ids=ids)
     bench.leases.require(found[0].drive.id, connection)
     bench.motion.require_idle(found[0])
     return found[0]

@@ -7,6 +7,7 @@ import io
 import struct
 from dataclasses import replace
 from datetime import UTC, datetime
+from itertools import cycle
 from xml.etree.ElementTree import Element
 
 import canopen
@@ -364,3 +365,25 @@ def test_a_name_with_control_characters_makes_no_broken_file() -> None:
     for form in forms:
         files = files_of(axis, form, "list", None)
         assert read_list(files["list"], axis.profile).writes
+
+
+def test_a_table_has_no_formulas() -> None:
+    """Names and units of an imported description are of somebody else's making."""
+    begins = ("=1+1", "@cmd", "-2+3", "\t=1", " =1", "\uff1d1", "\uff0b1", "\n+1")
+    profile = profile_of("imported")
+    hostile = tuple(
+        p.model_copy(update={"name": text, "unit": text})
+        for p, text in zip(profile.parameters, cycle(begins), strict=False)
+    )
+    fields = {name: getattr(profile, name) for name in Profile.model_fields}
+    made = Profile.model_construct(**{**fields, "parameters": hostile})
+    axis = replace(hand_over(set_of(profile), made, motor_individual=True), profile=made)
+    tables: tuple[tuple[Format, str, tuple[str, ...]], ...] = (
+        ("csv", ",", ("name", "unit")),
+        ("codesys", ";", ("Name",)),
+    )
+    for form, separator, columns in tables:
+        data = files_of(axis, form, "list.csv", SAVED)["list.csv"].decode("utf-8-sig")
+        rows = list(csv.DictReader(io.StringIO(data), delimiter=separator))
+        assert len(rows) > len(begins)
+        assert all(row[column].startswith("'") for row in rows for column in columns)

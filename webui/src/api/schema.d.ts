@@ -2899,6 +2899,8 @@ export interface paths {
         /**
          * Set Motion Class
          * @description Say what writing an object of an imported profile does, on one's own responsibility.
+         *
+         *     Another class than ``energises`` takes the right to move as well.
          */
         put: operations["set_motion_class"];
         post?: never;
