@@ -243,17 +243,19 @@ class Connection:
         self._bench.journal.add(text("station.stop-pressed"), level="warning", drive=request.drive)
         failed = {drive: why for drive, why in problems.items() if why is not None}
         problems_of = {drive: why.words() for drive, why in failed.items()}
-        self.send(StopTaken(drives=known, problems=problems_of))
+        # Of a machine with two axes, the other one is stopped as well.
+        stopped = list(problems)
+        self.send(StopTaken(drives=stopped, problems=problems_of))
         for drive, why in failed.items():
             failure = DriveError("api-live.stop-not-reach", drive=drive, text=why)
             self.send(Refused(request="stop", problem=problem_of(failure)))
         # The connection goes on meanwhile: STOP may be pressed again.
-        task = asyncio.create_task(self._stopped(drives, known), name=f"stop-answer-{self.id}")
+        task = asyncio.create_task(self._stopped(drives, stopped), name=f"stop-answer-{self.id}")
         self._stops.add(task)
         task.add_done_callback(self._stops.discard)
 
-    async def _stopped(self, drives: list[str], known: list[str]) -> None:
-        found = await self._bench.motion.standstill(known)
+    async def _stopped(self, drives: list[str], stopped: list[str]) -> None:
+        found = await self._bench.motion.standstill(stopped)
         self.send(StopReached(result=stop_result(self._bench, drives, found)))
 
     def _lease(self, request: LeaseTake) -> None:

@@ -273,9 +273,10 @@ async def stop(bench: TheBench, request: StopRequest | None = None) -> StopResul
     request = request or StopRequest()
     wanted = [request.drive] if request.drive is not None else list(bench.connected_drives)
     known = [drive_id for drive_id in wanted if drive_id in bench.connected_drives]
-    await bench.motion.stop(known)
+    # Of a machine with two axes, the other one is stopped as well.
+    stopped = list(await bench.motion.stop(known))
     bench.journal.add(text("station.stop-pressed"), level="warning", drive=request.drive)
-    return stop_result(bench, wanted, await bench.motion.standstill(known))
+    return stop_result(bench, wanted, await bench.motion.standstill(stopped))
 
 
 @router.get("/log")

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 import scipy
 
-from backend.analysis.coupled.modes import CoupledModes, find_modes
+from backend.analysis.coupled.modes import (
+    CoupledModes,
+    common_and_differential,
+    find_modes,
+)
 from backend.analysis.coupled.response import Controllers, CoupledResponse, PairRecord, estimate
 from backend.analysis.coupled.stability import (
     Design,
@@ -25,6 +30,7 @@ from backend.tools.gantry.result import (
     GantryFinding,
     GantryMargins,
     GantryMode,
+    GantryMotion,
     GantryResult,
     GantryValue,
 )
@@ -35,6 +41,7 @@ from drivers.errors import NotAllowed
 
 FloatArray = npt.NDArray[np.float64]
 _TURN = 2 * np.pi
+_KINDS: tuple[Literal["common", "skew"], ...] = ("common", "skew")
 
 
 @dataclass(frozen=True)
@@ -76,12 +83,12 @@ class Experiments:
     partner: str
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
-        """For storage."""
+        """For storage, which holds no complex numbers: pairs of real and imaginary part."""
         return {
             "lines": self.lines, "sent": self.sent, "torque": self.torque, "speed": self.speed,
             "valid": self.valid, "direction": self.direction, "skew_rad": self.skew_rad,
-            "controllers": self.controllers, "at_image": self.at_image,
-            "filters": self.filters,
+            "controllers": _pairs(self.controllers), "at_image": _pairs(self.at_image),
+            "filters": _pairs(self.filters),
         }  # fmt: skip
 
     def records(self) -> tuple[PairRecord, ...]:
@@ -142,6 +149,7 @@ def evaluate(data: Experiments, settings: GantrySettings) -> GantryResult:
         partner=data.partner,
         frequency_hz=_tuple(response.frequency_hz),
         entries=_entries(response),
+        motions=_motions(response),
         coupling=_tuple(ratio),
         coupling_half=_tuple(response.spread * deviation),
         relative_gain=_tuple(interaction(response.response)),
@@ -186,12 +194,20 @@ def reevaluate(arrays: Arrays, meta: Meta) -> GantryResult:
         np.asarray(arrays["speed"], np.float64), np.asarray(arrays["valid"], np.bool_),
         np.asarray(arrays["direction"], np.float64),
         np.asarray(arrays["skew_rad"], np.float64),
-        np.asarray(arrays["controllers"], np.complex128),
-        np.asarray(arrays["at_image"], np.complex128),
-        np.asarray(arrays["filters"], np.complex128), bool(meta["interpolates"]),
+        _complex(arrays["controllers"]), _complex(arrays["at_image"]),
+        _complex(arrays["filters"]), bool(meta["interpolates"]),
         (float(rated[0]), float(rated[1])), bool(meta["torque_known"]), str(meta["partner"]),
     )  # fmt: skip
     return evaluate(data, GantrySettings.model_validate(given))
+
+
+def _pairs(values: npt.NDArray[np.complex128]) -> FloatArray:
+    return np.stack([values.real, values.imag], axis=-1)
+
+
+def _complex(pairs: npt.NDArray[np.generic]) -> npt.NDArray[np.complex128]:
+    real = np.asarray(pairs, np.float64)
+    return np.asarray(real[..., 0] + 1j * real[..., 1])
 
 
 def _response(data: Experiments, records: tuple[PairRecord, ...]) -> CoupledResponse:
@@ -358,6 +374,22 @@ def _entries(response: CoupledResponse) -> tuple[GantryEntry, ...]:
                 )
             )  # fmt: skip
     return tuple(made)
+
+
+def _motions(response: CoupledResponse) -> tuple[GantryMotion, GantryMotion]:
+    found = common_and_differential(response)
+    both = np.einsum("kii->ki", found.response)
+    half = found.spread * np.einsum("kii->ki", found.std) / np.maximum(np.abs(both), 1e-300)
+    common, skew = (
+        GantryMotion(
+            kind=kind,
+            magnitude_db=_tuple(magnitude_db(both[:, i])),
+            half_db=_tuple(20.0 / np.log(10.0) * half[:, i]),
+            phase_deg=_tuple(phase_deg(both[:, i])),
+        )
+        for i, kind in enumerate(_KINDS)
+    )
+    return common, skew
 
 
 def _margins(found: JointMargins) -> GantryMargins:

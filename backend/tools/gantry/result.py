@@ -55,6 +55,17 @@ class GantryEntry(_Part):
     coherence: tuple[float, ...]
 
 
+class GantryMotion(_Part):
+    """Response of the motion alike (mean speed by the sum of both torques), or of the skew
+    (difference of the speeds by half the difference of the torques), line by line.
+    """
+
+    kind: Literal["common", "skew"]
+    magnitude_db: tuple[float, ...]
+    half_db: tuple[float, ...]
+    phase_deg: tuple[float, ...]
+
+
 class GantryMargins(_Part):
     """Of both speed loops together, on the measured lines; ``stable`` None where they do not show
     it. ``ms_alone`` is the peak of each axis by itself.
@@ -83,6 +94,7 @@ class GantryResult(ToolResult):
     partner: str
     frequency_hz: tuple[float, ...]
     entries: tuple[GantryEntry, ...]
+    motions: tuple[GantryMotion, GantryMotion]
     coupling: tuple[float, ...]
     coupling_half: tuple[float, ...]
     relative_gain: tuple[float, ...]

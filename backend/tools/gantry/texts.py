@@ -20,6 +20,15 @@ TEXTS: dict[str, tuple[str, str]] = {
         "两轴以同一低速双向运动，并叠加小幅激励：先同向，再反向。任一轴停止时两轴都停止；"
         "歪斜超出限值时两轴都停止。",
     ),
+    "danger": (
+        "WARNING: {first} and {second} are enabled and move several times together, each within "
+        "±{travel} rev of its present position, with at most {speed} rpm and {torque} % of rated "
+        "torque. Both are disabled afterwards. STOP of one stops both. Keep everyone clear of the "
+        "machine.",
+        "警告：{first} 与 {second} 将使能并一起运动多次，各限制在当前位置 ±{travel} 转、"
+        "{speed} rpm、{torque}% 额定转矩内，之后两轴断使能。停止其中一轴时两轴都停止。"
+        "请确保无人靠近。",
+    ),
     "start": ("Measure both axes", "测量两个轴"),
     "field.partner": ("The other axis", "另一轴"),
     "field.mirrored": ("The other motor turns the other way", "另一电机反向转动"),
@@ -46,6 +55,9 @@ TEXTS: dict[str, tuple[str, str]] = {
     "phase_margin": ("Smallest phase margin of both eigenloci", "两条特征轨迹的最小相位裕度"),
     "factor": ("Factor for both speed gains that keeps Ms", "保持 Ms 的两轴速度增益系数"),
     "response": ("Response from torque to speed", "从转矩到速度的频率响应"),
+    "motions": ("Motion alike and skew, from torque to speed", "同向运动与歪斜：从转矩到速度"),
+    "motion.common": ("alike: mean speed by both torques", "同向：平均速度 / 转矩之和"),
+    "motion.skew": ("skew: difference of speeds", "歪斜：速度差 / 转矩差的一半"),
     "coupling": ("Coupling of both axes", "两轴的耦合"),
     "frequency": ("Frequency (Hz)", "频率 (Hz)"),
     "magnitude": ("Magnitude (dB)", "幅值 (dB)"),
@@ -140,7 +152,7 @@ _TONES: dict[Code, Literal["good", "warn", "fault"]] = {
 
 
 def report(result: GantryResult) -> Section:
-    """Findings, figures and both curves."""
+    """Findings, figures and curves."""
     rows = [_row("fight", result.fight_percent, "%")]
     for number in (0, 1):
         place = {"axis": str(number + 1)}
@@ -163,7 +175,12 @@ def report(result: GantryResult) -> Section:
         for e in result.entries
     )
     ratio = Line("coupling", result.frequency_hz, result.coupling, result.coupling_half)
+    motions = tuple(
+        Line(f"motion.{m.kind}", result.frequency_hz, m.magnitude_db, m.half_db)
+        for m in result.motions
+    )
     charts = (
+        Chart("motions", "frequency", "magnitude", motions),
         Chart("response", "frequency", "magnitude", lines),
         Chart("coupling", "frequency", "ratio", (ratio,)),
     )

@@ -67,6 +67,14 @@ async def test_a_square_gantry(namespace: Namespace) -> None:
         assert np.median(off[use]) < 0.3, entry.torque
         assert np.median(half[use]) < 0.5, entry.torque
     assert np.mean(inside) >= 0.93
+    # Motion alike by the sum of both torques, and the skew by half of their difference.
+    common = np.sum(truth, axis=(1, 2)) / 4
+    skew = truth[:, 0, 0] - truth[:, 0, 1] - truth[:, 1, 0] + truth[:, 1, 1]
+    assert [motion.kind for motion in found.motions] == ["common", "skew"]
+    for motion, exact in zip(found.motions, (common, skew), strict=True):
+        off = np.abs(np.array(motion.magnitude_db) - 20 * np.log10(np.abs(exact)))
+        assert np.mean(off <= np.array(motion.half_db)) >= 0.93, motion.kind
+        assert np.median(np.array(motion.half_db)[use]) < 0.5, motion.kind
     assert codes(found)[0] == "square"
     # The modes of the equations of motion, which are those of this beam and these motors.
     assert [m.kind for m in found.modes] == ["skew", "common", "skew"]

@@ -4,6 +4,7 @@ import type {
   DwellResult,
   FirstPowerResult,
   FrictionResult,
+  GantryResult,
   HealthResult,
   InertiaAnswer,
   JobInfo,
@@ -21,6 +22,7 @@ type ToolOutcome =
   | DwellResult
   | FirstPowerResult
   | FrictionResult
+  | GantryResult
   | HealthResult
   | InertiaAnswer
   | LoadSideResult
@@ -48,6 +50,12 @@ export function asFriction(result: unknown): FrictionResult | null {
 export function asLoadSide(result: unknown): LoadSideResult | null {
   const found = outcome(result)
   return found?.tool === 'load-side' ? found : null
+}
+
+/** The figures of a gantry, or null where it is something else. */
+export function asGantry(result: unknown): GantryResult | null {
+  const found = outcome(result)
+  return found?.tool === 'gantry' ? found : null
 }
 
 /** The result of a brake test, or null where it is something else. */

@@ -6723,6 +6723,24 @@ export interface components {
             skew_share: number;
         };
         /**
+         * GantryMotion
+         * @description Response of the motion alike (mean speed by the sum of both torques), or of the skew
+         *     (difference of the speeds by half the difference of the torques), line by line.
+         */
+        GantryMotion: {
+            /** Half Db */
+            half_db: number[];
+            /**
+             * Kind
+             * @enum {string}
+             */
+            kind: "common" | "skew";
+            /** Magnitude Db */
+            magnitude_db: number[];
+            /** Phase Deg */
+            phase_deg: number[];
+        };
+        /**
          * GantryResult
          * @description Axis 1 is the one that the measurement was started on, axis 2 is ``partner``.
          *
@@ -6770,6 +6788,11 @@ export interface components {
             modes: components["schemas"]["GantryMode"][];
             /** Motion S */
             motion_s: number;
+            /** Motions */
+            motions: [
+                components["schemas"]["GantryMotion"],
+                components["schemas"]["GantryMotion"]
+            ];
             out_of_square_mm: components["schemas"]["GantryValue"] | null;
             out_of_square_rev: components["schemas"]["GantryValue"] | null;
             /** Partner */
@@ -13816,6 +13839,7 @@ export type GantryEntry = components['schemas']['GantryEntry'];
 export type GantryFinding = components['schemas']['GantryFinding'];
 export type GantryMargins = components['schemas']['GantryMargins'];
 export type GantryMode = components['schemas']['GantryMode'];
+export type GantryMotion = components['schemas']['GantryMotion'];
 export type GantryResult = components['schemas']['GantryResult'];
 export type GantrySettings = components['schemas']['GantrySettings'];
 export type GantryValue = components['schemas']['GantryValue'];

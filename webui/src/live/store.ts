@@ -1,4 +1,4 @@
-import { useSyncExternalStore } from 'react'
+import { useEffect, useReducer, useSyncExternalStore } from 'react'
 import type {
   AxisState,
   DriveSummary,
@@ -95,6 +95,18 @@ export const useDrive = (id: string | null) =>
   useStore('drives', () => contents.drives?.find((drive) => drive.id === id) ?? null)
 export const useAxisState = (id: string | null) =>
   useStore(`state ${id}`, () => (id === null ? null : (contents.states.get(id) ?? null)))
+/** The states of several axes; null for one that was not reported yet. */
+export function useAxisStates(ids: readonly string[]): (AxisState | null)[] {
+  const [, again] = useReducer((count: number) => count + 1, 0)
+  const key = ids.join(' ')
+  useEffect(() => {
+    const ends = key.split(' ').map((id) => subscribe(`state ${id}`, again))
+    return () => {
+      for (const end of ends) end()
+    }
+  }, [key])
+  return ids.map((id) => contents.states.get(id) ?? null)
+}
 export const useJobs = () => useStore('jobs', () => contents.jobs)
 export const useJob = (id: string | null) =>
   useStore('jobs', () => (id === null ? null : (contents.jobs.get(id) ?? null)))

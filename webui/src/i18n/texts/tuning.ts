@@ -354,9 +354,18 @@ export const tuning = {
   'fold.manual': ['Step by step', '逐步整定'],
   'fold.manualHelp': ['Steps 2 to 6 by hand.', '手动完成步骤 2 至 6。'],
   'fold.more': [
-    'Cycle load, vibration, friction, brake, health',
-    '循环负载、振动、摩擦、抱闸、健康检查',
+    'Cycle load, vibration, friction, gantry, brake, health',
+    '循环负载、振动、摩擦、龙门、抱闸、健康检查',
   ],
+  'gantry.choose': ['Choose', '请选择'],
+  'gantry.unchosen': ['Choose the other axis first.', '请先选择另一轴。'],
+  'gantry.others': ['Not possible as the other axis:', '不能作为另一轴：'],
+  'gantry.segment': ['It is not on the same EtherCAT segment.', '不在同一 EtherCAT 网段上。'],
+  'gantry.alone': [
+    'A gantry is measured with two drives on one EtherCAT segment. This axis has no other one there.',
+    '测量龙门需要同一 EtherCAT 网段上的两个驱动器。此轴所在网段没有其他驱动器。',
+  ],
+  'gantry.axes': ['Axis 1 is {first}, axis 2 is {second}.', '轴 1 为 {first}，轴 2 为 {second}。'],
   'fold.moreHelp': ['Not part of tuning.', '不属于整定步骤。'],
   'fold.response': [
     'The mechanics are measured from torque to speed.',

@@ -10,6 +10,7 @@ import { JobNote } from '../../widgets/JobNote'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { StartButton } from '../../widgets/StartButton'
+import { useSay } from '../../widgets/profile-text/texts'
 import { useAction } from '../../widgets/useAction'
 import type { Limits } from '../response/limits'
 import { useToolJob } from '../response/useToolJob'
@@ -79,7 +80,7 @@ export function ShapingPanel({
       </StartButton>
       <ProblemNote problem={start.problem} onClose={start.clear} />
       <JobNote id={note} onClose={dismiss} />
-      {result && <ShapingAnswer result={result} text={text} />}
+      {result && <ShapingAnswer drive={drive} result={result} text={text} />}
     </Panel>
   )
 }
@@ -87,8 +88,17 @@ export function ShapingPanel({
 const COLORS = { light: ['#1a5c94', '#c2571a'], dark: ['#6db3f2', '#f0a060'] } as const
 
 /** Verdict and findings, both traces, mode and comparison, and the shapers. */
-function ShapingAnswer({ result, text }: { result: ShapingResult; text: Text }) {
+function ShapingAnswer({
+  drive,
+  result,
+  text,
+}: {
+  drive: string
+  result: ShapingResult
+  text: Text
+}) {
   const t = useT()
+  const ofProfile = useSay(drive)
   const dark = useComputedColorScheme('light') === 'dark'
   const [first, second] = COLORS[dark ? 'dark' : 'light']
   const curves = useMemo(() => {
@@ -138,7 +148,7 @@ function ShapingAnswer({ result, text }: { result: ShapingResult; text: Text }) 
           </table>
         </div>
       )}
-      {shapingTables(result, text).map((table) => (
+      {shapingTables(result, text, ofProfile).map((table) => (
         <div className="scroll-table" key={table.name}>
           <table className="reported-values of-lists" aria-label={table.name}>
             <thead>

@@ -21,6 +21,7 @@ import { BrakePanel } from './BrakePanel'
 import { FirstPowerPanel } from './FirstPowerPanel'
 import { FrictionPanel } from './FrictionPanel'
 import { GainsPanel } from './GainsPanel'
+import { GantryPanel } from './GantryPanel'
 import { HealthPanel } from './HealthPanel'
 import { InertiaPanel } from './InertiaPanel'
 import { LoadSidePanel } from './LoadSidePanel'
@@ -61,6 +62,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
   const stepJob = useToolJob(drive, 'step').job
   const frictionJob = useToolJob(drive, 'friction').job
   const loadSideJob = useToolJob(drive, 'load-side').job
+  const gantryJob = useToolJob(drive, 'gantry').job
   const brakeJob = useToolJob(drive, 'brake-test').job
   const firstJob = useToolJob(drive, 'first-power').job
   const healthJob = useToolJob(drive, 'health').job
@@ -72,6 +74,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
   useJobEnd(inertiaJob?.id ?? null, () => void measured.refresh())
   useJobEnd(frictionJob?.id ?? null, () => void measured.refresh())
   useJobEnd(loadSideJob?.id ?? null, () => void measured.refresh())
+  useJobEnd(gantryJob?.id ?? null, () => void measured.refresh())
   useJobEnd(brakeJob?.id ?? null, () => void measured.refresh())
   useJobEnd(firstJob?.id ?? null, () => void measured.refresh())
   useJobEnd(cycleJob?.id ?? null, () => void measured.refresh())
@@ -127,6 +130,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
     [firstJob, 'first'],
     [frictionJob, 'more'],
     [loadSideJob, 'more'],
+    [gantryJob, 'more'],
     [brakeJob, 'more'],
     [healthJob, 'more'],
     [safetyJob, 'more'],
@@ -262,6 +266,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
               <DwellPanel {...measure} />
               <FrictionPanel {...measure} />
               <LoadSidePanel {...measure} />
+              <GantryPanel {...measure} />
               <BrakePanel {...measure} />
               <HealthPanel {...measure} />
               <SafetyPanel {...measure} />

@@ -73,9 +73,11 @@ it('has no rows for what was not compared', () => {
 })
 
 it('lists the impulses of each shaper, and the values of the drive', () => {
-  const [shapers, drive] = shapingTables(RESULT, spoken)
+  const [shapers, drive] = shapingTables(RESULT, spoken, (name) => name)
   expect(shapers?.rows).toEqual([
     ['chosen shaper=ZV', '52.00 / 48.00', '0.0 / 62.5', '0.0–3.3', '7.75–8.25'],
   ])
   expect(drive?.rows).toEqual([['named parameter=P09.26 name=Frequency', '8\u00a0Hz']])
+  const [, chinese] = shapingTables(RESULT, spoken, (name) => ({ Frequency: '频率' })[name] ?? name)
+  expect(chinese?.rows[0]?.[0]).toBe('named parameter=P09.26 name=频率')
 })

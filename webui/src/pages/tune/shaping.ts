@@ -98,8 +98,15 @@ interface ShownTable {
   rows: string[][]
 }
 
-/** The shapers with their impulses, and what the drive's own filter would take. */
-export function shapingTables(result: ShapingResult, text: Text): ShownTable[] {
+/**
+ * The shapers with their impulses, and what the drive's own filter would take. `ofProfile` says a
+ * text of the drive's profile in the language of the page.
+ */
+export function shapingTables(
+  result: ShapingResult,
+  text: Text,
+  ofProfile: (text: string) => string,
+): ShownTable[] {
   const { shapers, drive_values: values } = result
   const list = (numbers: number[], decimals: number) =>
     numbers.map((each) => each.toFixed(decimals)).join(' / ')
@@ -130,7 +137,7 @@ export function shapingTables(result: ShapingResult, text: Text): ShownTable[] {
       name: text('head.parameter'),
       head: [text('head.parameter'), text('head.value')],
       rows: values.map((each) => [
-        text('named', { parameter: each.parameter, name: each.name }),
+        text('named', { parameter: each.parameter, name: ofProfile(each.name) }),
         `${engineering(each.value)}\u00a0${each.unit}`.trim(),
       ]),
     })
