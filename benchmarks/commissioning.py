@@ -322,7 +322,8 @@ def measured(names: Iterable[str], small: bool = False) -> dict[str, Figures]:
             found[name] = asyncio.run(_item(name, small))
         except Exception as error:
             # A busy computer may lose the process data of one item; the others are measured.
-            found[name] = [Figure(f"broken: {type(error).__name__}: {error}", "", "", False)]
+            print(f"{name} broken: {error}", flush=True)
+            found[name] = [Figure("not measured", "", type(error).__name__, False)]
         print(f"{name}: {time.perf_counter() - begun:.0f} s", flush=True)
         for each in found[name]:
             print(f"  {each.name}: {each.value} ({each.aim or 'no aim'})", flush=True)
