@@ -318,7 +318,12 @@ def measured(names: Iterable[str], small: bool = False) -> dict[str, Figures]:
     found = {}
     for name in names:
         begun = time.perf_counter()
-        found[name] = asyncio.run(_item(name, small))
+        try:
+            found[name] = asyncio.run(_item(name, small))
+        except Exception as error:
+            # A busy computer may lose the process data of one item; the others are measured.
+            print(f"{name} broken: {error}", flush=True)
+            found[name] = [Figure("not measured", "", type(error).__name__, False)]
         print(f"{name}: {time.perf_counter() - begun:.0f} s", flush=True)
         for each in found[name]:
             print(f"  {each.name}: {each.value} ({each.aim or 'no aim'})", flush=True)
