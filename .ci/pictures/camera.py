@@ -1,0 +1,139 @@
+"""Screenshots and screen recordings of the page as WebP files."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from marks import Mark, drawn
+from PIL import Image
+from playwright.sync_api import Browser, BrowserContext, Locator, Page
+
+from tests.browser.conftest import LAPTOP
+
+#: Colours of a stored picture: thin lines of plots keep theirs, by which they are distinguished.
+COLOURS = 200
+#: Recordings are shown narrower than the page, and with at most so many pictures per second.
+RECORDED_WIDTH = 800
+RECORDED_PER_S = 6.0
+RECORDED_COLOURS = 96
+#: A recording must not be larger, in bytes.
+RECORDED_LIMIT = 600_000
+#: How long the last picture of a recording stays before it begins again, in ms.
+LAST_MS = 2500
+#: Notices that no picture may show: something was refused, or a job failed.
+TROUBLE = ".note.fault, [role=alert]"
+TIMEOUT_MS = 60_000
+
+
+class Trouble(RuntimeError):
+    """The page shows a notice that no picture may show."""
+
+
+@contextmanager
+def opened(
+    browser: Browser, url: str, language: str, size: dict[str, Any] = LAPTOP
+) -> Iterator[Page]:
+    """A light page in a language, without the offer of the guided tour."""
+    context: BrowserContext = browser.new_context(
+        locale=language, color_scheme="light", reduced_motion="reduce", **size
+    )
+    context.add_init_script(
+        f"localStorage.setItem('servodeck.language', '{language}');"
+        "localStorage.setItem('servodeck.tour', 'left')"
+    )
+    page = context.new_page()
+    page.set_default_timeout(TIMEOUT_MS)
+    # 3D without a graphics processor takes the computer that the cyclic exchange needs.
+    page.route("**/viser/**", lambda route: route.abort())
+    page.goto(url)
+    page.get_by_role("heading", level=1).wait_for()
+    try:
+        yield page
+    finally:
+        context.close()
+
+
+def take(
+    what: Page | Locator, file: Path, marks: Sequence[Mark] = (), *, faulty: bool = False
+) -> None:
+    """Store a screenshot of a page or of a part of it.
+
+    ``faulty``: the picture is about a fault, so its notice belongs there.
+
+    Raises:
+        Trouble: a notice of trouble is in sight. ValueError: a mark is not in sight.
+    """
+    page = what if isinstance(what, Page) else what.page
+    notices = page.locator(TROUBLE).all()
+    shown = [] if faulty else [each.inner_text() for each in notices if each.is_visible()]
+    if any(shown):
+        raise Trouble(f"{file.name}: {'; '.join(shown)}")
+    with drawn(page, marks):
+        picture = Image.open(io.BytesIO(what.screenshot())).convert("RGB")
+    reduced = picture.quantize(COLOURS, dither=Image.Dither.NONE).convert("RGB")
+    reduced.save(file, lossless=True, quality=100, method=6)
+
+
+class Recording:
+    """The screen of a page while something happens, from Chromium's own screencast."""
+
+    def __init__(self, page: Page) -> None:
+        self._page = page
+        self._frames: list[tuple[float, bytes]] = []
+        self._session = page.context.new_cdp_session(page)
+        self._session.on("Page.screencastFrame", self._keep)
+
+    def _keep(self, frame: dict[str, Any]) -> None:
+        self._frames.append((frame["metadata"]["timestamp"], base64.b64decode(frame["data"])))
+        self._session.send("Page.screencastFrameAck", {"sessionId": frame["sessionId"]})
+
+    def __enter__(self) -> Recording:
+        size = self._page.viewport_size
+        assert size is not None
+        wanted = {"format": "png", "maxWidth": size["width"], "maxHeight": size["height"]}
+        self._session.send("Page.startScreencast", wanted)
+        return self
+
+    def __exit__(self, *_exc: object) -> None:
+        self._session.send("Page.stopScreencast")
+        self._session.detach()
+
+    def store(self, file: Path, speed: float = 1.0) -> float:
+        """Write what was recorded, ``speed`` times as fast; returns its length in s.
+
+        Raises:
+            ValueError: nothing changed on the screen, or the file is larger than it may be.
+        """
+        kept: list[tuple[float, bytes]] = []
+        for time_s, data in self._frames:
+            if not kept or (time_s - kept[-1][0]) / speed >= 1 / RECORDED_PER_S:
+                kept.append((time_s, data))
+        if kept and self._frames[-1][0] > kept[-1][0]:
+            kept.append(self._frames[-1])
+        if len(kept) < 3:
+            raise ValueError(f"{file.name}: nothing changes on the screen")
+        pictures = [_reduced(data) for _, data in kept]
+        later = [time_s for time_s, _ in kept[1:]]
+        waits = [
+            max(round((after - now) / speed * 1000), 20)
+            for (now, _), after in zip(kept, later, strict=False)
+        ]
+        pictures[0].save(
+            file, save_all=True, append_images=pictures[1:], duration=[*waits, LAST_MS], loop=0,
+            lossless=True, quality=100, method=4, minimize_size=True,
+        )  # fmt: skip
+        if file.stat().st_size > RECORDED_LIMIT:
+            raise ValueError(f"{file.name} has {file.stat().st_size} bytes")
+        return (kept[-1][0] - kept[0][0]) / speed
+
+
+def _reduced(data: bytes) -> Image.Image:
+    picture = Image.open(io.BytesIO(data)).convert("RGB")
+    height = round(picture.height * RECORDED_WIDTH / picture.width)
+    small = picture.resize((RECORDED_WIDTH, height), Image.Resampling.LANCZOS)
+    return small.quantize(RECORDED_COLOURS, dither=Image.Dither.NONE).convert("RGB")

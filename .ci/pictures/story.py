@@ -1,0 +1,552 @@
+"""How one axis of the demo is commissioned, and what is photographed on the way.
+
+The axis is *Gantry left* of the demo bench, a screw on EtherCAT, from untouched to tuned. Signals
+and figures of the scope come first, as the settings are then those of the delivery.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from camera import Recording, opened, take
+from marks import Mark
+from playwright.sync_api import Browser, Locator, Page, expect
+from readings import Readings
+
+from tests.browser.driving import find, open_axis
+from tests.browser.test_scope import TORQUE, VELOCITY, add_channel, figure, number, peaks
+from tests.browser.tuning import open_step
+from tests.support.demo import AXIS, Demo
+from tests.support.station import until
+
+URL = "ethercat://virtual0"
+CYCLE_US = 1000
+LIMITS = {"travel_limit": 3, "speed_limit": 1200, "torque_limit": 80}
+SIGNAL_LIMITS = {"travel_limit": 20, "speed_limit": 1500, "torque_limit": 250}
+#: Measurements that a busy computer disturbed are repeated; what fails more often is a defect.
+TRIES = 4
+LONG_S = 240.0
+#: After the first values have come, so that plots and tables show something.
+SETTLE_MS = 1500
+#: Panels are photographed on a page that shows them whole.
+TALL = {"viewport": {"width": 1180, "height": 2600}}
+ERROR = "c4"
+LANGUAGES = ("en", "zh")
+
+
+class Story:
+    """The run: the demo, the browser, and where the pictures go."""
+
+    def __init__(self, demo: Demo, browser: Browser, folder: Path) -> None:
+        self.demo = demo
+        self.browser = browser
+        self.folder = folder
+        self.readings = Readings()
+        self.repeated = 0
+
+    # --- the axis ---------------------------------------------------------------------
+
+    def ok(self, path: str, method: str = "GET", body: object = None) -> Any:
+        answer = self.demo.http.request(method, path, json=body)
+        assert answer.is_success, f"{path}: {answer.text}"
+        return answer.json() if answer.content else None
+
+    def ended(self, job: str, timeout_s: float = LONG_S) -> Any:
+        def over() -> Any:
+            now = self.demo.ask(f"/jobs/{job}")
+            return now if now["state"] != "running" else None
+
+        return until(over, timeout_s, f"job {job} ends")
+
+    def ready(self) -> None:
+        """The axis answers without a fault, nothing moves it, and the bus exchanges."""
+
+        def fit() -> bool:
+            state = self.demo.fresh()
+            if state["state"] == "Fault":
+                self.demo.http.post(f"/drives/{AXIS}/fault-reset", json={})
+            return state["moving_job"] is None and state["state"] != "Fault"
+
+        until(fit, LONG_S, "the axis is ready")
+        body = {"url": URL, "cycle_us": CYCLE_US}
+        until(lambda: self._exchanges(body), LONG_S, "the exchange runs")
+
+    def _exchanges(self, body: object) -> bool:
+        buses = self.demo.ask("/buses")
+        (bus,) = [each for each in buses if each["url"] == URL]
+        if (bus["cyclic"] or {}).get("running"):
+            return True
+        return bool(self.demo.http.post("/buses/cyclic", json=body).is_success)
+
+    def run(self, tool: str, **settings: object) -> Any:
+        """A measurement; the result of the job."""
+        for _ in range(TRIES):
+            self.ready()
+            answer = self.demo.http.post(f"/drives/{AXIS}/jobs/{tool}", json=LIMITS | settings)
+            if answer.is_success:
+                job = self.ended(answer.json()["id"])
+                if job["state"] == "done":
+                    return job["result"]
+                print(f"{tool} is repeated: {(job['problem'] or {}).get('detail')}")
+            else:
+                print(f"{tool} is repeated: {answer.text}")
+            self.repeated += 1
+            time.sleep(1)
+        raise RuntimeError(f"{tool} failed {TRIES} times")
+
+    # --- pictures ---------------------------------------------------------------------
+
+    @contextmanager
+    def page(self, language: str = "en", **size: Any) -> Iterator[Page]:
+        with opened(self.browser, self.demo.url, language, **size) as page:
+            yield page
+
+    def keep(
+        self, what: Page | Locator, name: str, marks: Sequence[Mark] = (), *, faulty: bool = False
+    ) -> None:
+        page = what if isinstance(what, Page) else what.page
+        page.wait_for_timeout(SETTLE_MS)
+        take(what, self.folder / f"{name}.webp", marks, faulty=faulty)
+        print(f"  {name}")
+
+    def both(
+        self, name: str, show: Callable[[Page], Sequence[Mark]], *, faulty: bool = False
+    ) -> None:
+        """The same picture in English and in Chinese."""
+        for language in LANGUAGES:
+            with self.page(language) as page:
+                marks = show(page)
+                self.keep(page, name if language == "en" else f"{name}-zh", marks, faulty=faulty)
+
+
+def panel(page: Page, title: str) -> Locator:
+    return page.locator("section.panel", has=page.get_by_role("heading", name=title, exact=True))
+
+
+# --- the bus --------------------------------------------------------------------------
+
+
+def connected(story: Story) -> None:
+    """What a scan finds; it is made before the exchange, which keeps the bus to itself."""
+    story.demo.fresh()
+    story.both("connect", _connect)
+
+
+def _connect(page: Page) -> Sequence[Mark]:
+    page.evaluate("location.hash = '#/connect'")
+    way = page.locator("ul.ways button", has_text=URL)
+    way.click()
+    scan = page.locator("button", has_text=re.compile("^(Scan|扫描)$")).first
+    scan.click()
+    page.locator(".found").first.wait_for()
+    scan.scroll_into_view_if_needed()
+    page.wait_for_timeout(SETTLE_MS)
+    return [Mark(scan), Mark(page.locator(".found").first)]
+
+
+# --- scope: the axis as delivered -----------------------------------------------------
+
+
+def played(story: Story, **signal: object) -> bool:
+    """Whether a test signal was played to its end; a busy computer may keep the axis from it."""
+    story.ready()
+    answer = story.demo.http.post(f"/drives/{AXIS}/jobs/generate", json=SIGNAL_LIMITS | signal)
+    done = answer.is_success and story.ended(answer.json()["id"])["state"] == "done"
+    story.repeated += not done
+    return bool(done)
+
+
+def arm(page: Page, kind: str, window_s: str) -> None:
+    """A single trigger."""
+    page.get_by_label("Time shown").select_option(window_s)
+    page.get_by_label("Trigger", exact=True).select_option("single")
+    page.get_by_label("When", exact=True).select_option(kind)
+
+
+def caught(page: Page, story: Story, **signal: object) -> None:
+    """A whole signal in a single picture."""
+    for _ in range(TRIES):
+        page.get_by_role("button", name="Arm").click()
+        expect(page.get_by_text("Waiting for the trigger")).to_be_visible(timeout=60_000)
+        if played(story, **signal):
+            expect(page.get_by_text("Triggered (1)")).to_be_visible(timeout=120_000)
+            return
+    raise RuntimeError("this computer is too busy for the axis")
+
+
+def cursors(page: Page, a: str, b: str) -> None:
+    """Both cursors at typed times; the table follows."""
+    if page.get_by_label("Cursor A").count() == 0:
+        page.get_by_role("button", name="Cursors").click()
+    page.get_by_label("Cursor A").fill(a)
+    page.get_by_label("Cursor B").fill(b)
+    page.wait_for_timeout(SETTLE_MS)
+
+
+def reading(page: Page, trace: str, name: str) -> float:
+    """A cell of the table of measurements."""
+    return number(figure(page, trace, name))
+
+
+def scope(story: Story) -> None:
+    """A step, a move and a spectrum, with the figures that the page reads."""
+    story.ready()
+    with story.page() as page:
+        page.evaluate(f"location.hash = '#/axis/{AXIS}/overview'")
+        page.wait_for_timeout(SETTLE_MS)
+        page.evaluate("location.hash = '#/scope'")
+        figure(page, VELOCITY, "min").wait_for()
+        add_channel(page, "60F4")
+        _step(page, story)
+        _following_error(page, story)
+        _spectrum(page, story)
+
+
+def _step(page: Page, story: Story) -> None:
+    add = story.readings.add
+    arm(page, "rising", "0.5")
+    page.get_by_label("Level").fill("100")
+    # An earlier, lower step as reference.
+    caught(page, story, mode="CSV", shape="step", amplitude=180, duration_s=2.4)
+    page.get_by_text("Keep", exact=True).click()
+    page.get_by_role("button", name="Keep this view as reference").click()
+    page.get_by_text("Measurements", exact=True).click()
+    page.get_by_label("Level").fill("120")
+    caught(page, story, mode="CSV", shape="step", amplitude=240, duration_s=2.4)
+    cursors(page, "-0.05", "0.3")
+    page.get_by_role("heading", level=1).scroll_into_view_if_needed()
+    plot = page.get_by_role("img", name="Scope")
+    marks = [
+        Mark(page.get_by_role("button", name="Channels")),
+        Mark(page.get_by_label("Trigger", exact=True)),
+        Mark(page.get_by_role("button", name="Cursors")),
+        Mark(plot),
+    ]
+    story.keep(page, "scope", marks)
+    table = page.get_by_role("region", name="Measurements")
+    table.get_by_role("row").last.scroll_into_view_if_needed()
+    story.keep(page, "scope-step")
+    rise_ms = reading(page, VELOCITY, "rise")
+    add("scope_rise", rise_ms, "ms", 2)
+    add("scope_bandwidth", 0.35e3 / rise_ms, "Hz", 1)
+    add("scope_overshoot", reading(page, VELOCITY, "overshoot"), "%", 2)
+    add("scope_peak", reading(page, VELOCITY, "max"), "rpm", 2)
+    add("scope_settling", reading(page, VELOCITY, "settling"), "ms", 2)
+    add("scope_torque_max", reading(page, TORQUE, "max"), "%", 2)
+    add("scope_torque_mean", reading(page, TORQUE, "mean"), "%", 2)
+
+
+def _following_error(page: Page, story: Story) -> None:
+    arm(page, "motion", "1")
+    caught(page, story, mode="CSP", shape="ramp", amplitude=4, duration_s=2.4, acceleration=5)
+    cursors(page, "0.2", "0.7")
+    lag = reading(page, ERROR, "mean")
+    story.readings.add("scope_lag", lag, "rev", 3)
+    story.readings.add("scope_position_gain", 5 / lag, "/s", 2)
+
+
+def _spectrum(page: Page, story: Story) -> None:
+    page.get_by_label("Trigger", exact=True).select_option("off")
+    page.get_by_label("Time shown").select_option("5")
+    page.get_by_text("Spectrum", exact=True).click()
+    spectrum = page.get_by_role("region", name="Spectrum")
+    spectrum.get_by_label("Window").select_option("flattop")
+    spectrum.get_by_label("Trace").select_option(VELOCITY)
+    signal = {"mode": "CSV", "shape": "sine", "amplitude": 20, "frequency_hz": 12}
+    answer = story.demo.http.post(
+        f"/drives/{AXIS}/jobs/generate", json=SIGNAL_LIMITS | signal | {"duration_s": 25}
+    )
+    assert answer.is_success, answer.text
+    heights = [0.0]
+
+    def steady() -> bool:
+        """Nothing but the signal is in sight: its line has stopped growing."""
+        page.wait_for_timeout(500)
+        (hertz, height), *_ = peaks(page) or [(0.0, 0.0)]
+        heights.append(height)
+        return abs(hertz - 12) < 0.02 and height > 15 and abs(height / heights[-2] - 1) < 1e-3
+
+    until(steady, 120.0, "the sine alone")
+    page.get_by_role("button", name="Pause").click()
+    found = {}
+    for trace in (VELOCITY, TORQUE):
+        spectrum.get_by_label("Trace").select_option(trace)
+        page.wait_for_timeout(SETTLE_MS)
+        found[trace] = peaks(page)
+    page.locator(".scope-tabs").scroll_into_view_if_needed()
+    page.get_by_role("table", name="Highest peaks").scroll_into_view_if_needed()
+    story.keep(page, "scope-spectrum")
+    for trace, name, unit in ((VELOCITY, "speed", "rpm"), (TORQUE, "torque", "%")):
+        for hertz in (12, 36):
+            (height,) = [a for f, a in found[trace] if abs(f - hertz) < 0.1]
+            story.readings.add(f"line_{hertz}_{name}", height, unit, 2)
+    story.demo.http.post("/stop", json={})
+    story.ended(answer.json()["id"])
+
+
+# --- pages of the axis ----------------------------------------------------------------
+
+
+def pages(story: Story) -> None:
+    """Every page once, on the axis as delivered."""
+    story.ready()
+    story.ok(
+        f"/drives/{AXIS}/watch", "PUT", {"keys": ["2005:03", "200E:0B", "60F4:00"]}
+    )
+    body = {"file": "feed screw as delivered", "author": "M. Keller", "notes": "before tuning"}
+    job = story.ok(f"/drives/{AXIS}/jobs/read_all", "POST", {})
+    story.ended(job["id"])
+    story.ok(f"/drives/{AXIS}/sets", "POST", body)
+    story.both("parameters", _parameters)
+    story.both("motion", _motion)
+    with story.page() as page:
+        open_axis(page, AXIS, "overview")
+        story.keep(page, "overview")
+        open_axis(page, AXIS, "motion")
+        page.get_by_text("Homing", exact=True).first.click()
+        story.keep(page, "homing")
+        open_axis(page, AXIS, "gains")
+        story.keep(page, "gains")
+        open_axis(page, AXIS, "setup")
+        page.get_by_role("button", name="Calculate").click()
+        story.keep(page, "setup")
+        open_axis(page, AXIS, "io")
+        story.keep(page, "io")
+
+
+def _parameters(page: Page) -> Sequence[Mark]:
+    """One value edited and not written."""
+    open_axis(page, AXIS, "parameters")
+    row = find(page, "6084:00")
+    row.get_by_role("button").first.click()
+    page.keyboard.type("1200000")
+    page.keyboard.press("Enter")
+    page.get_by_role("searchbox").fill("608")
+    page.wait_for_timeout(SETTLE_MS)
+    return [Mark(page.get_by_role("searchbox")), Mark(page.locator('[id="row-6084:00"]'))]
+
+
+def _motion(page: Page) -> Sequence[Mark]:
+    open_axis(page, AXIS, "motion")
+    page.locator(".jog-pad").wait_for()
+    return [
+        Mark(page.locator(".jog-panel .fields")),
+        Mark(page.locator(".jog-pad button").last),
+        Mark(page.locator(".jog-live")),
+        Mark(page.locator("button.stop")),
+    ]
+
+
+# --- jog ------------------------------------------------------------------------------
+
+
+def jog(story: Story) -> None:
+    """Hold the button, release it: the axis brakes."""
+    for _ in range(TRIES):
+        story.ready()
+        with story.page() as page:
+            open_axis(page, AXIS, "motion")
+            button = page.get_by_role("button", name="Hold to move in the positive direction")
+            expect(button).to_have_attribute("aria-disabled", "false")
+            box = button.bounding_box()
+            assert box is not None
+            page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+            with Recording(page) as recording:
+                page.wait_for_timeout(1000)
+                page.mouse.down()
+                page.wait_for_timeout(4000)
+                page.mouse.up()
+                page.wait_for_timeout(2500)
+            reason = page.get_by_text("Ended: released")
+            if reason.is_visible():
+                recording.store(story.folder / "jog.webp")
+                return
+        story.repeated += 1
+    raise RuntimeError("the jog never ended by the release of the button")
+
+
+# --- measuring and tuning -------------------------------------------------------------
+
+
+def measured(story: Story) -> None:
+    """Inertia, both responses and a step, before anything is changed."""
+    add = story.readings.add
+    found = story.run("inertia")
+    add("inertia", found["inertia_kgm2"], "kg·m²", 2)
+    add("coulomb", found["coulomb_nm"], "N·m", 1)
+    story.run("sweep", kind="speed_loop")
+    sweep = story.run("sweep")
+    kinds = {each["kind"]: each["frequency_hz"] for each in sweep["resonances"][:2]}
+    add("antiresonance", kinds["antiresonance"], "Hz", 2)
+    add("resonance", kinds["resonance"], "Hz", 3)
+    story.run("step")
+
+
+def show(page: Page, what: str, number: int = 0) -> None:
+    stored = page.locator("li.measured", has_text=what).nth(number)
+    stored.get_by_role("button", name="Show", exact=True).click()
+    page.get_by_role("img").first.wait_for()
+
+
+def designs(story: Story) -> None:
+    """What is designed from the measurements by hand, step by step."""
+    with story.page() as page:
+        open_axis(page, AXIS, "response")
+        show(page, "Mechanics")
+        page.locator(".bode").first.scroll_into_view_if_needed()
+        story.keep(page, "response")
+    with story.page(size=TALL) as page:
+        open_axis(page, AXIS, "tune")
+        story.keep(page.get_by_role("navigation", name="Steps of commissioning"), "tuning-path")
+        open_step(page, "notches")
+        page.get_by_role("button", name="Compute designs").click()
+        page.get_by_role("table", name="Designs").wait_for(timeout=180_000)
+        story.keep(panel(page, "Designs"), "tuning-designs")
+        open_axis(page, AXIS, "response")
+        show(page, "Mechanics")
+        story.keep(page.locator(".bode").first, "tuning-mechanics")
+        page.get_by_text("What the shape of the curve shows").click()
+        story.keep(page.locator("ul.shapes"), "tuning-shapes")
+        page.get_by_text("What the shape of the curve shows").click()
+        page.get_by_role("button", name="Notch here").first.click()
+        expect(page.get_by_text("Effect in the drive: ").first).to_be_visible()
+        story.keep(panel(page, "Notches"), "tuning-notches")
+        story.keep(panel(page, "Try gains"), "tuning-predicted")
+
+
+def automatic(story: Story) -> None:
+    """All steps in one job, started on the page."""
+    for _ in range(TRIES):
+        story.ready()
+        with story.page() as page:
+            open_axis(page, AXIS, "tune")
+            start = page.get_by_role("button", name="Start tuning")
+            open_step(page, "automatic")
+            start.scroll_into_view_if_needed()
+            page.wait_for_timeout(SETTLE_MS)
+            before = {job["id"] for job in story.demo.ask("/jobs")}
+            with Recording(page) as recording:
+                page.wait_for_timeout(800)
+                start.click()
+                began = time.monotonic()
+                new = until(lambda old=before: _new(story, "autotune", old), 60, "the job runs")
+                while story.demo.ask(f"/jobs/{new}")["state"] == "running":
+                    page.wait_for_timeout(500)
+                took_s = time.monotonic() - began
+                page.wait_for_timeout(3000)
+            job = story.demo.ask(f"/jobs/{new}")
+            if job["state"] == "done" and job["result"]["applied"] is not None:
+                length_s = recording.store(story.folder / "tune.webp", speed=4)
+                print(f"  tune: {took_s:.0f} s, shown in {length_s:.0f} s")
+                _tuned(story, job["result"], took_s)
+                return
+            print(f"autotune is repeated: {(job['problem'] or {}).get('detail')}")
+        story.repeated += 1
+    raise RuntimeError("the axis was not tuned")
+
+
+def _new(story: Story, kind: str, before: set[str]) -> str | None:
+    found = [job["id"] for job in story.demo.ask("/jobs") if job["kind"] == kind]
+    return next((job for job in found if job not in before), None)
+
+
+def _tuned(story: Story, result: Any, took_s: float) -> None:
+    import json
+
+    Path("/tmp/pp/tuned.json").write_text(json.dumps(result, indent=1))
+    add = story.readings.add
+    applied, verified = result["applied"], result["verified"]
+    add("tuned_bandwidth", verified["measured_bandwidth_hz"], "Hz", 2)
+
+
+def verified(story: Story) -> None:
+    """The tuned axis beside the untouched one, on the page and in the report."""
+    story.both("tune", _tune)
+    story.both("response-mechanics", _response)
+    with story.page(size=TALL) as page:
+        open_axis(page, AXIS, "tune")
+        page.get_by_role("heading", name="Verification").wait_for()
+        story.keep(page.locator("#step-automatic"), "tuning-automatic")
+    story.run("sweep", kind="speed_loop")
+    story.run("step")
+    about = {"format": "html", "machine": "Press 4", "person": "M. Keller"}
+    report = story.ok(f"/drives/{AXIS}/reports", "POST", about)
+    with story.page(size=TALL) as page:
+        open_axis(page, AXIS, "tune")
+        open_step(page, "verify")
+        page.get_by_label("Shown").select_option(index=1)
+        page.get_by_label("Compared with").select_option(index=-1)
+        story.keep(panel(page, "Step response"), "tuning-step")
+        open_axis(page, AXIS, "response")
+        show(page, "Speed loop")
+        other = page.locator("li.measured", has_text="Speed loop").last
+        other.get_by_role("button", name="Compare").click()
+        story.keep(page.locator(".bode").first, "tuning-verified")
+        file = story.demo.ask("/reports")[0]["file"]
+        page.set_viewport_size({"width": 900, "height": 1000})
+        page.goto(f"{story.demo.url}api/v1/reports/{file}")
+        story.keep(page, "tuning-report")
+        del report
+    with story.page() as page:
+        page.evaluate("location.hash = '#/files'")
+        story.keep(page, "files")
+
+
+def _tune(page: Page) -> Sequence[Mark]:
+    open_axis(page, AXIS, "tune")
+    page.locator("#step-automatic .note.good").first.wait_for()
+    page.wait_for_timeout(SETTLE_MS)
+    page.locator("ol.path").scroll_into_view_if_needed()
+    return [Mark(page.locator("ol.path"))]
+
+
+def _response(page: Page) -> Sequence[Mark]:
+    open_axis(page, AXIS, "response")
+    page.locator(".bode").first.wait_for()
+    page.locator(".bode").first.scroll_into_view_if_needed()
+    return []
+
+
+# --- a fault --------------------------------------------------------------------------
+
+
+def fault(story: Story) -> None:
+    """A fault, what the page says about it, and its reset."""
+    story.ready()
+    with story.page() as page:
+        open_axis(page, AXIS, "alarms")
+        reset = page.get_by_role("button", name="Fault reset").first
+        reset.wait_for()
+        with Recording(page) as recording:
+            page.wait_for_timeout(1000)
+            story.ok(f"/drives/{AXIS}/training-fault", "POST")
+            until(lambda: story.demo.fresh()["state"] == "Fault", 60, "the fault is there")
+            page.wait_for_timeout(4000)
+            for language in ():
+                del language
+            reset.hover()
+            page.wait_for_timeout(1000)
+            reset.click()
+            until(lambda: story.demo.fresh()["state"] != "Fault", 60, "the fault is reset")
+            page.wait_for_timeout(2500)
+        recording.store(story.folder / "fault.webp")
+    story.ok(f"/drives/{AXIS}/training-fault", "POST")
+    until(lambda: story.demo.fresh()["state"] == "Fault", 60, "the fault is there")
+    story.both("alarms", _alarms, faulty=True)
+    story.demo.http.post(f"/drives/{AXIS}/fault-reset", json={})
+
+
+def _alarms(page: Page) -> Sequence[Mark]:
+    open_axis(page, AXIS, "alarms")
+    page.wait_for_timeout(SETTLE_MS)
+    return []
+
+
+CHAPTERS: tuple[Callable[[Story], None], ...] = (
+    connected, scope, pages, jog, measured, designs, automatic, verified, fault,
+)  # fmt: skip
