@@ -2,8 +2,8 @@
 
 `mkdocs.yml` names this file under ``hooks``. Generated: the reference of the command line from
 its definition, one page of parameters per drive from its profile, and the glossary from
-``docs/glossary/terms.yaml``. The build fails where a page quotes another figure than the run that made
-the pictures, or shows a picture that is not of that run (`pictures.py`).
+``docs/glossary/terms.yaml``. The build fails where a page quotes another figure than the run
+that made the pictures, or shows a picture that is not of that run (`pictures.py`).
 """
 
 from __future__ import annotations

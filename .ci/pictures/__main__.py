@@ -19,8 +19,8 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "docs")]
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs"))
 
 import pictures
 from playwright.sync_api import sync_playwright
@@ -30,17 +30,17 @@ import drivers.virtual
 from tests.browser.conftest import FLAGS
 from tests.support.demo import AXIS, Demo
 
+#: The axis as the bench file names it.
+NAME = "Gantry left"
 SUFFIXES = (".webp", ".png")
 
 
 def bench_text() -> str:
-    """The axes that the demo connects by itself: the EtherCAT axes with a load.
-
-    The other drives of the demo would only take the computer that the exchange needs.
-    """
+    """The axis of the demo alone: the other drives would only take the computer that it needs."""
     file = Path(drivers.virtual.__file__).parent / "standard_bench.toml"
     _, *axes = file.read_text("utf-8").split("[[axis]]")
-    return "".join(f"[[axis]]{axis}" for axis in axes if "connected = true" in axis)
+    (axis,) = [each for each in axes if f'name = "{NAME}"' in each]
+    return f"[[axis]]{axis}"
 
 
 def photograph(folder: Path, state: Path) -> Story:
@@ -95,7 +95,7 @@ def main() -> int:
         story = photograph(folder, state)
         run = publish(folder, story, began)
     for page in pictures.rewrite(run):
-        print(f"figures written: {page.relative_to(HERE.parents[1])}")
+        print(f"figures written: {page.relative_to(pictures.prose.ROOT)}")
     size = sum(each.stat().st_size for each in pictures.IMAGES.iterdir())
     print(f"{len(run.pictures)} pictures, {len(run.figures)} figures, {size / 1e3:.0f} kB in all")
     print(f"repeated because the computer was busy: {story.repeated}")

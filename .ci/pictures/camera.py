@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,31 +26,32 @@ RECORDED_COLOURS = 96
 RECORDED_LIMIT = 600_000
 #: How long the last picture of a recording stays before it begins again, in ms.
 LAST_MS = 2500
-#: Notices that no picture may show: something was refused, or a job failed.
-TROUBLE = ".note.fault, [role=alert]"
+#: Notices that no picture may show: something was refused, a job failed, a drive is silent.
+TROUBLE = ".note.fault, [role=alert], .late .note"
+#: What is still being fetched.
+LOADING = re.compile("^(Loading…|加载中…)$")
+ARRIVING = ".arriving, .arriving-path, .arriving-note"
 TIMEOUT_MS = 60_000
-
-
-class Trouble(RuntimeError):
-    """The page shows a notice that no picture may show."""
 
 
 @contextmanager
 def opened(
     browser: Browser, url: str, language: str, size: dict[str, Any] = LAPTOP
 ) -> Iterator[Page]:
-    """A light page in a language, without the offer of the guided tour."""
+    """A light page in a language, without the offer of the guided tour and without 3D.
+
+    3D without a graphics processor takes the computer that the cyclic exchange needs.
+    """
     context: BrowserContext = browser.new_context(
         locale=language, color_scheme="light", reduced_motion="reduce", **size
     )
     context.add_init_script(
         f"localStorage.setItem('servodeck.language', '{language}');"
-        "localStorage.setItem('servodeck.tour', 'left')"
+        "localStorage.setItem('servodeck.tour', 'left');"
+        "localStorage.setItem('servodeck.overview.scene', 'no')"
     )
     page = context.new_page()
     page.set_default_timeout(TIMEOUT_MS)
-    # 3D without a graphics processor takes the computer that the cyclic exchange needs.
-    page.route("**/viser/**", lambda route: route.abort())
     page.goto(url)
     page.get_by_role("heading", level=1).wait_for()
     try:
@@ -58,25 +60,25 @@ def opened(
         context.close()
 
 
-def take(
-    what: Page | Locator, file: Path, marks: Sequence[Mark] = (), *, faulty: bool = False
-) -> None:
+def obstacle(page: Page) -> str:
+    """Why the page cannot be photographed now; empty where it can."""
+    if page.locator(ARRIVING).count() > 0 or page.get_by_text(LOADING).count() > 0:
+        return "the page is not whole yet"
+    notices = [each.inner_text() for each in page.locator(TROUBLE).all() if each.is_visible()]
+    return "; ".join(each for each in notices if each)
+
+
+def take(what: Page | Locator, file: Path, marks: Sequence[Mark] = ()) -> None:
     """Store a screenshot of a page or of a part of it.
 
-    ``faulty``: the picture is about a fault, so its notice belongs there.
-
     Raises:
-        Trouble: a notice of trouble is in sight. ValueError: a mark is not in sight.
+        ValueError: a mark is not in sight.
     """
     page = what if isinstance(what, Page) else what.page
-    notices = page.locator(TROUBLE).all()
-    shown = [] if faulty else [each.inner_text() for each in notices if each.is_visible()]
-    if any(shown):
-        raise Trouble(f"{file.name}: {'; '.join(shown)}")
     with drawn(page, marks):
         picture = Image.open(io.BytesIO(what.screenshot())).convert("RGB")
     reduced = picture.quantize(COLOURS, dither=Image.Dither.NONE).convert("RGB")
-    reduced.save(file, lossless=True, quality=100, method=6)
+    reduced.save(file, lossless=True, quality=90, method=4)
 
 
 class Recording:
@@ -93,9 +95,12 @@ class Recording:
         self._session.send("Page.screencastFrameAck", {"sessionId": frame["sessionId"]})
 
     def __enter__(self) -> Recording:
-        size = self._page.viewport_size
-        assert size is not None
-        wanted = {"format": "png", "maxWidth": size["width"], "maxHeight": size["height"]}
+        # Of 60 pictures per second six, and no larger than they are stored: encoding more of them
+        # would keep the page from renewing a jog.
+        wanted = {
+            "format": "png", "everyNthFrame": 10,
+            "maxWidth": RECORDED_WIDTH, "maxHeight": RECORDED_WIDTH,
+        }  # fmt: skip
         self._session.send("Page.startScreencast", wanted)
         return self
 
@@ -125,7 +130,7 @@ class Recording:
         ]
         pictures[0].save(
             file, save_all=True, append_images=pictures[1:], duration=[*waits, LAST_MS], loop=0,
-            lossless=True, quality=100, method=4, minimize_size=True,
+            lossless=True, quality=80, method=3,
         )  # fmt: skip
         if file.stat().st_size > RECORDED_LIMIT:
             raise ValueError(f"{file.name} has {file.stat().st_size} bytes")
@@ -134,6 +139,4 @@ class Recording:
 
 def _reduced(data: bytes) -> Image.Image:
     picture = Image.open(io.BytesIO(data)).convert("RGB")
-    height = round(picture.height * RECORDED_WIDTH / picture.width)
-    small = picture.resize((RECORDED_WIDTH, height), Image.Resampling.LANCZOS)
-    return small.quantize(RECORDED_COLOURS, dither=Image.Dither.NONE).convert("RGB")
+    return picture.quantize(RECORDED_COLOURS, dither=Image.Dither.NONE).convert("RGB")

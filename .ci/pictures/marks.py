@@ -27,7 +27,7 @@ _DRAW = """(boxes) => {
   for (const { x, y, width, height, label, arrow } of boxes) {
     const ring = { fill: 'none', stroke: colour, 'stroke-width': 2.5 }
     const middle = y + height / 2
-    let [at, above] = [x, y]
+    let [at, above] = [x - 9, y + 4]
     if (arrow) {
       // The arrow ends at the middle of the element's left or right edge.
       const side = arrow === 'left' ? -1 : 1
@@ -40,13 +40,16 @@ _DRAW = """(boxes) => {
       )
       ;[at, above] = [tail, middle]
     } else {
-      svg.append(made('rect', { x, y, width, height, rx: 7, ...ring }))
+      const [left, top] = [Math.max(x, 2), Math.max(y, 2)]
+      const [right, bottom] = [Math.min(x + width, wide - 2), Math.min(y + height, high - 2)]
+      const size = { width: right - left, height: bottom - top }
+      svg.append(made('rect', { x: left, y: top, ...size, rx: 7, ...ring }))
     }
     const [cx, cy] = [within(at, wide), within(above, high)]
     svg.append(made('circle', { cx, cy, r: 11, fill: colour, stroke: '#fff', 'stroke-width': 2 }))
     const text = made('text', {
-      x: cx, y: cy + 5, fill: '#fff', 'text-anchor': 'middle',
-      style: 'font: bold 14px sans-serif',
+      x: cx, y: cy + 5, 'text-anchor': 'middle',
+      style: 'font: bold 14px sans-serif; fill: #fff',
     })
     text.textContent = label
     svg.append(text)

@@ -6,6 +6,8 @@ and figures of the scope come first, as the settings are then those of the deliv
 
 from __future__ import annotations
 
+import json
+import math
 import re
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -13,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from camera import Recording, opened, take
+from camera import Recording, obstacle, opened, take
 from marks import Mark
 from playwright.sync_api import Browser, Locator, Page, expect
 from readings import Readings
@@ -31,6 +33,8 @@ SIGNAL_LIMITS = {"travel_limit": 20, "speed_limit": 1500, "torque_limit": 250}
 #: Measurements that a busy computer disturbed are repeated; what fails more often is a defect.
 TRIES = 4
 LONG_S = 240.0
+#: A page that shows trouble for longer is wrong.
+WHOLE_S = 120.0
 #: After the first values have come, so that plots and tables show something.
 SETTLE_MS = 1500
 #: Panels are photographed on a page that shows them whole.
@@ -52,11 +56,14 @@ class Story:
     # --- the axis ---------------------------------------------------------------------
 
     def ok(self, path: str, method: str = "GET", body: object = None) -> Any:
+        """What the interface answers; a refusal ends the run."""
         answer = self.demo.http.request(method, path, json=body)
         assert answer.is_success, f"{path}: {answer.text}"
         return answer.json() if answer.content else None
 
     def ended(self, job: str, timeout_s: float = LONG_S) -> Any:
+        """A job once it has ended."""
+
         def over() -> Any:
             now = self.demo.ask(f"/jobs/{job}")
             return now if now["state"] != "running" else None
@@ -103,16 +110,27 @@ class Story:
 
     @contextmanager
     def page(self, language: str = "en", **size: Any) -> Iterator[Page]:
+        """A page of the demo in a browser context of its own."""
         with opened(self.browser, self.demo.url, language, **size) as page:
             yield page
 
     def keep(
         self, what: Page | Locator, name: str, marks: Sequence[Mark] = (), *, faulty: bool = False
     ) -> None:
+        """Store a picture once the page shows its values and no trouble.
+
+        ``faulty``: the picture is about a fault, so its notice belongs there.
+        """
         page = what if isinstance(what, Page) else what.page
-        page.wait_for_timeout(SETTLE_MS)
-        take(what, self.folder / f"{name}.webp", marks, faulty=faulty)
-        print(f"  {name}")
+
+        def whole() -> bool:
+            self.demo.fresh()
+            page.wait_for_timeout(SETTLE_MS)
+            return obstacle(page) == "" or (faulty and self.demo.fresh()["state"] == "Fault")
+
+        until(whole, WHOLE_S, f"{name}: the page is whole and without trouble")
+        take(what, self.folder / f"{name}.webp", marks)
+        print(f"  {name}", flush=True)
 
     def both(
         self, name: str, show: Callable[[Page], Sequence[Mark]], *, faulty: bool = False
@@ -125,6 +143,7 @@ class Story:
 
 
 def panel(page: Page, title: str) -> Locator:
+    """A part of the page by its title."""
     return page.locator("section.panel", has=page.get_by_role("heading", name=title, exact=True))
 
 
@@ -285,8 +304,24 @@ def _spectrum(page: Page, story: Story) -> None:
         for hertz in (12, 36):
             (height,) = [a for f, a in found[trace] if abs(f - hertz) < 0.1]
             story.readings.add(f"line_{hertz}_{name}", height, unit, 2)
+    _worked_out(story)
     story.demo.http.post("/stop", json={})
     story.ended(answer.json()["id"])
+
+
+def _worked_out(story: Story) -> None:
+    """The torque of the line at 12 Hz from the mechanics of the bench file, for the speed read.
+
+    Inertia times acceleration, and at right angles the first line of the square wave of Coulomb
+    friction, 4/π of its height, with viscous friction; all in % of the rated torque.
+    """
+    rated, inertia, coulomb, viscous = 1.27, 1.5e-4, 0.03, 2e-4
+    speed = story.readings.figures["line_12_speed"]["value"] * math.tau / 60
+    accelerating = 100 * inertia * math.tau * 12 * speed / rated
+    friction = 100 * (4 / math.pi * coulomb + viscous * speed) / rated
+    story.readings.add("line_12_speed_rad", speed, "rad/s", 3)
+    story.readings.add("line_12_inertia", accelerating, "%", 3)
+    story.readings.add("line_12_expected", math.hypot(accelerating, friction), "%", 3)
 
 
 # --- pages of the axis ----------------------------------------------------------------
@@ -295,9 +330,7 @@ def _spectrum(page: Page, story: Story) -> None:
 def pages(story: Story) -> None:
     """Every page once, on the axis as delivered."""
     story.ready()
-    story.ok(
-        f"/drives/{AXIS}/watch", "PUT", {"keys": ["2005:03", "200E:0B", "60F4:00"]}
-    )
+    story.ok(f"/drives/{AXIS}/watch", "PUT", {"keys": ["2005:03", "200E:0B", "60F4:00"]})
     body = {"file": "feed screw as delivered", "author": "M. Keller", "notes": "before tuning"}
     job = story.ok(f"/drives/{AXIS}/jobs/read_all", "POST", {})
     story.ended(job["id"])
@@ -323,7 +356,7 @@ def _parameters(page: Page) -> Sequence[Mark]:
     """One value edited and not written."""
     open_axis(page, AXIS, "parameters")
     row = find(page, "6084:00")
-    row.get_by_role("button").first.click()
+    row.get_by_role("button").nth(1).click()  # the first one marks a favourite
     page.keyboard.type("1200000")
     page.keyboard.press("Enter")
     page.get_by_role("searchbox").fill("608")
@@ -362,12 +395,12 @@ def jog(story: Story) -> None:
                 page.wait_for_timeout(4000)
                 page.mouse.up()
                 page.wait_for_timeout(2500)
-            reason = page.get_by_text("Ended: released")
-            if reason.is_visible():
-                recording.store(story.folder / "jog.webp")
+            disturbed = page.locator(".jog-panel .note.warn")
+            if page.get_by_text("Ended: released").is_visible() and disturbed.count() == 0:
+                recording.store(story.folder / "recording-jog.webp")
                 return
         story.repeated += 1
-    raise RuntimeError("the jog never ended by the release of the button")
+    raise RuntimeError("no jog was undisturbed and ended by the release")
 
 
 # --- measuring and tuning -------------------------------------------------------------
@@ -380,26 +413,26 @@ def measured(story: Story) -> None:
     add("inertia", found["inertia_kgm2"], "kg·m²", 2)
     add("coulomb", found["coulomb_nm"], "N·m", 1)
     story.run("sweep", kind="speed_loop")
+    step = story.run("step")["step"]
+    add("step_overshoot_before", step["overshoot_percent"], "%", 2)
+    add("step_settling_before", step["settling_s"] * 1e3, "ms", 2)
+    # The page Response opens with the newest measurement.
     sweep = story.run("sweep")
     kinds = {each["kind"]: each["frequency_hz"] for each in sweep["resonances"][:2]}
     add("antiresonance", kinds["antiresonance"], "Hz", 2)
     add("resonance", kinds["resonance"], "Hz", 3)
-    story.run("step")
 
 
-def show(page: Page, what: str, number: int = 0) -> None:
-    stored = page.locator("li.measured", has_text=what).nth(number)
+def show(page: Page, what: str) -> None:
+    """The newest stored measurement of a kind."""
+    stored = page.locator("li.measured", has_text=what).first
     stored.get_by_role("button", name="Show", exact=True).click()
     page.get_by_role("img").first.wait_for()
 
 
 def designs(story: Story) -> None:
     """What is designed from the measurements by hand, step by step."""
-    with story.page() as page:
-        open_axis(page, AXIS, "response")
-        show(page, "Mechanics")
-        page.locator(".bode").first.scroll_into_view_if_needed()
-        story.keep(page, "response")
+    story.both("response", _response)
     with story.page(size=TALL) as page:
         open_axis(page, AXIS, "tune")
         story.keep(page.get_by_role("navigation", name="Steps of commissioning"), "tuning-path")
@@ -441,7 +474,7 @@ def automatic(story: Story) -> None:
                 page.wait_for_timeout(3000)
             job = story.demo.ask(f"/jobs/{new}")
             if job["state"] == "done" and job["result"]["applied"] is not None:
-                length_s = recording.store(story.folder / "tune.webp", speed=4)
+                length_s = recording.store(story.folder / "recording-tune.webp", speed=4)
                 print(f"  tune: {took_s:.0f} s, shown in {length_s:.0f} s")
                 _tuned(story, job["result"], took_s)
                 return
@@ -456,26 +489,35 @@ def _new(story: Story, kind: str, before: set[str]) -> str | None:
 
 
 def _tuned(story: Story, result: Any, took_s: float) -> None:
-    import json
-
-    Path("/tmp/pp/tuned.json").write_text(json.dumps(result, indent=1))
+    """Figures of the design that was written, as it was measured."""
     add = story.readings.add
     applied, verified = result["applied"], result["verified"]
+    worst = verified["verdict"]["worst"]
+    add("tuned_minutes", took_s / 60, "min", 1)
+    add("tuned_speed_loop", applied["gains"]["speed_bandwidth_hz"], "Hz", 2)
     add("tuned_bandwidth", verified["measured_bandwidth_hz"], "Hz", 2)
+    add("tuned_phase_margin", worst["phase_margin_deg"], "°", 2)
+    add("tuned_gain_margin", worst["gain_margin_db"], "dB", 1)
+    add("tuned_ms", worst["ms"], "", 2)
+    for notch in applied["notches"][:1]:
+        add("notch_frequency", notch["center_hz"], "Hz", 2)
+        add("notch_depth", -notch["depth_db"], "dB", 1)
+    print("  ", json.dumps({"applied": applied, "worst": worst, "step": result["step"]["step"]}))
 
 
 def verified(story: Story) -> None:
     """The tuned axis beside the untouched one, on the page and in the report."""
     story.both("tune", _tune)
-    story.both("response-mechanics", _response)
     with story.page(size=TALL) as page:
         open_axis(page, AXIS, "tune")
         page.get_by_role("heading", name="Verification").wait_for()
         story.keep(page.locator("#step-automatic"), "tuning-automatic")
     story.run("sweep", kind="speed_loop")
-    story.run("step")
+    step = story.run("step")["step"]
+    story.readings.add("step_overshoot_after", step["overshoot_percent"], "%", 2)
+    story.readings.add("step_settling_after", step["settling_s"] * 1e3, "ms", 2)
     about = {"format": "html", "machine": "Press 4", "person": "M. Keller"}
-    report = story.ok(f"/drives/{AXIS}/reports", "POST", about)
+    story.ok(f"/drives/{AXIS}/reports", "POST", about)
     with story.page(size=TALL) as page:
         open_axis(page, AXIS, "tune")
         open_step(page, "verify")
@@ -491,7 +533,6 @@ def verified(story: Story) -> None:
         page.set_viewport_size({"width": 900, "height": 1000})
         page.goto(f"{story.demo.url}api/v1/reports/{file}")
         story.keep(page, "tuning-report")
-        del report
     with story.page() as page:
         page.evaluate("location.hash = '#/files'")
         story.keep(page, "files")
@@ -527,14 +568,12 @@ def fault(story: Story) -> None:
             story.ok(f"/drives/{AXIS}/training-fault", "POST")
             until(lambda: story.demo.fresh()["state"] == "Fault", 60, "the fault is there")
             page.wait_for_timeout(4000)
-            for language in ():
-                del language
             reset.hover()
             page.wait_for_timeout(1000)
             reset.click()
             until(lambda: story.demo.fresh()["state"] != "Fault", 60, "the fault is reset")
             page.wait_for_timeout(2500)
-        recording.store(story.folder / "fault.webp")
+        recording.store(story.folder / "recording-fault.webp")
     story.ok(f"/drives/{AXIS}/training-fault", "POST")
     until(lambda: story.demo.fresh()["state"] == "Fault", 60, "the fault is there")
     story.both("alarms", _alarms, faulty=True)

@@ -16,7 +16,8 @@ FOLDERS = Path(__file__).resolve().parents[3] / ".ci"
 ABC = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
 PAGE = """![a step](images/step.webp)
 
-It settles in <span data-figure="settling">32 ms</span>, in 中文 too: <span data-figure="settling">32</span> ms.
+It settles in <span data-figure="settling">32 ms</span>;
+in 中文 too: <span data-figure="settling">32</span> ms.
 """
 
 
