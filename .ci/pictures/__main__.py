@@ -23,31 +23,18 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs"))
 
 import pictures
+from demo import AXIS, Demo
 from playwright.sync_api import sync_playwright
 from story import CHAPTERS, CYCLE_US, URL, Story
 
-import drivers.virtual
 from tests.browser.conftest import FLAGS
-from tests.support.demo import AXIS, Demo
 
-#: The axis as the bench file names it.
-NAME = "Gantry left"
 SUFFIXES = (".webp", ".png")
-
-
-def bench_text() -> str:
-    """The axis of the demo alone: the other drives would only take the computer that it needs."""
-    file = Path(drivers.virtual.__file__).parent / "standard_bench.toml"
-    _, *axes = file.read_text("utf-8").split("[[axis]]")
-    (axis,) = [each for each in axes if f'name = "{NAME}"' in each]
-    return f"[[axis]]{axis}"
 
 
 def photograph(folder: Path, state: Path) -> Story:
     """Commission the axis; pictures go into ``folder``."""
-    bench = state / "bench.toml"
-    bench.write_text(bench_text(), "utf-8")
-    demo = Demo(state, bench)
+    demo = Demo(state)
     try:
         with sync_playwright() as playwright:
             program = shutil.which("chromium") or "/usr/bin/chromium"

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from camera import Recording, obstacle, opened, take
+from demo import AXIS, Demo
 from marks import Mark
 from playwright.sync_api import Browser, Locator, Page, expect
 from readings import Readings
@@ -23,7 +24,6 @@ from readings import Readings
 from tests.browser.driving import find, open_axis
 from tests.browser.test_scope import TORQUE, VELOCITY, add_channel, figure, number, peaks
 from tests.browser.tuning import open_step
-from tests.support.demo import AXIS, Demo
 from tests.support.station import until
 
 URL = "ethercat://virtual0"
