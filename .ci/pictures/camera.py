@@ -17,11 +17,11 @@ from playwright.sync_api import Browser, BrowserContext, Locator, Page
 from tests.browser.conftest import LAPTOP
 
 #: Colours of a stored picture: thin lines of plots keep theirs, by which they are distinguished.
-COLOURS = 200
+COLOURS = 96
 #: Recordings are shown narrower than the page, and with at most so many pictures per second.
 RECORDED_WIDTH = 800
-RECORDED_PER_S = 6.0
-RECORDED_COLOURS = 96
+RECORDED_PER_S = 5.0
+RECORDED_COLOURS = 64
 #: A recording must not be larger, in bytes.
 RECORDED_LIMIT = 600_000
 #: How long the last picture of a recording stays before it begins again, in ms.
@@ -122,7 +122,7 @@ class Recording:
             kept.append(self._frames[-1])
         if len(kept) < 3:
             raise ValueError(f"{file.name}: nothing changes on the screen")
-        pictures = [_reduced(data) for _, data in kept]
+        pictures = _reduced([data for _, data in kept])
         later = [time_s for time_s, _ in kept[1:]]
         waits = [
             max(round((after - now) / speed * 1000), 20)
@@ -130,13 +130,21 @@ class Recording:
         ]
         pictures[0].save(
             file, save_all=True, append_images=pictures[1:], duration=[*waits, LAST_MS], loop=0,
-            lossless=True, quality=80, method=3,
+            lossless=True, quality=80, method=3, kmin=500, kmax=1000,
         )  # fmt: skip
         if file.stat().st_size > RECORDED_LIMIT:
             raise ValueError(f"{file.name} has {file.stat().st_size} bytes")
         return (kept[-1][0] - kept[0][0]) / speed
 
 
-def _reduced(data: bytes) -> Image.Image:
-    picture = Image.open(io.BytesIO(data)).convert("RGB")
-    return picture.quantize(RECORDED_COLOURS, dither=Image.Dither.NONE).convert("RGB")
+def _reduced(kept: Sequence[bytes]) -> list[Image.Image]:
+    """The pictures in the same few colours, so that what does not change is not stored again."""
+    pictures = [Image.open(io.BytesIO(data)).convert("RGB") for data in kept]
+    width, height = pictures[0].size
+    typical = [pictures[0], pictures[len(pictures) // 2], pictures[-1]]
+    together = Image.new("RGB", (width, height * len(typical)))
+    for place, picture in enumerate(typical):
+        together.paste(picture, (0, place * height))
+    palette = together.quantize(RECORDED_COLOURS, dither=Image.Dither.NONE)
+    none = Image.Dither.NONE
+    return [picture.quantize(palette=palette, dither=none).convert("RGB") for picture in pictures]
