@@ -84,23 +84,34 @@ def take(what: Page | Locator, file: Path, marks: Sequence[Mark] = ()) -> None:
 class Recording:
     """The screen of a page while something happens, from Chromium's own screencast."""
 
-    def __init__(self, page: Page) -> None:
+    def __init__(self, page: Page, speed: float = 1.0) -> None:
+        """``speed``: how many times as fast it is shown."""
+        self._speed = speed
         self._page = page
         self._frames: list[tuple[float, bytes]] = []
+        self._unanswered: list[int] = []
         self._session = page.context.new_cdp_session(page)
         self._session.on("Page.screencastFrame", self._keep)
 
     def _keep(self, frame: dict[str, Any]) -> None:
         self._frames.append((frame["metadata"]["timestamp"], base64.b64decode(frame["data"])))
-        self._session.send("Page.screencastFrameAck", {"sessionId": frame["sessionId"]})
+        self._unanswered.append(frame["sessionId"])
+
+    def wait(self, time_s: float) -> None:
+        """Record for so long.
+
+        The browser sends no more pictures than were answered: encoding more than are kept would
+        take the time in which the page must renew a jog.
+        """
+        interval_s = self._speed / RECORDED_PER_S
+        for _ in range(max(round(time_s / interval_s), 1)):
+            self._page.wait_for_timeout(interval_s * 1000)
+            for frame in self._unanswered:
+                self._session.send("Page.screencastFrameAck", {"sessionId": frame})
+            self._unanswered.clear()
 
     def __enter__(self) -> Recording:
-        # Of 60 pictures per second six, and no larger than they are stored: encoding more of them
-        # would keep the page from renewing a jog.
-        wanted = {
-            "format": "png", "everyNthFrame": 10,
-            "maxWidth": RECORDED_WIDTH, "maxHeight": RECORDED_WIDTH,
-        }  # fmt: skip
+        wanted = {"format": "png", "maxWidth": RECORDED_WIDTH, "maxHeight": RECORDED_WIDTH}
         self._session.send("Page.startScreencast", wanted)
         return self
 
@@ -108,13 +119,14 @@ class Recording:
         self._session.send("Page.stopScreencast")
         self._session.detach()
 
-    def store(self, file: Path, speed: float = 1.0) -> float:
-        """Write what was recorded, ``speed`` times as fast; returns its length in s.
+    def store(self, file: Path) -> float:
+        """Write what was recorded; returns the length of it in s.
 
         Raises:
             ValueError: nothing changed on the screen, or the file is larger than it may be.
         """
         kept: list[tuple[float, bytes]] = []
+        speed = self._speed
         for time_s, data in self._frames:
             if not kept or (time_s - kept[-1][0]) / speed >= 1 / RECORDED_PER_S:
                 kept.append((time_s, data))

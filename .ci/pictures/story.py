@@ -390,11 +390,11 @@ def jog(story: Story) -> None:
             assert box is not None
             page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
             with Recording(page) as recording:
-                page.wait_for_timeout(1000)
+                recording.wait(1)
                 page.mouse.down()
-                page.wait_for_timeout(4000)
+                recording.wait(4)
                 page.mouse.up()
-                page.wait_for_timeout(2500)
+                recording.wait(2.5)
             disturbed = page.locator(".jog-panel .note.warn")
             if page.get_by_text("Ended: released").is_visible() and disturbed.count() == 0:
                 recording.store(story.folder / "recording-jog.webp")
@@ -412,15 +412,18 @@ def measured(story: Story) -> None:
     found = story.run("inertia")
     add("inertia", found["inertia_kgm2"], "kg·m²", 2)
     add("coulomb", found["coulomb_nm"], "N·m", 1)
-    story.run("sweep", kind="speed_loop")
-    step = story.run("step")["step"]
-    add("step_overshoot_before", step["overshoot_percent"], "%", 2)
-    add("step_settling_before", step["settling_s"] * 1e3, "ms", 2)
-    # The page Response opens with the newest measurement.
     sweep = story.run("sweep")
     kinds = {each["kind"]: each["frequency_hz"] for each in sweep["resonances"][:2]}
     add("antiresonance", kinds["antiresonance"], "Hz", 2)
     add("resonance", kinds["resonance"], "Hz", 3)
+    story.both("response", _response)
+    with story.page(size=TALL) as page:
+        open_axis(page, AXIS, "tune")
+        story.keep(page.get_by_role("navigation", name="Steps of commissioning"), "tuning-path")
+    story.run("sweep", kind="speed_loop")
+    step = story.run("step")["step"]
+    add("step_overshoot_before", step["overshoot_percent"], "%", 2)
+    add("step_settling_before", step["settling_s"] * 1e3, "ms", 2)
 
 
 def show(page: Page, what: str) -> None:
@@ -432,14 +435,15 @@ def show(page: Page, what: str) -> None:
 
 def designs(story: Story) -> None:
     """What is designed from the measurements by hand, step by step."""
-    story.both("response", _response)
     with story.page(size=TALL) as page:
+        # All columns of the table.
+        page.set_viewport_size({"width": 1480, "height": 2600})
         open_axis(page, AXIS, "tune")
-        story.keep(page.get_by_role("navigation", name="Steps of commissioning"), "tuning-path")
         open_step(page, "notches")
         page.get_by_role("button", name="Compute designs").click()
         page.get_by_role("table", name="Designs").wait_for(timeout=180_000)
         story.keep(panel(page, "Designs"), "tuning-designs")
+        page.set_viewport_size(TALL["viewport"])
         open_axis(page, AXIS, "response")
         show(page, "Mechanics")
         story.keep(page.locator(".bode").first, "tuning-mechanics")
@@ -463,18 +467,18 @@ def automatic(story: Story) -> None:
             start.scroll_into_view_if_needed()
             page.wait_for_timeout(SETTLE_MS)
             before = {job["id"] for job in story.demo.ask("/jobs")}
-            with Recording(page) as recording:
-                page.wait_for_timeout(800)
+            with Recording(page, speed=4) as recording:
+                recording.wait(1)
                 start.click()
                 began = time.monotonic()
                 new = until(lambda old=before: _new(story, "autotune", old), 60, "the job runs")
                 while story.demo.ask(f"/jobs/{new}")["state"] == "running":
-                    page.wait_for_timeout(500)
+                    recording.wait(1)
                 took_s = time.monotonic() - began
-                page.wait_for_timeout(3000)
+                recording.wait(4)
             job = story.demo.ask(f"/jobs/{new}")
             if job["state"] == "done" and job["result"]["applied"] is not None:
-                length_s = recording.store(story.folder / "recording-tune.webp", speed=4)
+                length_s = recording.store(story.folder / "recording-tune.webp")
                 print(f"  tune: {took_s:.0f} s, shown in {length_s:.0f} s")
                 _tuned(story, job["result"], took_s)
                 return
@@ -564,15 +568,15 @@ def fault(story: Story) -> None:
         reset = page.get_by_role("button", name="Fault reset").first
         reset.wait_for()
         with Recording(page) as recording:
-            page.wait_for_timeout(1000)
+            recording.wait(1)
             story.ok(f"/drives/{AXIS}/training-fault", "POST")
             until(lambda: story.demo.fresh()["state"] == "Fault", 60, "the fault is there")
-            page.wait_for_timeout(4000)
+            recording.wait(4)
             reset.hover()
-            page.wait_for_timeout(1000)
+            recording.wait(1)
             reset.click()
             until(lambda: story.demo.fresh()["state"] != "Fault", 60, "the fault is reset")
-            page.wait_for_timeout(2500)
+            recording.wait(2.5)
         recording.store(story.folder / "recording-fault.webp")
     story.ok(f"/drives/{AXIS}/training-fault", "POST")
     until(lambda: story.demo.fresh()["state"] == "Fault", 60, "the fault is there")
