@@ -17,7 +17,7 @@ from playwright.sync_api import Browser, BrowserContext, Locator, Page
 from tests.browser.conftest import LAPTOP
 
 #: Colours of a stored picture: thin lines of plots keep theirs, by which they are distinguished.
-COLOURS = 96
+COLOURS = 256
 #: Recordings are shown narrower than the page, and with at most so many pictures per second.
 RECORDED_WIDTH = 800
 RECORDED_PER_S = 5.0
