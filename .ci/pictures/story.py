@@ -510,9 +510,9 @@ def _tuned(story: Story, result: Any) -> None:
     add("tuned_phase_margin", worst["phase_margin_deg"], "°", 2)
     add("tuned_gain_margin", worst["gain_margin_db"], "dB", 1)
     add("tuned_ms", worst["ms"], "", 2)
-    for notch in applied["notches"][:1]:
-        add("notch_frequency", notch["center_hz"], "Hz", 2)
-        add("notch_depth", -notch["depth_db"], "dB", 1)
+    notch = applied["notches"][0]
+    add("notch_frequency", notch["center_hz"], "Hz", 1)
+    add("notch_depth", -notch["depth_db"], "dB", 1)
     print("  ", json.dumps({"applied": applied, "worst": worst, "step": result["step"]["step"]}))
 
 
