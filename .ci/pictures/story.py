@@ -34,8 +34,8 @@ SIGNAL_LIMITS = {"travel_limit": 20, "speed_limit": 1500, "torque_limit": 250}
 #: Measurements that a busy computer disturbed are repeated; what fails more often is a defect.
 TRIES = 8
 LONG_S = 240.0
-#: A page that shows trouble for longer is wrong.
-WHOLE_S = 120.0
+#: How often a page is looked at until its trouble is taken as lasting.
+WHOLE_TRIES = 8
 #: After the first values have come, so that plots and tables show something.
 SETTLE_MS = 1500
 #: Panels are photographed on a page that shows them whole.
@@ -115,23 +115,54 @@ class Story:
         with opened(self.browser, self.demo.url, language, **size) as page:
             yield page
 
-    def keep(
-        self, what: Page | Locator, name: str, marks: Sequence[Mark] = (), *, faulty: bool = False
-    ) -> None:
-        """Store a picture once the page shows its values and no trouble.
-
-        ``faulty``: the picture is about a fault, so its notice belongs there.
-        """
-        page = what if isinstance(what, Page) else what.page
-
-        def whole() -> bool:
+    def whole(self, page: Page, faulty: bool) -> str:
+        """Wait until the page shows its values and no trouble; returns what is still in the way."""
+        reason = ""
+        for _ in range(WHOLE_TRIES):
             self.demo.fresh()
             page.wait_for_timeout(SETTLE_MS)
-            return obstacle(page) == "" or (faulty and self.demo.fresh()["state"] == "Fault")
+            reason = obstacle(page)
+            if reason == "" or (faulty and self.demo.fresh()["state"] == "Fault"):
+                return ""
+        return reason
 
-        until(whole, WHOLE_S, f"{name}: the page is whole and without trouble")
+    def keep(self, what: Page | Locator, name: str, marks: Sequence[Mark] = ()) -> None:
+        """Store a picture of what a page shows now.
+
+        Raises:
+            RuntimeError: it shows trouble.
+        """
+        page = what if isinstance(what, Page) else what.page
+        if reason := self.whole(page, faulty=False):
+            raise RuntimeError(f"{name}: {reason}")
         take(what, self.folder / f"{name}.webp", marks)
         print(f"  {name}", flush=True)
+
+    def shoot(
+        self,
+        page: Page,
+        name: str,
+        show: Callable[[Page], Sequence[Mark]],
+        *,
+        faulty: bool = False,
+    ) -> None:
+        """Bring a page into sight and store a picture of it.
+
+        What a busy bus did not answer stays on the page as a problem: it is then loaded again.
+        ``faulty``: the picture is about a fault, so its notice belongs there.
+        """
+        reason = ""
+        for _ in range(TRIES):
+            marks = show(page)
+            reason = self.whole(page, faulty)
+            if not reason:
+                take(page, self.folder / f"{name}.webp", marks)
+                print(f"  {name}", flush=True)
+                return
+            print(f"  {name} is repeated: {reason}", flush=True)
+            self.repeated += 1
+            page.reload()
+        raise RuntimeError(f"{name}: {reason}")
 
     def both(
         self, name: str, show: Callable[[Page], Sequence[Mark]], *, faulty: bool = False
@@ -139,8 +170,20 @@ class Story:
         """The same picture in English and in Chinese."""
         for language in LANGUAGES:
             with self.page(language) as page:
-                marks = show(page)
-                self.keep(page, name if language == "en" else f"{name}-zh", marks, faulty=faulty)
+                file = name if language == "en" else f"{name}-zh"
+                self.shoot(page, file, show, faulty=faulty)
+
+
+def axis_page(name: str, press: str = "") -> Callable[[Page], Sequence[Mark]]:
+    """Shows a page of the axis, after a press of a button or tab of it."""
+
+    def show(page: Page) -> Sequence[Mark]:
+        open_axis(page, AXIS, name)
+        if press:
+            page.get_by_text(press, exact=True).first.click()
+        return []
+
+    return show
 
 
 def panel(page: Page, title: str) -> Locator:
@@ -341,18 +384,11 @@ def pages(story: Story) -> None:
     story.both("parameters", _parameters)
     story.both("motion", _motion)
     with story.page() as page:
-        open_axis(page, AXIS, "overview")
-        story.keep(page, "overview")
-        open_axis(page, AXIS, "motion")
-        page.get_by_text("Homing", exact=True).first.click()
-        story.keep(page, "homing")
-        open_axis(page, AXIS, "gains")
-        story.keep(page, "gains")
-        open_axis(page, AXIS, "setup")
-        page.get_by_role("button", name="Calculate").click()
-        story.keep(page, "setup")
-        open_axis(page, AXIS, "io")
-        story.keep(page, "io")
+        story.shoot(page, "overview", axis_page("overview"))
+        story.shoot(page, "homing", axis_page("motion", "Homing"))
+        story.shoot(page, "gains", axis_page("gains"))
+        story.shoot(page, "setup", axis_page("setup", "Calculate"))
+        story.shoot(page, "io", axis_page("io"))
 
 
 def _parameters(page: Page) -> Sequence[Mark]:
