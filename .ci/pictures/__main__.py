@@ -15,6 +15,7 @@ import sys
 import tempfile
 import time
 import uuid
+from collections.abc import Callable
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -24,11 +25,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "docs"))
 
 import pictures
 from demo import AXIS, Demo
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Error, sync_playwright
 from story import CHAPTERS, CYCLE_US, URL, Story
 
 from tests.browser.conftest import FLAGS
 
+#: How often a chapter is begun.
+TRIES = 3
 SUFFIXES = (".webp", ".png")
 
 
@@ -43,12 +46,32 @@ def photograph(folder: Path, state: Path) -> Story:
             for chapter in CHAPTERS:
                 began = time.monotonic()
                 print(chapter.__name__, flush=True)
-                chapter(story)
+                through(story, chapter)
                 print(f"  {time.monotonic() - began:.0f} s", flush=True)
             browser.close()
     finally:
         demo.close()
     return story
+
+
+def through(story: Story, chapter: Callable[[Story], None]) -> None:
+    """Run a chapter; one that a busy computer disturbed is begun again, without its figures.
+
+    Raises:
+        AssertionError, RuntimeError, Error: it failed every time.
+    """
+    figures = dict(story.readings.figures)
+    for attempt in range(TRIES):
+        try:
+            chapter(story)
+        except (AssertionError, RuntimeError, Error) as error:
+            if attempt == TRIES - 1:
+                raise
+            print(f"  {chapter.__name__} begins again: {str(error)[:300]}", flush=True)
+            story.repeated += 1
+            story.readings.figures = dict(figures)
+        else:
+            return
 
 
 def publish(folder: Path, story: Story, began: datetime) -> pictures.Run:
