@@ -58,13 +58,13 @@ def through(story: Story, chapter: Callable[[Story], None]) -> None:
     """Run a chapter; one that a busy computer disturbed is begun again, without its figures.
 
     Raises:
-        AssertionError, RuntimeError, Error: it failed every time.
+        AssertionError, RuntimeError, ValueError, Error: it failed every time.
     """
     figures = dict(story.readings.figures)
     for attempt in range(TRIES):
         try:
             chapter(story)
-        except (AssertionError, RuntimeError, Error) as error:
+        except (AssertionError, RuntimeError, ValueError, Error) as error:
             if attempt == TRIES - 1:
                 raise
             print(f"  {chapter.__name__} begins again: {str(error)[:300]}", flush=True)
