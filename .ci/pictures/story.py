@@ -334,6 +334,8 @@ def _spectrum(page: Page, story: Story) -> None:
         page.wait_for_timeout(500)
         (hertz, height), *_ = peaks(page) or [(0.0, 0.0)]
         heights.append(height)
+        if page.get_by_text("not equally spaced").count() > 0:
+            return False  # samples that the bus lost are in sight
         return abs(hertz - 12) < 0.02 and height > 15 and abs(height / heights[-2] - 1) < 1e-3
 
     until(steady, 120.0, "the sine alone")
@@ -477,7 +479,7 @@ def designs(story: Story) -> None:
     """What is designed from the measurements by hand, step by step."""
     with story.page(size=TALL) as page:
         # All columns of the table.
-        page.set_viewport_size({"width": 1480, "height": 2600})
+        page.set_viewport_size({"width": 1640, "height": 2600})
         open_axis(page, AXIS, "tune")
         open_step(page, "notches")
         page.get_by_role("button", name="Compute designs").click()
