@@ -10,7 +10,7 @@ PAGE := webui/dist/index.html
 PAGE_SOURCES := $(shell find webui/src webui/public drivers/texts/catalogue -type f 2>/dev/null) webui/index.html \
 	webui/package.json webui/package-lock.json webui/vite.config.ts
 
-.PHONY: install run test bench fmt docs page new-drive clean check-python supply-chain wheels packages emulated audit
+.PHONY: install run test bench fmt docs pictures page new-drive clean check-python supply-chain wheels packages emulated audit
 
 install: $(VENV)/.installed $(PAGE) ## the virtual environment with the product in it
 
@@ -32,6 +32,9 @@ docs: $(VENV)/.dev ## the documentation, in site/, and how much of the profiles'
 	$(BIN)/python .ci/docs --check
 	$(BIN)/mkdocs build --strict
 	$(BIN)/python .ci/docs --coverage
+
+pictures: $(VENV)/.dev $(PAGE) ## pictures of the documentation and the figures that it quotes, from one run of the demo; some 15 minutes
+	$(BIN)/python .ci/pictures
 
 check-python:
 	@$(PYTHON) -c 'import sys; sys.exit("servodeck needs Python 3.11 or newer" if sys.version_info < (3, 11) else 0)'

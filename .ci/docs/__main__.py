@@ -1,4 +1,4 @@
-"""The checks of texts: banned words of the term base, length of sentences, pictures.
+"""The checks of texts: banned words of the term base, length of sentences, pictures, figures.
 
 ``python .ci/docs --check`` fails where a text breaks a rule; ``python .ci/docs --coverage`` prints
 how much of the profiles' texts is there in Chinese.
@@ -12,6 +12,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+import pictures
 import prose
 import terms
 
@@ -23,6 +24,7 @@ def check() -> int:
         *prose.words_in_pages(known), *prose.words_in_messages(known), *prose.words_on_page(known),
         *prose.words_elsewhere(known), *prose.words_in_code(),
         *prose.long_sentences(), *prose.long_texts(), *prose.missing_pictures(),
+        *pictures.findings(),
     ]  # fmt: skip
     for finding in found:
         print(finding)

@@ -2,7 +2,8 @@
 
 `mkdocs.yml` names this file under ``hooks``. Generated: the reference of the command line from
 its definition, one page of parameters per drive from its profile, and the glossary from
-``docs/glossary/terms.yaml``.
+``docs/glossary/terms.yaml``. The build fails where a page quotes another figure than the run
+that made the pictures, or shows a picture that is not of that run (`pictures.py`).
 """
 
 from __future__ import annotations
@@ -11,15 +12,28 @@ import sys
 from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 import command_line
 import parameters
+import pictures
 import terms
 
 from profiles.loader import drive_names, load_profile
+
+
+def on_pre_build(config: MkDocsConfig) -> None:
+    """Refuse to build pages that contradict their figures and pictures.
+
+    Raises:
+        PluginError: with all findings.
+    """
+    del config
+    if found := [str(each) for each in pictures.findings()]:
+        raise PluginError("\n".join(["pictures and figures of different runs:", *found]))
 
 
 def on_files(files: Files, *, config: MkDocsConfig) -> Files:

@@ -64,7 +64,7 @@ def pages() -> list[Path]:
 
 
 def prose(text: str) -> Iterator[Line]:
-    """The lines of a page without code, neither in blocks nor inside a line."""
+    """The lines of a page without code, neither in blocks nor inside a line, and without spans."""
     fence = ""
     for number, line in enumerate(text.splitlines(), 1):
         found = re.match(r"\s*(```+|~~~+)", line)
@@ -72,7 +72,7 @@ def prose(text: str) -> Iterator[Line]:
             fence = "" if fence else found[1]
             continue
         if not fence:
-            yield Line(number, re.sub(r"`[^`]*`", "`code`", line))
+            yield Line(number, re.sub(r"</?span[^>]*>", "", re.sub(r"`[^`]*`", "`code`", line)))
 
 
 def words_in_pages(terms: Sequence[Term]) -> Iterator[Finding]:

@@ -23,6 +23,8 @@ _LEAST_COHERENCE = 0.5
 _BAND = 1.96
 _PHASE_STEPS = (15.0, 30.0, 45.0, 90.0, 180.0, 360.0)
 _TURN = 360.0
+#: A read-out that one of two steps does not have.
+_ABSENT = "—"
 
 
 def chapter(measured: Measured, words: Words) -> list[Block]:
@@ -185,11 +187,17 @@ def _step(measured: Measured, view: StepAnswer, words: Words) -> list[Block]:
         ),
         words("step.caption"),
     )  # fmt: skip
-    names, column = _numbers(view, words)
-    return [figure, _compared(names, column, _numbers(other, words)[1] if other else None, words)]
+    present = _numbers(view, words)
+    past = _numbers(other, words) if other else {}
+    # Either step may have a row that the other one has not, such as a widened window.
+    names = list(present | past)
+    column = [present.get(each, _ABSENT) for each in names]
+    earlier_column = [past.get(each, _ABSENT) for each in names] if other else None
+    return [figure, _compared(names, column, earlier_column, words)]
 
 
-def _numbers(view: StepAnswer, words: Words) -> tuple[list[str], list[str]]:
+def _numbers(view: StepAnswer, words: Words) -> dict[str, str]:
+    """Read-outs by their names, in the order of the table."""
     rows: list[tuple[str, str]] = []
     if view.step is not None:
         rows += [
@@ -209,4 +217,4 @@ def _numbers(view: StepAnswer, words: Words) -> tuple[list[str], list[str]]:
         ("torque_peak", fixed(view.torque_peak_percent, 0, "%")),
         ("torque_rms", fixed(view.torque_rms_percent, 0, "%")),
     ]
-    return [words(name) for name, _ in rows], [text for _, text in rows]
+    return {words(name): text for name, text in rows}

@@ -203,6 +203,27 @@ def test_a_measurement_from_before_the_change_proves_nothing(facts: Facts) -> No
     assert "no loop was measured afterwards" in warned(replace(back, measured=(old,)))
 
 
+@pytest.mark.parametrize("widened", ["now", "before"])
+def test_steps_with_other_read_outs_are_compared(facts: Facts, widened: str) -> None:
+    """Noise asked for a wider settling window in one of two steps: its row stays its own."""
+    step = measured(facts, "step-speed")
+    assert step.earlier is not None
+    plain = step.view.model_copy(update={"widened": False, "window": 2.0})
+    wide = plain.model_copy(update={"widened": True, "window": 3.5})
+    now, before = (wide, plain) if widened == "now" else (plain, wide)
+    both = replace(step, view=now, earlier=replace(step.earlier, view=before))
+    document = compose(replace(facts, measured=(both,)), "en")
+    (rows,) = [
+        {row[0]: row[1:] for row in block.rows}
+        for block in document.blocks
+        if isinstance(block, Table) and any("Settling window" in row[0] for row in block.rows)
+    ]
+    (window,) = [cells for name, cells in rows.items() if "Settling window" in name]
+    assert window == (("—", "3.5 rpm") if widened == "now" else ("3.5 rpm", "—"))
+    torque = f"{now.torque_peak_percent:.0f} %"
+    assert rows["Torque peak"] == (torque, torque)
+
+
 def test_what_is_not_in_order_is_reported(facts: Facts) -> None:
     change = replace(facts.changes[0], now="77 Hz")
     changed = replace(

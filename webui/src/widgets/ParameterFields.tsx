@@ -13,6 +13,7 @@ import { ProblemNote } from './ProblemNote'
 import { Original } from './profile-text/ProfileText'
 import { useRows } from './profile-text/rows'
 import type { ShownRow } from './profile-text/shown-row'
+import { together } from './together'
 import { useAction } from './useAction'
 
 /** Rows of these keys that a connected port can carry, in the order of the keys. */
@@ -21,9 +22,8 @@ export function useReachable(drive: string, keys: readonly string[]): ShownRow[]
   return keys.flatMap((key) => rows.filter((row) => row.key === key && row.reachable))
 }
 
-/** Read parameters whose values are not known yet, or all of them. */
-async function readKeys(drive: string, keys: string[]): Promise<void> {
-  if (keys.length === 0) return
+/** Reads parameters; what several forms ask for at once is one job. */
+const readKeys = together(async (drive, keys) => {
   setJob(
     await ask(
       api.POST('/api/v1/drives/{drive_id}/jobs/read_all', {
@@ -32,7 +32,7 @@ async function readKeys(drive: string, keys: string[]): Promise<void> {
       }),
     ),
   )
-}
+})
 
 /** Raw values as they are before a write, to undo it. */
 function rawsOf(drive: string, keys: string[]): Record<string, number> {
