@@ -2,7 +2,7 @@ import { expect, it, vi } from 'vitest'
 import { together } from './together'
 
 it('asks once for what several forms of a drive need', async () => {
-  const send = vi.fn((_drive: string, _keys: string[]) => Promise.resolve())
+  const send = vi.fn<(drive: string, keys: string[]) => Promise<void>>(() => Promise.resolve())
   const ask = together(send)
   await Promise.all([
     ask('x', ['2005:03', '2005:04']),
