@@ -1109,6 +1109,9 @@ class sweep_evaluation:
     """[s] What is charged to all lines where a speed loop's reference was the excitation, one
     deviation: a setpoint that is held until it is sampled shows next to nothing of current loop and
     delay, which the loop's own torque has to, and that is small on heavy axes. Origin: 7020a899."""
+    CUT = 0.25
+    """[ratio] With more of its samples at one torque while more was commanded, the drive cuts the
+    torque and no mechanics are looked for; as SATURATED of `autotune/run.py`. Origin: 7166e5a3."""
     ROUNDS = 3
     """[count] A speed loop's gain and the mechanics are found in turn, so often at most. Origin:
     7bd7faec."""

@@ -21,7 +21,7 @@ from backend.people.station import People
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from tests.support.servo import Servo, bench_with
-from tests.support.station import HANG_S, Live
+from tests.support.station import HANG_S, NO_CERTIFICATES, Live
 
 T = TypeVar("T")
 PASSWORD = "eleven blue horses"
@@ -42,6 +42,7 @@ class Caller:
         self.http = httpx.Client(
             base_url=f"{server.url}/api/v1",
             timeout=HANG_S,
+            verify=NO_CERTIFICATES,
             headers=headers,
             cookies={"servodeck": cookie} if cookie else None,
         )

@@ -31,7 +31,7 @@ from backend.analysis.response.sampling import (
     lag_response,
     sampled_command,
 )
-from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 from backend.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
@@ -151,6 +151,9 @@ def evaluate(
     taken = _taken(records)
     if (cycles := mean_cycles(taken)) is not None:
         raise Unsuitable(text("sweep.speed-is-mean", cycles=cycles))
+    # A search for mechanics that explain another torque takes a minute, and finds none.
+    if (cut := _cut(taken, path, quantity)) > threshold.CUT:
+        raise Unsuitable(text("sweep.torque-cut", cut_share=cut))
     if by_speed:
         found, taken = _by_reference(records, path, integral_hz, inertia, hold_known=known)
     else:
@@ -311,13 +314,31 @@ def _saturated(
         torque = np.abs(r.torque)
         at_limit = torque >= 0.98 * limit_nm
         if quantity == "torque_mode":
-            asked = np.abs(sampled_command(r.excitation.samples, path))
-            missing = asked - torque > 0.1 * float(np.max(asked))
-            at_limit |= (
-                missing if as_reported else missing & (torque >= 0.97 * float(np.max(torque)))
-            )
+            missing = _missing(r, torque, path)
+            at_limit |= missing if as_reported else missing & _at_highest(torque)
         shares.append(float(np.mean(at_limit)))
     return max(shares, default=0.0)
+
+
+def _cut(records: tuple[Record, ...], path: SignalPath, quantity: Quantity) -> float:
+    """Share of samples at one level of torque while more was commanded; 0 where nobody knows."""
+    shares = [0.0]
+    for r in records:
+        if r.torque is not None and quantity == "torque_mode":
+            torque = np.abs(r.torque)
+            shares.append(float(np.mean(_missing(r, torque, path) & _at_highest(torque))))
+    return max(shares)
+
+
+def _missing(record: Record, torque: FloatArray, path: SignalPath) -> BoolArray:
+    """Where the torque [n], without its sign, is clearly less than commanded."""
+    asked = np.abs(sampled_command(record.excitation.samples, path))
+    return np.asarray(asked - torque > 0.1 * np.max(asked))
+
+
+def _at_highest(torque: FloatArray) -> BoolArray:
+    """Where the torque [n], without its sign, is at the highest that was seen."""
+    return np.asarray(torque >= 0.97 * np.max(torque))
 
 
 def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tuple[Text, ...]:
