@@ -36,6 +36,7 @@ REAL_TIME = [
     "tests/api/test_stop_floods.py",
     "tests/api/test_ethercat.py", "tests/api/test_ethercat_faults.py",
     "tests/api/test_ethercat_segment.py", "tests/api/test_every_family.py",
+    "tests/api/test_gantry.py",
     "tests/wire/ethercat_host",
     "tests/api/test_scope_streams.py", "tests/api/test_scope_soak.py",
     "tests/api/test_scales_taught.py", "tests/docs",
