@@ -70,7 +70,9 @@ class CoupledResponse:
     half of a variance is that of the real part). ``freedom`` are the real degrees of freedom that
     it is known with, and ``distortion`` [n] by how much more the realisations differ than the
     noise between periods explains (a factor of the variance, 1 where nothing more; it is contained
-    in ``covariance``).
+    in ``covariance``). ``unmodelled`` [n, 2, 2] is the part of each entry's deviation, contained in
+    the diagonal of ``covariance`` as well, that no noise makes: how those of two entries belong
+    together is not known.
     """
 
     frequency_hz: FloatArray
@@ -81,6 +83,7 @@ class CoupledResponse:
     distortion: FloatArray
     periods_used: int
     periods_dropped: int
+    unmodelled: FloatArray | None = None
 
     @cached_property
     def spread(self) -> float:
@@ -129,8 +132,10 @@ class CoupledResponse:
             setpoint = np.eye(2) / controllers.at_line[:, :, None] + g
             images = np.abs(beyond[:, None] * controllers.at_image)
             left = np.sqrt(np.abs(g * images[:, None, :]) ** 2 @ np.abs(setpoint) ** 2)
-        own = 2.0 * (left.reshape(-1, 4) / self.spread) ** 2
-        return replace(self, response=g, covariance=covariance + own[:, :, None] * np.eye(4))
+        deviation = left / self.spread
+        return replace(
+            self, response=g, covariance=covariance + _diagonal(deviation), unmodelled=deviation
+        )
 
     def not_better_than_known(self) -> CoupledResponse:
         """With a covariance that holds a small shift of all frequencies, and a share of each entry:
@@ -139,8 +144,7 @@ class CoupledResponse:
         g, f = self.response, self.frequency_hz
         shift = threshold.SHIFTED * f[:, None, None] * np.gradient(g, f, axis=0)
         left = np.hypot(np.abs(shift), threshold.FLOOR * np.abs(g))
-        own = 2.0 * (left.reshape(-1, 4) / self.spread) ** 2
-        return replace(self, covariance=self.covariance + own[:, :, None] * np.eye(4))
+        return replace(self, covariance=self.covariance + _diagonal(left / self.spread))
 
     def without_filter(self, rows: ComplexArray) -> CoupledResponse:
         """Without filters [n, 2] that the speed of each axis has passed."""
@@ -149,21 +153,36 @@ class CoupledResponse:
             self,
             response=self.response / rows[:, :, None],
             covariance=self.covariance * each[:, :, None] * each.conj()[:, None, :],
+            unmodelled=(
+                None if self.unmodelled is None else self.unmodelled / np.abs(rows)[:, :, None]
+            ),
         )
 
     def transformed(self, rows: FloatArray, columns: FloatArray) -> CoupledResponse:
-        """``rows`` G ``columns``, with the covariance of that; the coherence is left out (NaN)."""
+        """``rows`` G ``columns``, with the covariance of that; the coherence is left out (NaN).
+
+        What is unmodelled in the entries may add up: it is summed, not averaged.
+        """
         each = np.kron(rows, columns.T)
+        before = np.zeros(self.response.shape) if self.unmodelled is None else self.unmodelled
+        after = np.abs(rows) @ before @ np.abs(columns)
+        noise = self.covariance - _diagonal(before)
         return CoupledResponse(
             self.frequency_hz,
             rows @ self.response @ columns,
-            each @ self.covariance @ each.T,
+            each @ noise @ each.T + _diagonal(after),
             self.freedom,
             np.full_like(self.coherence, np.nan),
             self.distortion,
             self.periods_used,
             self.periods_dropped,
+            after,
         )
+
+
+def _diagonal(deviation: FloatArray) -> FloatArray:
+    """Covariance [n, 4, 4] of complex entries with these deviations [n, 2, 2] of each part."""
+    return np.asarray(2.0 * (deviation.reshape(-1, 4) ** 2)[:, :, None] * np.eye(4))
 
 
 def estimate(records: tuple[PairRecord, ...]) -> CoupledResponse:

@@ -377,7 +377,8 @@ def _entries(response: CoupledResponse) -> tuple[GantryEntry, ...]:
 
 
 def _motions(response: CoupledResponse) -> tuple[GantryMotion, GantryMotion]:
-    found = common_and_differential(response)
+    # A share of the motion itself is not known better, whatever the four entries average.
+    found = common_and_differential(response).not_better_than_known()
     both = np.einsum("kii->ki", found.response)
     half = found.spread * np.einsum("kii->ki", found.std) / np.maximum(np.abs(both), 1e-300)
     common, skew = (
