@@ -101,7 +101,7 @@ export function Frame({ children }: { children: ReactNode }) {
         <Pages />
         <div className="narrow-only row">
           <LanguageSwitch />
-          <Preferences />
+          <Preferences onTour={() => setOpen(false)} />
         </div>
       </Drawer>
       <main id="main" tabIndex={-1}>

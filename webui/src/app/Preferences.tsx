@@ -6,7 +6,7 @@ import { leave, useSession } from './session'
 import { setPlace, useHasTour } from './tour/tour'
 
 /** Appearance, the time zone of what is shown, and who is logged in. */
-export function Preferences() {
+export function Preferences({ onTour }: { onTour?: () => void }) {
   const t = useT()
   const session = useSession()
   const tour = useHasTour(useLink().open)
@@ -31,7 +31,16 @@ export function Preferences() {
           </Menu.Item>
         ))}
         <Menu.Label>{t('frame.times', { zone })}</Menu.Label>
-        {tour && <Menu.Item onClick={() => setPlace('offer')}>{t('tour.menu')}</Menu.Item>}
+        {tour && (
+          <Menu.Item
+            onClick={() => {
+              setPlace('offer')
+              onTour?.()
+            }}
+          >
+            {t('tour.menu')}
+          </Menu.Item>
+        )}
         {session?.login_required && session.person !== null && (
           <>
             <Menu.Label>{t('login.in', { name: session.person ?? '' })}</Menu.Label>
