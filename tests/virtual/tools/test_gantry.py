@@ -74,7 +74,8 @@ async def test_a_square_gantry(namespace: Namespace) -> None:
     for motion, exact in zip(found.motions, (common, skew), strict=True):
         off = np.abs(np.array(motion.magnitude_db) - 20 * np.log10(np.abs(exact)))
         assert np.mean(off <= np.array(motion.half_db)) >= 0.93, motion.kind
-        assert np.median(np.array(motion.half_db)[use]) < 0.5, motion.kind
+        # Wider than of the entries: what the images do to each of them may add up.
+        assert np.median(np.array(motion.half_db)[use]) < 0.65, motion.kind
     assert codes(found)[0] == "square"
     # The modes of the equations of motion, which are those of this beam and these motors.
     assert [m.kind for m in found.modes] == ["skew", "common", "skew"]
