@@ -29,6 +29,8 @@ from profiles.schema import Profile
 _SIZE = {"bool": 1, "int8": 1, "uint8": 1, "sm8": 1, "int16": 2, "uint16": 2, "sm16": 2,
          "int32": 4, "uint32": 4, "sm32": 4, "float": 4, "int64": 8, "uint64": 8,
          "sm64": 8, "double": 8}  # fmt: skip
+#: The command of the IgH master, whose name each line of a script has.
+_COMMAND = "ethercat"
 _DOWNLOAD = re.compile(
     r"^\s*(?:sudo\s+)?(?:\S*/)?ethercat(?P<options>\s.*)?\sdownload\s(?P<rest>.*)$"
 )
@@ -45,7 +47,7 @@ _LONGEST_LINE = 10_000
 
 def is_script(content: str) -> bool:
     """Whether a line of it writes by ``ethercat download``."""
-    return "ethercat" in content and any(_DOWNLOAD.match(line) for line in _lines(content))
+    return _COMMAND in content and any(_DOWNLOAD.match(line) for line in _lines(content))
 
 
 def table_of(content: str) -> tuple[str, str] | None:

@@ -39,11 +39,12 @@ def test_a_gap_and_an_unexplained_chapter_are_found() -> None:
     profile = load_profile("ep3e")
     first, second, *rest = profile.manual_chapters
     holes = (first, second.model_copy(update={"first_line": second.first_line + 3}), *rest)
-    found = [str(f) for f in check(profile.model_copy(update={"manual_chapters": holes}))]
-    assert any("should begin at line 25" in text for text in found)
+    found = check(profile.model_copy(update={"manual_chapters": holes}))
+    begins = [f.params for f in found if f.code == "profile-check.chapter-begin"]
+    assert begins[0] == {"line": second.first_line}
     silent = Chapter(title="Silent", first_line=1757, last_line=1800, taken="")
     more = profile.model_copy(update={"manual_chapters": (*profile.manual_chapters, silent)})
-    assert any("without a reason" in str(finding) for finding in check(more))
+    assert "profile-check.chapter-empty" in {finding.code for finding in check(more)}
 
 
 def test_counts_look_at_notes_too() -> None:
