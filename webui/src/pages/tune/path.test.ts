@@ -22,6 +22,8 @@ describe('the guided path', () => {
     expect(stepsDone(known).verify).toBe(true)
     expect(nextStep(stepsDone(known))).toBe('report')
     expect(nextStep(stepsDone({ ...known, changed: at(6) }))).toBe('verify')
+    // The loop as it was before any change is not its verification.
+    expect(stepsDone({ ...known, changed: null }).verify).toBe(false)
   })
   it('asks for a new report after a new verification', () => {
     const measured = [{ kind: 'sweep-speed_loop', saved: at(5) }]

@@ -39,7 +39,8 @@ export function stepsDone(known: Known): Record<StepName, boolean> {
     gains: changed !== null,
     response: newest(known, ['sweep-mechanics']) !== null,
     notches: changed !== null && newest(known, ['sweep-mechanics']) !== null,
-    verify: verified !== null && after(verified, changed),
+    // A loop that was measured before anything was written verifies nothing.
+    verify: changed !== null && after(verified, changed),
   }
   return { ...done, report: done.verify && after(known.reported, verified) }
 }
