@@ -60,7 +60,10 @@ async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -
     key, speed = drive.require("torque_actual"), drive.require("velocity_actual")
     async with enabled(axis, session, Mode.CSV):
         await asyncio.sleep(threshold.SETTLE_S)
+        began_s, began_raw = time.monotonic(), await axis.position_raw()
         readings = [await drive.read_many([key, speed]) for _ in range(threshold.READINGS)]
+        passed_s = time.monotonic() - began_s
+        moved_rev = units.position(await axis.position_raw() - began_raw)
         # A disabled drive has no torque: a load that it held would seem to pull nothing, and fall.
         await require_enabled(axis)
     raws = [(_integer(r[key].raw), _integer(r[speed].raw)) for r in readings]
@@ -77,6 +80,14 @@ async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -
             ptp_rpm=float(np.ptp(turning)),
         )
     if abs(float(np.mean(turning))) > threshold.FALLING_RPM:
+        if abs(moved_rev) * 60.0 < threshold.FALLING_RPM * passed_s:
+            # It turns and stays where it is: an oscillation whose readings meet one phase of it.
+            raise NotAllowed(
+                "inertia.not-stand-still-under",
+                drive=drive.name,
+                ptp_percent=2.0 * abs(float(np.mean(torque))),
+                ptp_rpm=2.0 * abs(float(np.mean(turning))),
+            )
         raise Interrupted(
             "inertia.turns-rpm-rated-torque",
             drive=drive.name,
