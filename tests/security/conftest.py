@@ -18,6 +18,15 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[GuardedServer]:
     running.stop()
 
 
+@pytest.fixture
+def guarded(tmp_path: Path) -> Iterator[GuardedServer]:
+    """A server of one test alone, with people."""
+    running = GuardedServer(tmp_path).start()
+    running.add_people()
+    yield running
+    running.stop()
+
+
 @dataclass
 class Cast:
     """Everybody who may come to a station."""

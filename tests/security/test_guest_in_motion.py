@@ -3,26 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
 from backend.people.identity import Actor, Identity, acting
 from backend.people.rights import Right, Role
-from backend.work.jobs import Job, JobResult, Progress
+from backend.work.jobs import Job
 from drivers.cia402 import Mode, State
-from tests.support.guarded import GuardedServer
+from tests.support.guarded import GuardedServer, begin_motion
 
 MOVES = frozenset({Right.MEASURE, Right.MOTION})
-
-
-@pytest.fixture
-def guarded(tmp_path: Path) -> Iterator[GuardedServer]:
-    running = GuardedServer(tmp_path).start()
-    running.add_people()
-    yield running
-    running.stop()
 
 
 @pytest.fixture
@@ -44,23 +34,6 @@ def invitation(guarded: GuardedServer) -> str:
 def identity_of(server: GuardedServer, invitation: str) -> Identity:
     support = server.people.support
     return server.call(lambda: support.identity(support.find(invitation)))
-
-
-def begin(server: GuardedServer, identity: Identity) -> Job:
-    """A dwell, say: it goes on until it is cancelled."""
-
-    async def work(_progress: Progress) -> JobResult | None:
-        await asyncio.Event().wait()
-        return None
-
-    async def starting() -> Job:
-        acting.set(Actor(identity))
-        return server.bench.jobs.start("dwell", "Dwell", work, drive="x", motion=True)
-
-    job = server.run(starting())
-    server.run(asyncio.sleep(0.05))
-    assert job.state == "running"
-    return job
 
 
 def leave_enabled(server: GuardedServer, identity: Identity, connection: str | None) -> None:
@@ -94,7 +67,7 @@ def require_ended(server: GuardedServer, job: Job) -> None:
 def test_a_smaller_grant_in_place_of_the_old_one_ends_the_motion(
     guarded: GuardedServer, invitation: str, rights: frozenset[Right], drive: str | None
 ) -> None:
-    job = begin(guarded, identity_of(guarded, invitation))
+    job = begin_motion(guarded, identity_of(guarded, invitation))
     support = guarded.people.support
     guarded.call(lambda: support.grant(invitation, "Olaf", rights, 600.0, drive))
     require_ended(guarded, job)
@@ -102,7 +75,7 @@ def test_a_smaller_grant_in_place_of_the_old_one_ends_the_motion(
 
 
 def test_a_longer_or_larger_grant_lets_it_go_on(guarded: GuardedServer, invitation: str) -> None:
-    job = begin(guarded, identity_of(guarded, invitation))
+    job = begin_motion(guarded, identity_of(guarded, invitation))
     support = guarded.people.support
     more = MOVES | {Right.PARAMETERS}
     guarded.call(lambda: support.grant(invitation, "Olaf", more, 1200.0, None))
@@ -113,7 +86,7 @@ def test_a_longer_or_larger_grant_lets_it_go_on(guarded: GuardedServer, invitati
 
 
 def test_a_visit_that_ends_in_a_dwell_ends_it(guarded: GuardedServer, invitation: str) -> None:
-    job = begin(guarded, identity_of(guarded, invitation))
+    job = begin_motion(guarded, identity_of(guarded, invitation))
     guarded.call(lambda: guarded.people.support.revoke(invitation, "Olaf ended it"))
     require_ended(guarded, job)
 

@@ -3,24 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
-from pathlib import Path
-
-import pytest
 
 from backend.people.identity import Actor, Identity, acting
 from backend.people.rights import Right, Role
-from backend.work.jobs import Job, JobResult, Progress
+from backend.work.jobs import Job
 from drivers.cia402 import Mode, State
-from tests.support.guarded import PASSWORD, Caller, GuardedServer
-
-
-@pytest.fixture
-def guarded(tmp_path: Path) -> Iterator[GuardedServer]:
-    running = GuardedServer(tmp_path).start()
-    running.add_people()
-    yield running
-    running.stop()
+from tests.support.guarded import PASSWORD, Caller, GuardedServer, begin_motion
 
 
 def identity_of(server: GuardedServer, caller: Caller) -> Identity:
@@ -30,21 +18,7 @@ def identity_of(server: GuardedServer, caller: Caller) -> Identity:
 
 
 def begin(server: GuardedServer, caller: Caller) -> Job:
-    """A motion of the axis, begun by this caller, that goes on until it is cancelled."""
-    identity = identity_of(server, caller)
-
-    async def work(_progress: Progress) -> JobResult | None:
-        await asyncio.Event().wait()
-        return None
-
-    async def starting() -> Job:
-        acting.set(Actor(identity))
-        return server.bench.jobs.start("move", "Move", work, drive="x", motion=True)
-
-    job = server.run(starting())
-    server.run(asyncio.sleep(0))
-    assert server.call(lambda: server.bench.authority.mover_of("x")) is not None
-    return job
+    return begin_motion(server, identity_of(server, caller))
 
 
 def require_ended(server: GuardedServer, job: Job) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -17,14 +15,6 @@ from tests.support.guarded import GuardedServer
 LIMITS = {
     "travel_limit": 1.0, "speed_limit": 300.0, "torque_limit": 50.0, "time_limit_s": 30.0,
 }  # fmt: skip
-
-
-@pytest.fixture
-def guarded(tmp_path: Path) -> Iterator[GuardedServer]:
-    running = GuardedServer(tmp_path).start()
-    running.add_people()
-    yield running
-    running.stop()
 
 
 def test_the_partner_needs_the_right_too(

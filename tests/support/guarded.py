@@ -15,13 +15,15 @@ import uvicorn
 from argon2 import PasswordHasher
 
 from backend.commands.serve import Serving, _config, _listen
+from backend.people.identity import Actor, Identity, acting
 from backend.people.passwords import Passwords
 from backend.people.rights import Right, Role
 from backend.people.station import People
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
+from backend.work.jobs import Job, JobResult, Progress
 from tests.support.servo import Servo, bench_with
-from tests.support.station import HANG_S, NO_CERTIFICATES, Live
+from tests.support.station import HANG_S, NO_CERTIFICATES, Live, until
 
 T = TypeVar("T")
 PASSWORD = "eleven blue horses"
@@ -199,3 +201,19 @@ class GuardedServer:
         joined = httpx.post(f"{self.url}/api/v1/guests", json=asked, timeout=HANG_S)
         assert joined.is_success, joined.text
         return Caller(self, cookie=joined.cookies["servodeck"]), made["invitation"]["id"]
+
+
+def begin_motion(server: GuardedServer, identity: Identity) -> Job:
+    """A motion of the axis x, begun by somebody, that goes on until it is cancelled."""
+
+    async def work(_progress: Progress) -> JobResult | None:
+        await asyncio.Event().wait()
+        return None
+
+    async def starting() -> Job:
+        acting.set(Actor(identity))
+        return server.bench.jobs.start("move", "Move", work, drive="x", motion=True)
+
+    job = server.run(starting())
+    until(lambda: server.call(lambda: server.bench.authority.mover_of("x")), what="the axis moves")
+    return job
