@@ -13,15 +13,14 @@ import asyncio
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-import httpx
 
 import drivers.virtual
 from backend.station.demo import connect_axes
-from tests.support.station import HANG_S, Station, until
+from tests.support.demo_api import DemoApi
+from tests.support.station import HANG_S, Station
 
 #: The axis as the bench file names it, and as the interface does.
 NAME = "Gantry left"
@@ -55,7 +54,7 @@ def serve(folder: Path) -> None:
         station.stop()
 
 
-class Demo:
+class Demo(DemoApi):
     """The running station, in a process of its own: the browser's work must not delay the bus."""
 
     def __init__(self, folder: Path) -> None:
@@ -65,27 +64,7 @@ class Demo:
         assert self._process.stdout is not None
         address = self._process.stdout.readline().strip()
         assert address, "the demo does not start"
-        self.url = f"{address}/"
-        self.http = httpx.Client(base_url=f"{self.url}api/v1", timeout=HANG_S)
-
-    def ask(self, path: str) -> Any:
-        """What the interface answers.
-
-        Raises:
-            AssertionError: it refuses.
-        """
-        answer = self.http.get(path)
-        assert answer.is_success, answer.text
-        return answer.json()
-
-    def fresh(self) -> Any:
-        """The state of the axis, once its drive answers."""
-
-        def answered() -> Any:
-            state = self.ask(f"/drives/{AXIS}/state")
-            return state if state["fresh"] and state["position"] is not None else None
-
-        return until(answered, HANG_S, "the axis answers")
+        super().__init__(f"{address}/", AXIS)
 
     def close(self) -> None:
         """End server and drives."""

@@ -10,13 +10,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from drivers.virtual.wires.netns import unavailable
 from tests.browser.conftest import LAPTOP, PHONE, _open
-from tests.support.station import HANG_S, until
+from tests.support.demo_api import DemoApi
 
 # The drives of the demo start in each, on a busy computer slowly.
 pytestmark = pytest.mark.timeout(500)
@@ -26,7 +25,7 @@ START_S = 120.0
 AXIS = "gantry-left"
 
 
-class Demo:
+class Demo(DemoApi):
     """The running command."""
 
     def __init__(self, folder: Path) -> None:
@@ -35,29 +34,15 @@ class Demo:
             [*command, "--config", str(folder)], stdout=subprocess.PIPE, text=True
         )
         assert self._process.stdout is not None
-        self.url = ""
+        url = ""
         deadline = time.monotonic() + START_S
         for line in self._process.stdout:
             if found := re.search(r"servodeck is at (\S+)", line):
-                self.url = found[1]
+                url = found[1]
                 break
             assert time.monotonic() < deadline, "the demo does not start"
-        assert self.url, "the demo ended"
-        self.http = httpx.Client(base_url=f"{self.url}api/v1", timeout=HANG_S)
-
-    def ask(self, path: str) -> Any:
-        answer = self.http.get(path)
-        assert answer.is_success, answer.text
-        return answer.json()
-
-    def fresh(self) -> Any:
-        """The state of the first axis, once its drive answers: a busy computer loses it."""
-
-        def answered() -> Any:
-            state = self.ask(f"/drives/{AXIS}/state")
-            return state if state["fresh"] and state["position"] is not None else None
-
-        return until(answered, START_S, "the axis answers")
+        assert url, "the demo ended"
+        super().__init__(url, AXIS)
 
     def jobs(self) -> list[str]:
         """Kinds of the jobs that somebody started: reading again after a lost line is not one."""
