@@ -1398,6 +1398,10 @@ class coupled_modes:
 class coupled_stability:
     """`coupled/stability.py`."""
 
+    COUPLED = 0.1
+    """[ratio] No line above this share of a rigid body's coupling: two machines, or two joined so
+    softly that the measured band does not show it. Origin:
+    tests/unit/analysis/test_coupled_axes.py."""
     OPEN = 0.8
     """[ratio] A locus that is larger at the highest line may turn round -1 above it. Origin:
     tests/unit/analysis/test_coupled_axes.py."""

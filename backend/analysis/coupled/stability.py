@@ -70,6 +70,13 @@ def coupling(response: CoupledResponse) -> tuple[FloatArray, FloatArray]:
     return ratio, ratio * response.slope_std(slope)
 
 
+def shows_coupling(ratio: FloatArray, half: FloatArray) -> bool:
+    """Whether a coupling [n] is above what two separate machines may show, by the near end of its
+    95 % interval on any line: one rigid body has 1 on the lines below its modes.
+    """
+    return bool(np.max(ratio - half) > threshold.COUPLED)
+
+
 def joint_margins(
     response: CoupledResponse, controllers: ComplexArray, factor: float = 1.0
 ) -> JointMargins:

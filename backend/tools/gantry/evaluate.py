@@ -22,6 +22,7 @@ from backend.analysis.coupled.stability import (
     design,
     interaction,
     joint_margins,
+    shows_coupling,
 )
 from backend.analysis.signals.arrays import magnitude_db, phase_deg
 from backend.analysis.signals.excitation import Excitation
@@ -142,7 +143,10 @@ def evaluate(data: Experiments, settings: GantrySettings) -> GantryResult:
         goals = {"ms": threshold.MS, "phase_margin_deg": threshold.PHASE_MARGIN_DEG}
         margins, best = joint_margins(response, loops), design(response, loops, **goals)
     ratio, deviation = coupling(response)
-    square = _square_rev(data, steady, modes)
+    half = response.spread * deviation
+    # Of two machines nothing is square, skews, or presses against the other.
+    joined = shows_coupling(ratio, half)
+    square = _square_rev(data, steady, modes) if joined else None
     lead = settings.lead_mm
     in_mm = None if lead is None or square is None else _scaled(square, lead)
     return GantryResult(
@@ -151,27 +155,34 @@ def evaluate(data: Experiments, settings: GantrySettings) -> GantryResult:
         entries=_entries(response),
         motions=_motions(response),
         coupling=_tuple(ratio),
-        coupling_half=_tuple(response.spread * deviation),
+        coupling_half=_tuple(half),
         relative_gain=_tuple(interaction(response.response)),
         modes=tuple(
             GantryMode(
                 kind=m.kind, frequency_hz=m.frequency_hz, frequency_ci95_hz=m.frequency_ci95_hz,
                 damping=m.damping, damping_ci95=m.damping_ci95, skew_share=m.skew_share,
             )
-            for m in modes.modes
+            for m in (modes.modes if joined else ())
         ),
         inertia_kgm2=GantryValue(value=modes.inertia_kgm2, ci95=modes.inertia_ci95_kgm2)
-        if modes.inertia_kgm2 > 0 and data.torque_known else None,
-        skew_stiffness_nm_per_rad=_stiffness(modes) if data.torque_known else None,
+        if joined and modes.inertia_kgm2 > 0 and data.torque_known else None,
+        skew_stiffness_nm_per_rad=_stiffness(modes) if joined and data.torque_known else None,
         holding_percent=steady.holding,
         friction_percent=steady.friction,
-        fight_percent=steady.fight,
+        fight_percent=steady.fight if joined else None,
         out_of_square_rev=square,
         out_of_square_mm=in_mm,
         largest_skew_rev=float(np.max(np.abs(data.skew_rad))) / _TURN,
         margins=None if margins is None else _margins(margins),
         gain_factor=None if best is None else best.factor,
-        findings=tuple(_findings(data, steady, square, in_mm, modes, response, margins, best)),
+        findings=(
+            *(
+                _machine_findings(data, steady, square, in_mm, modes)
+                if joined else _apart(response, float(np.max(ratio + half)))
+            ),
+            *_loop_findings(response, margins, best),
+            *_distortion_findings(response),
+        ),
         periods_used=response.periods_used,
         periods_dropped=response.periods_dropped,
         motion_s=data.sent.shape[0] * data.sent.shape[2] / data.shape.sample_rate_hz,
@@ -292,10 +303,9 @@ def _square_rev(data: Experiments, steady: _Steady, modes: CoupledModes) -> Gant
     return GantryValue(value=value, ci95=(value - half, value + half))
 
 
-def _findings(
+def _machine_findings(
     data: Experiments, steady: _Steady, square: GantryValue | None, in_mm: GantryValue | None,
-    modes: CoupledModes, response: CoupledResponse, margins: JointMargins | None,
-    best: Design | None,
+    modes: CoupledModes,
 ) -> list[GantryFinding]:  # fmt: skip
     found = [_square_finding(steady, square, in_mm)]
     if square is None and found[0].code == "out_of_square":
@@ -305,10 +315,19 @@ def _findings(
     if skew is not None:
         values = {"frequency": f"{skew.frequency_hz:.3g}", "damping": f"{100 * skew.damping:.2g}"}
         found.append(GantryFinding(code="skew_mode", values=values))
-    found += _loop_findings(response, margins, best)
-    if float(np.median(response.distortion)) > threshold.DISTORTED:
-        found.append(GantryFinding(code="distortion"))
     return found
+
+
+def _apart(response: CoupledResponse, most: float) -> list[GantryFinding]:
+    """No coupling shows; ``most`` is the highest far end of its intervals."""
+    low, top = response.frequency_hz[[0, -1]]
+    values = {"most": f"{most:.2g}", "low": f"{low:.3g}", "top": f"{top:.3g}"}
+    return [GantryFinding(code="not_coupled", values=values)]
+
+
+def _distortion_findings(response: CoupledResponse) -> list[GantryFinding]:
+    large = float(np.median(response.distortion)) > threshold.DISTORTED
+    return [GantryFinding(code="distortion")] if large else []
 
 
 def _square_finding(

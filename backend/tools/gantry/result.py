@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 from backend.tools.tool import Interval, ToolResult
 
 Code = Literal[
-    "square", "out_of_square", "square_uncertain", "no_skew_stiffness", "skew_mode",
+    "not_coupled", "square", "out_of_square", "square_uncertain", "no_skew_stiffness", "skew_mode",
     "pair_sound", "pair_margin_low", "pair_unstable", "margins_beyond_band",
     "controllers_unknown", "factor", "no_factor", "distortion", "rated_torque_unknown",
 ]  # fmt: skip
@@ -86,6 +86,7 @@ class GantryResult(ToolResult):
     ``holding_percent`` is the torque that each axis needs on the mean of both directions, without
     friction, and ``fight_percent`` half their difference: what both sides press against each other
     with. ``out_of_square_rev`` is by how much axis 1 is ahead of where the beam would rest.
+    Where no coupling shows, neither is stated, nor are modes, inertia and stiffness of the machine.
     ``coupling`` is √|G12·G21/(G11·G22)|, 0 without coupling, 1 for one rigid body;
     ``relative_gain`` that of axis 1, 1 without coupling.
     """
@@ -103,7 +104,7 @@ class GantryResult(ToolResult):
     skew_stiffness_nm_per_rad: GantryValue | None
     holding_percent: tuple[GantryValue, GantryValue]
     friction_percent: tuple[GantryValue, GantryValue]
-    fight_percent: GantryValue
+    fight_percent: GantryValue | None
     out_of_square_rev: GantryValue | None
     out_of_square_mm: GantryValue | None
     largest_skew_rev: float

@@ -66,6 +66,13 @@ TEXTS: dict[str, tuple[str, str]] = {
     "entry.12": ("axis 1 by axis 2", "轴 2 转矩到轴 1"),
     "entry.21": ("axis 2 by axis 1", "轴 1 转矩到轴 2"),
     "entry.22": ("axis 2 by axis 2", "轴 2 转矩到轴 2"),
+    "finding.not_coupled": (
+        "No coupling of both axes shows from {low} to {top} Hz: at most {most}, where one rigid "
+        "body has 1. Check whether both axes move the same machine. Nothing is stated of "
+        "squareness, skew and modes.",
+        "在 {low} 至 {top} Hz 之间未见两轴的耦合：至多 {most}，而同一刚体为 1。"
+        "请检查两轴是否驱动同一机器。不给出垂直度、歪斜和模态的结论。",
+    ),
     "finding.square": (
         "The gantry is square where it stands: both sides press against each other with at most "
         "{limit} % of rated torque.",
@@ -141,6 +148,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
 }
 _TONES: dict[Code, Literal["good", "warn", "fault"]] = {
+    "not_coupled": "warn",
     "square": "good",
     "out_of_square": "warn",
     "square_uncertain": "warn",

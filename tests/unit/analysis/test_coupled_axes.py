@@ -22,6 +22,7 @@ from backend.analysis.coupled.stability import (
     interaction,
     is_stable,
     joint_margins,
+    shows_coupling,
 )
 from backend.analysis.signals.excitation import choose_lines
 from tests.unit.analysis.gantry_plant import Gantry
@@ -73,6 +74,16 @@ def records(
     return tuple(found)
 
 
+class Apart:
+    """Two motors with a load each, and nothing between them."""
+
+    def __init__(self, plant):
+        self._plant = plant
+
+    def response(self, f):
+        return self._plant.response(f) * np.eye(2)
+
+
 def exact(plant, f=None):
     f = LINES.astype(float) if f is None else f
     n = f.size
@@ -80,6 +91,19 @@ def exact(plant, f=None):
         f, plant.response(f), np.zeros((n, 4, 4), complex), 10**6, np.ones((n, 2, 2)), np.ones(n),
         1, 0,
     )  # fmt: skip
+
+
+def test_two_machines_show_no_coupling_and_one_does_through_any_noise():
+    plant = Gantry()
+    for seed in range(5):
+        found = estimate(records(plant, np.random.default_rng(seed)))
+        ratio, deviation = coupling(found)
+        assert shows_coupling(ratio, found.spread * deviation)
+    apart = Apart(plant)
+    for seed in range(20):
+        found = estimate(records(apart, np.random.default_rng(seed)))
+        ratio, deviation = coupling(found)
+        assert not shows_coupling(ratio, found.spread * deviation), seed
 
 
 def test_both_experiments_excite_every_line_at_full_amplitude_and_are_orthogonal():

@@ -44,6 +44,23 @@ def between(found: Any, truth: float) -> bool:
     return bool(low <= truth <= high)
 
 
+async def test_two_axes_without_a_beam_are_no_gantry(namespace: Namespace) -> None:
+    async with gantry(namespace, joined=False) as two:
+        found = await measured(two, ASKED.model_copy(update={"resolution_hz": 10.0}))
+    assert codes(found)[0] == "not_coupled"
+    assert not {"square", "square_uncertain", "out_of_square", "skew_mode"} & set(codes(found))
+    assert found.modes == ()
+    assert found.fight_percent is None
+    assert found.inertia_kgm2 is None
+    assert found.skew_stiffness_nm_per_rad is None
+    # What each motor needs was measured, whatever is between them.
+    for friction in found.friction_percent:
+        assert friction.value == pytest.approx(100 * 0.03 / RATED, abs=0.2)
+    assert "No coupling of both axes shows" in TOOL.text(
+        TOOL.report(found).notes[0].name, "en", TOOL.report(found).notes[0].values
+    )
+
+
 async def test_a_square_gantry(namespace: Namespace) -> None:
     kept: list[tuple[Any, Any]] = []
 

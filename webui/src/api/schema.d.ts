@@ -6659,7 +6659,7 @@ export interface components {
              * Code
              * @enum {string}
              */
-            code: "square" | "out_of_square" | "square_uncertain" | "no_skew_stiffness" | "skew_mode" | "pair_sound" | "pair_margin_low" | "pair_unstable" | "margins_beyond_band" | "controllers_unknown" | "factor" | "no_factor" | "distortion" | "rated_torque_unknown";
+            code: "not_coupled" | "square" | "out_of_square" | "square_uncertain" | "no_skew_stiffness" | "skew_mode" | "pair_sound" | "pair_margin_low" | "pair_unstable" | "margins_beyond_band" | "controllers_unknown" | "factor" | "no_factor" | "distortion" | "rated_torque_unknown";
             /**
              * Values
              * @default {}
@@ -6747,6 +6747,7 @@ export interface components {
          *     ``holding_percent`` is the torque that each axis needs on the mean of both directions, without
          *     friction, and ``fight_percent`` half their difference: what both sides press against each other
          *     with. ``out_of_square_rev`` is by how much axis 1 is ahead of where the beam would rest.
+         *     Where no coupling shows, neither is stated, nor are modes, inertia and stiffness of the machine.
          *     ``coupling`` is √|G12·G21/(G11·G22)|, 0 without coupling, 1 for one rigid body;
          *     ``relative_gain`` that of axis 1, 1 without coupling.
          */
@@ -6757,7 +6758,7 @@ export interface components {
             coupling_half: number[];
             /** Entries */
             entries: components["schemas"]["GantryEntry"][];
-            fight_percent: components["schemas"]["GantryValue"];
+            fight_percent: components["schemas"]["GantryValue"] | null;
             /** Findings */
             findings: components["schemas"]["GantryFinding"][];
             /** Frequency Hz */

@@ -78,9 +78,11 @@ class Two:
 @asynccontextmanager
 async def gantry(
     namespace: Namespace, spec: GantrySpec = SQUARE, *, brake: bool = False,
-    defects: tuple[Defect, ...] = (),
+    defects: tuple[Defect, ...] = (), joined: bool = True,
 ) -> AsyncIterator[Two]:  # fmt: skip
-    """The beam between both drives; ``defects`` are those that the first axis has in the file."""
+    """The beam between both drives, or nothing where they are not ``joined``; ``defects`` are those
+    that the first axis has in the file.
+    """
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "bench.json"
         mechanics = motor(brake).model_dump(exclude_defaults=True)
@@ -89,7 +91,7 @@ async def gantry(
             for n, name in enumerate(spec.axes, 1)
         ]
         axes[0]["defects"] = list(defects)
-        bench = {"axis": axes, "gantry": [spec.model_dump(mode="json")]}
+        bench = {"axis": axes, "gantry": [spec.model_dump(mode="json")] if joined else []}
         file.write_text(json.dumps(bench), "utf-8")
         arguments = [
             "--bench", str(file), "--on", URL, "--sdo-ms", "0.2", "--eeprom-us", "5", "--lockstep",

@@ -59,6 +59,7 @@ export function candidatesOf(
 
 /** As `backend/tools/gantry/texts.py` has them. */
 const TONES: Partial<Record<string, ShownNote['tone']>> = {
+  not_coupled: 'warn',
   square: 'good',
   out_of_square: 'warn',
   square_uncertain: 'warn',
@@ -77,6 +78,12 @@ export function gantryNotes(result: GantryResult, text: Text): ShownNote[] {
   })
 }
 
+/** No digit is shown below a hundredth of the interval: 0 instead of −2·10⁻⁵ within ±0.1. */
+function rounded({ value, ci95 }: GantryValue): number {
+  const step = ((ci95[1] ?? 0) - (ci95[0] ?? 0)) / 200
+  return step > 0 && Math.abs(value) < step ? 0 : value
+}
+
 /** The figures with their intervals; null is what cannot be known. */
 export function gantryRows(result: GantryResult, text: Text): ShownRow[] {
   const row = (
@@ -86,7 +93,7 @@ export function gantryRows(result: GantryResult, text: Text): ShownRow[] {
     places: Record<string, string> = {},
   ): ShownRow => ({
     name: text(name, places),
-    value: found?.value ?? null,
+    value: found && rounded(found),
     unit,
     ends: found?.ci95 ?? null,
   })
@@ -136,7 +143,9 @@ export function motionCurves(result: GantryResult, text: Text): ShownCurve[] {
 
 /** How much of the coupling of one rigid body there is, over frequency. */
 export function couplingCurve(result: GantryResult, text: Text): ShownCurve {
-  return banded(text('coupling'), result, result.coupling, result.coupling_half)
+  const curve = banded(text('coupling'), result, result.coupling, result.coupling_half)
+  // A ratio of magnitudes has no negative values.
+  return { ...curve, low: curve.low.map((value) => Math.max(value, 0)) }
 }
 
 function banded(
