@@ -56,17 +56,21 @@ def test_every_route_is_declared_and_nothing_else(server: GuardedServer) -> None
     assert declared - own - set(operations(server)) == set(), "no such route any more"
 
 
-def test_nobody_gets_in(server: GuardedServer, cast: Cast) -> None:
-    passed = []
-    for operation in operations(server):
-        if ROUTES[operation].right == "public":
-            continue
-        status = ask(cast.nobody, operation).status_code
-        if status not in (401, 429):
-            passed.append(f"{operation}: {status}")
-        if status == 429:
-            server.call(lambda: None)
-    assert passed == []
+def test_nobody_gets_in(guarded: GuardedServer) -> None:
+    # A server of its own: so many requests use up what an address without a login may ask.
+    stranger = Caller(guarded)
+
+    def answered(operation: str) -> int | None:
+        status = ask(stranger, operation).status_code
+        return None if status == 429 else status
+
+    passed = {
+        operation: status
+        for operation in operations(guarded)
+        if ROUTES[operation].right != "public"
+        and (status := until(lambda operation=operation: answered(operation))) != 401
+    }
+    assert passed == {}
 
 
 @pytest.mark.parametrize("forged", ["", "x" * 43, "../../etc/passwd", "a" * 5000, "é%00"])
