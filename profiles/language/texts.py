@@ -8,13 +8,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 from profiles.check import Finding, found
+from profiles.functions import Functions
 from profiles.language.overlay import Overlay, Place
 from profiles.schema import ConfirmStep, Fault, Parameter, Procedure, Profile
 
 #: ``safety``: warnings and the texts that a person must agree to before anything moves.
+#: ``pages``: what the pages of gains, motion, mechanics, I/O and alarms say of the family.
 Kind = Literal[
     "safety", "faults", "procedures", "homing", "terminals", "groups", "parameter names",
-    "parameter help", "values", "notes on the drive",
+    "parameter help", "parameter notes", "values", "pages", "notes on the drive",
 ]  # fmt: skip
 
 
@@ -44,11 +46,13 @@ def _all(profile: Profile) -> Iterator[Text]:
         place = ("homing_methods", str(method.method))
         yield Text("homing", (*place, "name"), method.name)
         yield Text("homing", (*place, "help"), method.help)
+        yield Text("homing", (), method.notes)
     yield from _of_functions(profile)
     for terminal in profile.terminals:
         for function in terminal.functions:
             yield Text("terminals", (), function.name)
             yield Text("terminals", (), function.help)
+        yield Text("terminals", (), terminal.notes)
     for group in dict.fromkeys(parameter.group for parameter in profile.parameters):
         yield Text("groups", (), group)
     for parameter in profile.parameters:
@@ -80,6 +84,7 @@ def _of_procedure(procedure: Procedure) -> Iterator[Text]:
     agreed = (step.text for step in procedure.steps if isinstance(step, ConfirmStep))
     for number, text in enumerate(agreed):
         yield Text("safety", (*place, "confirm", str(number)), text)
+    yield Text("procedures", (), procedure.notes)
 
 
 def _of_functions(profile: Profile) -> Iterator[Text]:
@@ -89,18 +94,49 @@ def _of_functions(profile: Profile) -> Iterator[Text]:
         yield Text("notes on the drive", (*place, "title"), forcing.title)
         yield Text("notes on the drive", (*place, "help"), forcing.help)
         yield Text("safety", (*place, "warning"), forcing.warning)
+        yield Text("pages", (), forcing.notes)
     for guide in functions.guides:
         place = ("guides", guide.name)
         yield Text("notes on the drive", (*place, "title"), guide.title)
         yield Text("safety", (*place, "warning"), guide.warning)
+        yield Text("pages", (), guide.notes)
+        for step in guide.steps:
+            yield Text("pages", (), step.title)
+            yield Text("pages", (), step.text)
     if functions.identification is not None:
         yield Text("safety", ("identification", "warning"), functions.identification.warning)
+    for english in _page_texts(functions):
+        yield Text("pages", (), english)
+
+
+def _page_texts(functions: Functions) -> Iterator[str]:
+    """Titles, help and notes of the pages, by their English text alone."""
+    for group in functions.groups:
+        yield from (group.title, group.help)
+    for block in functions.gain_blocks:
+        yield block.help
+    if (history := functions.history) is not None:
+        yield history.notes
+        yield from (slot.name for slot in history.slots)
+    yield functions.terminals.notes
+    if functions.probe is not None:
+        yield functions.probe.notes
+        for probe in functions.probe.probes:
+            yield from probe.sources.values()
+    if functions.brake is not None:
+        yield from (functions.brake.fault, functions.brake.notes)
+    if functions.regeneration is not None:
+        yield functions.regeneration.notes
+    yield from (functions.gear.acts, functions.gear.notes)
 
 
 def _of_parameter(parameter: Parameter) -> Iterator[Text]:
     place = ("parameters", parameter.key)
     yield Text("parameter names", (*place, "name"), parameter.name)
     yield Text("parameter help", (*place, "help"), parameter.help)
+    yield Text("parameter notes", (), parameter.notes)
+    for note in (*parameter.also_printed, parameter.motion_reason):
+        yield Text("parameter notes", (), note)
     for code, meaning in parameter.enum.items():
         yield Text("values", (*place, "enum", str(code)), meaning)
     for bits, meaning in parameter.bits.items():

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Iterator
 
 import pytest
+from pydantic import BaseModel
 
 from profiles import load_profile
 from profiles.language.overlay import load_overlay, load_shared, parse_overlay
@@ -108,3 +110,44 @@ def test_own_translation_of_a_family_goes_before_the_shared_one() -> None:
 def test_file_of_a_family_cannot_give_texts_of_all_families() -> None:
     with pytest.raises(ProfileError, match="use common"):
         parse_overlay("mms7/zh", {"a.yaml": 'shared: {"Target position": 目标位置}'})
+
+
+#: Texts of a profile that no page shows: sources, remarks to whoever maintains the profile, and
+#: the inventory of the manual, which `profile check` reads.
+NOT_SHOWN = (
+    "source", "manual", "drive", "title", "manual_chapters", "chapters", "conflicts",
+    "motion_rules", "identity", "units", "pdo", "gains", "notch", "stiffness", "signals",
+    "slow_vibration", "faults.notes", "faults.also_printed", "faults.led", "faults.severity",
+    "links.notes", "functions.regeneration.models.model", "homing_methods.also_printed",
+)  # fmt: skip
+
+
+def _written(value: object, path: str = "") -> Iterator[tuple[str, str]]:
+    """Every text of two words or more in a record, with the path of its field."""
+    if isinstance(value, str):
+        if " " in value.strip():
+            yield path, value
+    elif isinstance(value, BaseModel):
+        for name in type(value).model_fields:
+            yield from _written(getattr(value, name), f"{path}.{name}".strip("."))
+    elif isinstance(value, dict):
+        for each in value.values():
+            yield from _written(each, path)
+    elif isinstance(value, tuple | list):
+        for each in value:
+            yield from _written(each, path)
+
+
+def _shown(path: str) -> bool:
+    last = path.rpartition(".")[2]
+    return last not in ("source", "unit") and not any(
+        path == out or path.startswith(f"{out}.") for out in NOT_SHOWN
+    )
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_text_that_a_page_shows_counts_as_one_to_translate(family: str) -> None:
+    profile = load_profile(family)
+    counted = {text.english for text in texts_of(profile)}
+    forgotten = {path for path, text in _written(profile) if _shown(path) and text not in counted}
+    assert forgotten == set()

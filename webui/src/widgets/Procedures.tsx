@@ -111,7 +111,11 @@ export function ProcedureDialog({
             <li key={i}>{step}</li>
           ))}
         </ol>
-        {procedure.notes && <p className="dim">{procedure.notes}</p>}
+        {procedure.notes && (
+          <p className="dim">
+            <ProfileText drive={drive} text={procedure.notes} />
+          </p>
+        )}
         <p className="dim">{t('source', { source: procedure.source })}</p>
       </details>
       {procedure.confirm.map((text, i) => (

@@ -10,6 +10,7 @@ import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { ProcedureButton } from '../../widgets/Procedures'
 import { useRows } from '../../widgets/profile-text/rows'
+import { useSay } from '../../widgets/profile-text/texts'
 import { useAction } from '../../widgets/useAction'
 import { useFetched } from '../../widgets/useFunctions'
 
@@ -90,6 +91,7 @@ export function History({ drive }: { drive: string }) {
 
 function Past({ drive, entry }: { drive: string; entry: PastFaultInfo }) {
   const t = useT()
+  const say = useSay(drive)
   const rows = useRows(drive) ?? []
   const values = entry.values.flatMap((value) => {
     const row = rows.find((each) => each.key === value.key)
@@ -98,14 +100,14 @@ function Past({ drive, entry }: { drive: string; entry: PastFaultInfo }) {
   if (entry.error) {
     return (
       <li>
-        <strong>{entry.name}</strong> <span className="warn-text">{entry.error}</span>
+        <strong>{say(entry.name)}</strong> <span className="warn-text">{entry.error}</span>
       </li>
     )
   }
   return (
     <li className={entry.kind ?? ''}>
       <h3>
-        <small className="dim">{entry.name}</small> <span className="mono">{entry.code}</span>{' '}
+        <small className="dim">{say(entry.name)}</small> <span className="mono">{entry.code}</span>{' '}
         {entry.known ? <ProfileText drive={drive} text={entry.title} /> : t('history.notInProfile')}
       </h3>
       {values.length > 0 && (

@@ -4,6 +4,7 @@ import { api, ask } from '../../api/client'
 import type { DriveSummary, MissingPort } from '../../api/schema'
 import { useT } from '../../i18n'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { useSay } from '../../widgets/profile-text/texts'
 import { useAction } from '../../widgets/useAction'
 
@@ -52,7 +53,11 @@ function Missing({ drive, port }: { drive: DriveSummary; port: MissingPort }) {
           ? t('port.missing', { kind, count: port.parameters, groups })
           : t('port.missingNothing', { kind })}
       </summary>
-      {port.wiring && <p className="prose">{port.wiring}</p>}
+      {port.wiring && (
+        <p className="prose">
+          <ProfileText drive={drive.id} text={port.wiring} />
+        </p>
+      )}
       <div className="row">
         <TextInput
           className="grow mono-input"

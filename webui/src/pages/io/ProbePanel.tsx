@@ -102,7 +102,7 @@ function OneProbe({
           />
         ) : (
           <p>
-            {t('probe.source')}: {sources[0]?.[1]}
+            {t('probe.source')}: {say(sources[0]?.[1] ?? '')}
           </p>
         )}
         <Button loading={act.busy} disabled={form === null} onClick={() => void write()}>

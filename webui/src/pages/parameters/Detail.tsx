@@ -113,7 +113,9 @@ export function Detail({
       </div>
       <ProblemNote problem={problems.get(row.key) ?? act.problem} />
       <OnWatchList drive={drive} row={row} />
-      {row.access !== 'ro' && <MotionClass key={row.key} profile={profile} parameter={row.key} />}
+      {row.access !== 'ro' && (
+        <MotionClass key={row.key} drive={drive} profile={profile} parameter={row.key} />
+      )}
       <Facts row={row} />
     </aside>
   )

@@ -5,12 +5,21 @@ import type { MotionClass as Info, MotionClassRequest } from '../../api/schema'
 import { hasRight } from '../../app/session'
 import { useT } from '../../i18n'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { useSay } from '../../widgets/profile-text/texts'
 import { useAction } from '../../widgets/useAction'
 
 const CLASSES = ['none', 'at_enable', 'energises'] as const
 
 /** Whether writing an object can cause motion, who says so, and the control to say otherwise. */
-export function MotionClass({ profile, parameter }: { profile: string; parameter: string }) {
+export function MotionClass({
+  drive,
+  profile,
+  parameter,
+}: {
+  drive: string
+  profile: string
+  parameter: string
+}) {
   const t = useT()
   const [info, setInfo] = useState<Info | null>(null)
   const act = useAction()
@@ -30,6 +39,7 @@ export function MotionClass({ profile, parameter }: { profile: string; parameter
       gone = true
     }
   }, [profile, parameter, run])
+  const say = useSay(drive)
   if (!info) return <ProblemNote problem={act.problem} />
   if (info.motion === null) return null
   return (
@@ -38,7 +48,7 @@ export function MotionClass({ profile, parameter }: { profile: string; parameter
       <p>{t(info.safe_in_motion ? 'motionClass.safe' : `motionClass.${info.motion}`)}</p>
       <p className="dim">
         {t(`motionClass.origin.${info.origin ?? 'unclassified'}`)}
-        {info.origin === 'unclassified' ? '' : `: ${info.reason}`}
+        {info.origin === 'unclassified' ? '' : `: ${say(info.reason)}`}
       </p>
       {info.changeable && hasRight('station') && (
         <Choice profile={profile} parameter={parameter} info={info} onChange={setInfo} />

@@ -35,7 +35,11 @@ export function BrakePanel({ drive, brake }: { drive: string; brake: BrakeTiming
       </Panel>
       <Panel title={t('brake.picture')}>
         <Picture drive={drive} brake={brake} />
-        {brake.fault && <p>{brake.fault}</p>}
+        {brake.fault && (
+          <p>
+            <ProfileText drive={drive} text={brake.fault} />
+          </p>
+        )}
         <p className="dim">{t('source', { source: brake.source })}</p>
       </Panel>
     </div>
