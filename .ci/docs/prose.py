@@ -35,7 +35,7 @@ REFERENCE = (
     "adr/", "architecture.md", "audit.md", "backup.md", "buses/", "drives/", "friction.md",
     "import.md", "library.md", "parameter-sets.md", "recording.md",
     "reference/", "scope.md", "security.md", "station.md", 
-    "tuning.md", "virtual-drives.md", "pages.md", "handover.md",
+    "virtual-drives.md", "pages.md", "handover.md",
     "remote-support.md", "command-line.md",
 )  # fmt: skip
 
