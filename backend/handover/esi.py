@@ -5,15 +5,17 @@ Without it no complete ENI can be written: the addresses are the slave's own (ET
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, TypeAlias
 from xml.etree.ElementTree import Element
 
 from backend.parameters.set_file import BadSet
 from drivers.errors import NotAllowed
 from drivers.texts.imports import failure_text
+from drivers.texts.message import Text
 from profiles.importer import ImportFailed, ImportReport
-from profiles.importer.esi import esi_devices, open_esi
+from profiles.importer.esi import EsiFile, esi_devices, open_esi
 from profiles.importer.values import whole_number
 from profiles.importer.xml_tree import attribute_of, child, children, flag_of, text_of
 
@@ -58,32 +60,108 @@ class SlaveController:
         return next((each for each in self.sync_managers if each.kind == kind), None)
 
 
+#: Vendor ID, product code and revision number of a drive; the revision may not be known.
+Wanted: TypeAlias = tuple[int, int, int | None]
+
+
+def controllers_of(
+    sources: Iterable[tuple[bytes, str]], wanted: Sequence[Wanted]
+) -> tuple[SlaveController, ...]:
+    """The controllers of these drives in their order, each of the first file that has it.
+
+    ``sources`` are ESI files with their names; of each one is in memory at a time.
+
+    Raises:
+        BadSet: a file is no ESI file, or one that is damaged.
+        NotAllowed: no file has such a device, or one without CoE mailboxes.
+    """
+    found: dict[int, SlaveController] = {}
+    missing: dict[int, NotAllowed] = {}
+    for data, name in sources:
+        left = [number for number in range(len(wanted)) if number not in found]
+        if not left:
+            break
+        file = _opened(data, name)
+        for number in left:
+            try:
+                found[number] = _of_file(file, *wanted[number])
+            except BadSet:
+                raise
+            except NotAllowed as error:
+                missing[number] = error
+    for number, error in sorted(missing.items()):
+        if number not in found:
+            raise error
+    return tuple(found[number] for number in range(len(wanted)))
+
+
 def controller_of(
     data: bytes, name: str, vendor: int, product: int, revision: int | None
 ) -> SlaveController:
-    """The controller of the device with this identity; the newest revision where none is known.
+    """The controller of one drive; the newest revision where none is known. Raises as above."""
+    return controllers_of([(data, name)], [(vendor, product, revision)])[0]
 
-    Raises:
-        BadSet: no ESI file, or one that is damaged.
-        NotAllowed: the file has no such device, or one without CoE mailboxes.
-    """
-    report = ImportReport()
+
+@dataclass(frozen=True, slots=True)
+class ControllersTask:
+    """`controllers_of` for the process of an import: an uploaded file may take any memory."""
+
+    sources: tuple[tuple[bytes, str], ...]
+    wanted: tuple[Wanted, ...]
+
+    def run(self) -> dict[str, object]:
+        """``controllers``, or ``refused`` with the error's message and remedy."""
+        try:
+            found = controllers_of(self.sources, self.wanted)
+        except NotAllowed as error:
+            remedy = error.own_remedy
+            return {
+                "refused": error.text.to_wire(),
+                "remedy": None if remedy is None else remedy.to_wire(),
+                "damaged": isinstance(error, BadSet),
+            }
+        return {"controllers": [asdict(each) for each in found]}
+
+
+def reported_controllers(answer: Mapping[str, Any]) -> tuple[SlaveController, ...]:
+    """What `ControllersTask` answered. Raises what `controllers_of` raised there."""
+    if "refused" in answer:
+        kind = BadSet if answer["damaged"] else NotAllowed
+        remedy = answer["remedy"]
+        raise kind(
+            Text.from_wire(answer["refused"]),
+            remedy=None if remedy is None else Text.from_wire(remedy),
+        )
+    return tuple(
+        SlaveController(
+            **each | {"sync_managers": tuple(SyncManager(**m) for m in each["sync_managers"])}
+        )
+        for each in answer["controllers"]
+    )
+
+
+def _opened(data: bytes, name: str) -> EsiFile:
     try:
-        file = open_esi(data, name, report)
+        return open_esi(data, name, ImportReport())
     except ImportFailed as error:
         raise BadSet(failure_text(error), value=name, remedy="handover.choose-esi") from error
+
+
+def _of_file(file: EsiFile, vendor: int, product: int, revision: int | None) -> SlaveController:
     fitting = [
         device
         for device in esi_devices(file)
         if (device.vendor_id, device.product_code) == (vendor, product)
     ]
-    exact = [device for device in fitting if device.revision == revision]
     if not fitting:
-        raise NotAllowed("handover.no-device-vendor-0x", value=name, vendor=vendor, product=product)
+        raise NotAllowed(
+            "handover.no-device-vendor-0x", value=file.name, vendor=vendor, product=product
+        )
+    exact = [device for device in fitting if device.revision == revision]
     chosen = max(exact or fitting, key=lambda device: device.revision or 0)
-    found = _controller(file.devices[chosen.number], name, report)
+    found = _controller(file.devices[chosen.number], file.name, file.report)
     if found.manager("mailbox_out") is None or found.manager("mailbox_in") is None:
-        raise NotAllowed("handover.no-mailboxes-no-start", value=name, chosen=chosen.name)
+        raise NotAllowed("handover.no-mailboxes-no-start", value=file.name, chosen=chosen.name)
     return found
 
 
