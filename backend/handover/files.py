@@ -10,10 +10,10 @@ from typing import Literal, get_args
 
 from backend.handover import ros2_files, text_lists, xml_lists
 from backend.handover.eni import eni, is_complete
-from backend.handover.esi import SlaveController, Wanted
 from backend.handover.model import AxisHandover
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, text
+from profiles.importer.esi_controller import SlaveController, Wanted
 
 Format = Literal["twincat", "codesys", "eni", "lcec", "ros2", "igh", "dcf", "csv", "python"]
 FORMATS: tuple[str, ...] = get_args(Format)

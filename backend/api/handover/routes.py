@@ -29,7 +29,7 @@ from backend.api.handover.models import (
 )
 from backend.drive.drive import Drive
 from backend.handover.conflicts import Conflict, changed_since, compare
-from backend.handover.esi import ControllersTask, reported_controllers
+from backend.handover.esi import reported_controllers
 from backend.handover.files import (
     digest,
     files_of,
@@ -48,6 +48,7 @@ from backend.station.bench import Bench
 from backend.station.description import import_in_process
 from drivers.errors import NotAllowed
 from drivers.texts.message import language, text
+from profiles.importer.esi_controller import ControllersTask
 from profiles.schema import Profile, Raw
 
 router = APIRouter()

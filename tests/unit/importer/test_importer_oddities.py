@@ -319,6 +319,34 @@ def test_an_array_beyond_the_subindices_is_said() -> None:
     assert sum(k.startswith("2010") for k in result.profile.by_key) == 255
 
 
+def test_an_inline_array_with_a_subindex_is_one_octet_string() -> None:
+    """ETG.1020: messages of the diagnosis history (10F3h) lie at subindices 6 and following."""
+    message = "<Type>ARRAY [0..27] OF BYTE</Type><BitSize>224</BitSize>"
+    described = (
+        "<DataType><Name>ARRAY [0..27] OF BYTE</Name><BaseType>BYTE</BaseType>"
+        "<BitSize>224</BitSize>"
+        "<ArrayInfo><LBound>0</LBound><Elements>28</Elements></ArrayInfo></DataType>"
+    )
+    history = (
+        "<DataType><Name>DT10F3</Name><BitSize>512</BitSize>"
+        "<SubItem><SubIdx>0</SubIdx><Name>SubIndex 000</Name><Type>USINT</Type></SubItem>"
+        "<SubItem><SubIdx>1</SubIdx><Name>Maximum Messages</Name><Type>USINT</Type></SubItem>"
+        f"<SubItem><SubIdx>6</SubIdx><Name>Message 001</Name>{message}</SubItem>"
+        f"<SubItem><SubIdx>7</SubIdx><Name>Message 002</Name>{message}</SubItem></DataType>"
+    )
+    diagnosis = (
+        "<Object><Index>#x10F3</Index><Name>Diagnosis History</Name><Type>DT10F3</Type>"
+        "<BitSize>512</BitSize><Flags><Access>ro</Access></Flags></Object>"
+    )
+    for types in (history, described + history):
+        found = import_file(esi(device(CONTROL + STATUS + diagnosis, types=types)), "d.xml")
+        entries = [(k, p.type) for k, p in found.profile.by_key.items() if k[:4] == "10F3"]
+        assert entries == [("10F3:01", "UINT8"), ("10F3:06", "OCTETS"), ("10F3:07", "OCTETS")]
+        assert not any(
+            finding.code == "description.subindex-twice" for finding in found.report.findings
+        )
+
+
 # 9, 10, 12: enumerations, access, remarks -------------------------------------------------------
 
 

@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 from importer_samples import GOOD_EDS, GOOD_ESI
 
-from backend.handover.esi import ControllersTask, controller_of, reported_controllers
+from backend.handover.esi import controller_of, reported_controllers
 from backend.parameters.set_file import BadSet
 from backend.station.description import BadDescription, Work, import_in_process
 from drivers.errors import NotAllowed
+from profiles.importer.esi_controller import ControllersTask
 from profiles.importer.process import DevicesTask, FileTask
 from profiles.loader import ProfileError, broken_profiles, load_all, load_profile
 
@@ -30,7 +31,7 @@ def run(task: Work, limit_s: float = 60.0, limit_mib: int = 768) -> dict[str, An
 
 
 def greedy(elements: int = 400_000) -> bytes:
-    """An ESI file of 3.6 MB whose elements take more than 100 MiB."""
+    """An ESI file of 3.6 MB whose elements take more than 150 MiB."""
     device = b"".join([
         b'<Type ProductCode="#x1" RevisionNo="#x1">A</Type>', b'<a b=""/>' * elements,
     ])  # fmt: skip
