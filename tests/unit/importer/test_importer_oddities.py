@@ -278,6 +278,29 @@ def test_negative_values_of_the_file_keep_its_sign() -> None:
     assert (found.type, found.default_raw) == ("INT16", -1000)
 
 
+def test_real_numbers_in_hexadecimal_are_their_bits() -> None:
+    """DefaultData holds the bytes as they travel: 0000003F is 0.5 (IEEE 754), not 1056964608."""
+    data = "<MinData>000020C1</MinData><MaxData>0000C842</MaxData>"
+    for default in (
+        "<DefaultData>0000003F</DefaultData>",
+        "<DefaultValue>#x3F000000</DefaultValue>",
+    ):
+        gain = scalar(0x2510, "Gain", "REAL", 32, info=default + data)
+        result = import_file(esi(device(CONTROL + STATUS + gain)), "real.xml")
+        found = result.profile.by_key["2510:00"]
+        assert (found.type, found.default_raw) == ("REAL32", 0.5)
+        assert (found.min_raw, found.max_raw) == (-10.0, 100.0)
+        assert not any(f.code == "description.limits-swapped" for f in result.report.findings)
+    nan = scalar(0x2510, "Gain", "REAL", 32, info="<DefaultData>0000C07F</DefaultData>")
+    assert imported(CONTROL + STATUS + nan).by_key["2510:00"].default_raw is None
+
+
+def test_an_io_device_with_modules_has_no_further_axes() -> None:
+    module = scalar(0x7040, "Output of module 3", "UINT", 16, mapping="R")
+    result = import_file(esi(device(module + STATUS)), "io.xml")
+    assert not any(f.code == "description.further-axes" for f in result.report.findings)
+
+
 # 8: names of array members ----------------------------------------------------------------------
 
 ARRAY = (
