@@ -173,14 +173,14 @@ def _candidates(script: str) -> Iterator[tuple[Text, str]]:
         BadRow: a line is too long, or there are too many.
     """
     found = 0
-    for number, line in enumerate(_lines(script), 1):
+    for at, line in enumerate(_lines(script), 1):
         before = line[: max(line.rfind("download"), 0)]
         if not ("$" in before or "ethercat" in before.lower()) or _in_remark(before):
             continue
         found += 1
         if len(line) > _LONGEST_LINE or found > _MOST_CANDIDATES:
-            raise BadRow(text("handover.row-download-form", place=line_of(number)))
-        yield line_of(number), line
+            raise BadRow(text("handover.row-download-form", place=line_of(at)))
+        yield line_of(at), line
 
 
 def _in_remark(before: str) -> bool:

@@ -143,7 +143,9 @@ def test_no_download_of_a_script_is_passed_over(line: str, words: str) -> None:
 
 
 def test_a_remark_about_the_command_makes_no_script() -> None:
-    row = "  - {index: 0x6072, sub_index: 0, type: uint16, value: 1000} # drive's: ethercat download 1"
+    row = (
+        "  - {index: 0x6072, sub_index: 0, type: uint16, value: 1000} # drive's: ethercat download"
+    )
     assert writes(f"vendor_id: 1\nsdo:\n{row}\n") == TAKEN
 
 
@@ -173,7 +175,7 @@ def test_what_the_driver_of_an_lcec_slave_writes_is_not_called_unchanged() -> No
     assert writes(lcec_slave("basic_cia402", pins + MOTOR)) == TAKEN
     gear = '<modParam name="gearRatio" value="3:1"/>'
     for content in (gear + MOTOR, gear):
-        with pytest.raises(BadSet, match="the driver basic_cia402 writes .* gearRatio"):
+        with pytest.raises(BadSet, match=r"the driver basic_cia402 writes .* gearRatio"):
             writes(lcec_slave("basic_cia402", pins + content))
 
 
