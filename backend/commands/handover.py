@@ -17,6 +17,7 @@ from backend.commands.session import run
 from backend.commands.values import bytes_of
 from backend.handover.conflicts import Conflict, Verdict, changed_since
 from backend.handover.conflicts import compare as compared
+from backend.handover.esi import controllers_of
 from backend.handover.files import (
     FORMATS,
     Format,
@@ -24,7 +25,8 @@ from backend.handover.files import (
     files_of,
     fitting,
     remarks,
-    with_controller,
+    wanted_of,
+    with_controllers,
 )
 from backend.handover.model import AxisHandover, Choice, hand_over
 from backend.handover.read import read_list
@@ -91,7 +93,7 @@ def export(
         ]  # fmt: skip
         sources = [(bytes_of(file), file.name) for file in esi or []]
         if sources:
-            axes = [with_controller(axis, sources) for axis in axes]
+            axes = with_controllers(axes, controllers_of(sources, wanted_of(axes)))
         files = files_of(axes, chosen, out.name, contents[0].saved)
         for name, data in files.items():
             write_atomically(out.with_name(name), data)

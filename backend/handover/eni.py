@@ -21,11 +21,11 @@ from backend.handover.eni_registers import (
     register_command,
     slave_registers,
 )
-from backend.handover.esi import SlaveController
 from backend.handover.model import AxisHandover, MappedEntry, MappedPdo
 from backend.handover.xml_lists import child, file_of, init_command, init_commands, note
 from drivers.errors import NotAllowed
 from drivers.texts import limits
+from profiles.importer.esi_controller import SlaveController
 
 #: Datagram commands (ETG.1000.4 clause 5.4).
 _BRD, _BWR, _LRW, _ARMW = 7, 8, 12, 13

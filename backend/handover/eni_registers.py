@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
-from backend.handover.esi import SlaveController, SyncManager
 from backend.handover.model import AxisHandover
 from backend.handover.xml_lists import child
+from profiles.importer.esi_controller import SlaveController, SyncManager
 
 #: Datagram commands (ETG.1000.4 clause 5.4).
 _APRD, _APWR, _FPRD, _FPWR = 1, 2, 4, 5

@@ -1,139 +1,58 @@
-"""What a maker's ESI file says of a slave's controller: mailboxes, sync managers and clock.
-
-Without it no complete ENI can be written: the addresses are the slave's own (ETG.2000).
-"""
+"""Controllers of slaves out of makers' ESI files, with the errors of a hand-over."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
-from xml.etree.ElementTree import Element
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from backend.parameters.set_file import BadSet
 from drivers.errors import NotAllowed
-from drivers.texts.imports import failure_text
-from profiles.importer import ImportFailed, ImportReport
-from profiles.importer.esi import esi_devices, open_esi
-from profiles.importer.values import whole_number
-from profiles.importer.xml_tree import attribute_of, child, children, flag_of, text_of
-
-SyncKind = Literal["mailbox_out", "mailbox_in", "outputs", "inputs"]
-_KINDS: dict[str, SyncKind] = {
-    "mboxout": "mailbox_out", "mboxin": "mailbox_in", "outputs": "outputs", "inputs": "inputs",
-}  # fmt: skip
-_MEMORY, _MEMORY_END = 0x1000, 0x10000
-#: What the smallest mailbox of CoE holds (ETG.1000.6), and the largest length of a sync manager.
-_SHORTEST_MAILBOX, _LONGEST = 16, 0x7FFF
-#: A drive with a clock whose file names no way to use it: SYNC0 without SYNC1.
-_SYNC0 = 0x0300
+from drivers.texts.imports import failure_text, message_of_import
+from drivers.texts.message import Text
+from profiles.importer import ImportFailed
+from profiles.importer.esi_controller import (
+    NoController,
+    SlaveController,
+    SyncManager,
+    Wanted,
+    read_controllers,
+)
 
 
-@dataclass(frozen=True, slots=True)
-class SyncManager:
-    """One sync manager by its number; ``length`` is the mailbox's, 0 for process data."""
+def controllers_of(
+    sources: Iterable[tuple[bytes, str]], wanted: Sequence[Wanted]
+) -> tuple[SlaveController, ...]:
+    """See `read_controllers`, in this process: for files of who has started it.
 
-    number: int
-    kind: SyncKind
-    start: int
-    length: int
-    control: int
-
-
-@dataclass(frozen=True, slots=True)
-class SlaveController:
-    """Sync managers and clock of a slave; ``assign_activate`` 0 is no clock."""
-
-    physics: str
-    sync_managers: tuple[SyncManager, ...]
-    assigns: bool
-    """Whether PDOs can be assigned (1C12h, 1C13h)."""
-    configures: bool
-    """Whether the contents of PDOs can be written."""
-    assign_activate: int
-    shift_ns: int
-    source: str
-
-    def manager(self, kind: SyncKind) -> SyncManager | None:
-        """The first one of a kind."""
-        return next((each for each in self.sync_managers if each.kind == kind), None)
+    Raises:
+        BadSet: a file is no ESI file, or one that is damaged.
+        NotAllowed: no file has such a device, or one without CoE mailboxes.
+    """
+    try:
+        return read_controllers(sources, wanted)
+    except ImportFailed as error:
+        sound = isinstance(error, NoController)
+        raise _refusal(failure_text(error), sound=sound) from error
 
 
 def controller_of(
     data: bytes, name: str, vendor: int, product: int, revision: int | None
 ) -> SlaveController:
-    """The controller of the device with this identity; the newest revision where none is known.
-
-    Raises:
-        BadSet: no ESI file, or one that is damaged.
-        NotAllowed: the file has no such device, or one without CoE mailboxes.
-    """
-    report = ImportReport()
-    try:
-        file = open_esi(data, name, report)
-    except ImportFailed as error:
-        raise BadSet(failure_text(error), value=name, remedy="handover.choose-esi") from error
-    fitting = [
-        device
-        for device in esi_devices(file)
-        if (device.vendor_id, device.product_code) == (vendor, product)
-    ]
-    exact = [device for device in fitting if device.revision == revision]
-    if not fitting:
-        raise NotAllowed("handover.no-device-vendor-0x", value=name, vendor=vendor, product=product)
-    chosen = max(exact or fitting, key=lambda device: device.revision or 0)
-    found = _controller(file.devices[chosen.number], name, report)
-    if found.manager("mailbox_out") is None or found.manager("mailbox_in") is None:
-        raise NotAllowed("handover.no-mailboxes-no-start", value=name, chosen=chosen.name)
-    return found
+    """The controller of one drive; see `controllers_of`."""
+    return controllers_of([(data, name)], [(vendor, product, revision)])[0]
 
 
-def _controller(element: Element, name: str, report: ImportReport) -> SlaveController:
-    managers = []
-    for number, each in enumerate(children(element, "Sm")):
-        kind = _KINDS.get(text_of(each).lower())
-        start = _number(each, "StartAddress", name, report)
-        control = _number(each, "ControlByte", name, report)
-        length = _number(each, "DefaultSize", name, report)
-        if kind is None:
-            continue
-        mailbox = kind.startswith("mailbox")
-        if not _MEMORY <= start < _MEMORY_END or (
-            mailbox and not _SHORTEST_MAILBOX <= length <= _LONGEST
-        ):
-            raise BadSet(
-                "handover.sync-manager-0x-bytes",
-                value=name,
-                number=number,
-                start=start,
-                length_bytes=length,
-            )
-        managers.append(SyncManager(number, kind, start, length if mailbox else 0, control))
-    coe = child(child(element, "Mailbox"), "CoE")
-    modes = children(child(element, "Dc"), "OpMode")
-    activate = shift = 0
-    if modes:
-        words = [_text_number(child(mode, "AssignActivate"), name, report) for mode in modes]
-        at = next((n for n, word in enumerate(words) if word), 0)
-        activate = words[at]
-        shift = _text_number(child(modes[at], "ShiftTimeSync0"), name, report)
-    elif child(element, "Dc") is not None:
-        activate = _SYNC0
-    return SlaveController(
-        physics=element.get("Physics", "YY")[:4],
-        sync_managers=tuple(managers),
-        assigns=flag_of(coe, "PdoAssign"),
-        configures=flag_of(coe, "PdoConfig"),
-        assign_activate=activate & 0xFFFF,
-        shift_ns=shift,
-        source=name,
+def reported_controllers(answer: Mapping[str, Any]) -> tuple[SlaveController, ...]:
+    """What `ControllersTask` answered; raises what `controllers_of` raises."""
+    if "refused" in answer:
+        raise _refusal(message_of_import(answer["refused"]), sound=answer["sound"])
+    return tuple(
+        SlaveController(
+            **each | {"sync_managers": tuple(SyncManager(**m) for m in each["sync_managers"])}
+        )
+        for each in answer["controllers"]
     )
 
 
-def _number(element: Element, attribute: str, name: str, report: ImportReport) -> int:
-    text = attribute_of(element, attribute)
-    return (whole_number(text, name, report) or 0) if text else 0
-
-
-def _text_number(element: Element | None, name: str, report: ImportReport) -> int:
-    text = text_of(element)
-    return (whole_number(text, name, report) or 0) if text else 0
+def _refusal(why: Text, *, sound: bool) -> NotAllowed:
+    return NotAllowed(why) if sound else BadSet(why, remedy="handover.choose-esi")

@@ -10,11 +10,10 @@ from typing import Literal, get_args
 
 from backend.handover import ros2_files, text_lists, xml_lists
 from backend.handover.eni import eni, is_complete
-from backend.handover.esi import controller_of
 from backend.handover.model import AxisHandover
-from backend.parameters.set_file import BadSet
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, text
+from profiles.importer.esi_controller import SlaveController, Wanted
 
 Format = Literal["twincat", "codesys", "eni", "lcec", "ros2", "igh", "dcf", "csv", "python"]
 FORMATS: tuple[str, ...] = get_args(Format)
@@ -81,26 +80,20 @@ def remarks(axes: Sequence[AxisHandover], form: Format) -> tuple[Text, ...]:
     return tuple(found)
 
 
-def with_controller(axis: AxisHandover, esi_files: Sequence[tuple[bytes, str]]) -> AxisHandover:
-    """The axis with the controller of its own ESI file, among files with their names.
+def wanted_of(axes: Sequence[AxisHandover]) -> tuple[Wanted, ...]:
+    """The identities by which the drives' devices are found in ESI files.
 
     Raises:
-        NotAllowed: no file has this drive. BadSet: a file is no ESI file.
+        NotAllowed: identity unknown.
     """
-    vendor, product = axis.identity()
-    missing: NotAllowed | None = None
-    for data, name in esi_files:
-        try:
-            found = controller_of(data, name, vendor, product, axis.revision)
-        except BadSet:
-            raise
-        except NotAllowed as error:
-            missing = error
-            continue
-        return replace(axis, controller=found)
-    if missing is not None:
-        raise missing
-    return axis
+    return tuple((*axis.identity(), axis.revision) for axis in axes)
+
+
+def with_controllers(
+    axes: Sequence[AxisHandover], controllers: Sequence[SlaveController]
+) -> list[AxisHandover]:
+    """Each axis with the controller of its own ESI file."""
+    return [replace(axis, controller=found) for axis, found in zip(axes, controllers, strict=True)]
 
 
 def digest(data: bytes) -> str:

@@ -9,12 +9,12 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
-from backend.handover.esi import SlaveController
 from backend.motion.classes import motion_of
 from backend.parameters.set_file import ParameterSet
 from drivers.codec import encode, size_of
 from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import Text, joined, prose, text
+from profiles.importer.esi_controller import SlaveController
 from profiles.schema import DataType, Parameter, Profile, Raw
 
 Transition = Literal["PS", "SO"]

@@ -58,6 +58,9 @@ _COMMANDS = ".//CoE/InitCmds/InitCmd"
 _DAMAGED = (
     ParseError, ValueError, LookupError, yaml.YAMLError, csv.Error, RecursionError,
 )  # fmt: skip
+#: Parameters of lcec's drivers that choose pins, PDOs and names; the others are values that the
+#: driver writes to the slave at its start, in a way of its own.
+_SETS_PINS = re.compile(r"(?:cia|pdo|enable|fsoe)\w*|\w*(?:channels|name)", re.I)
 #: Entries of the objects that say which PDOs and objects the process data hold (ETG.1000.6
 #: clauses 5.6.7.4 and 5.6.7.5): numbers of PDOs, or objects with their lengths.
 _PDO_LISTS = ((range(0x1600, 0x1C00), 4), (range(0x1C10, 0x1C30), 2))
@@ -120,7 +123,7 @@ def _by_contents(data: bytes, profile: Profile, name: str, slave: int | None) ->
         rows = read_text.codesys if form == "codesys" else read_text.csv_table
         return ControllerList(form, tuple(_first(rows(words, separator))))
     if read_text.is_script(words):
-        return ControllerList("igh", tuple(_of_slave(_first(read_text.igh(words)), slave)))
+        return ControllerList("igh", tuple(_of_slave(_first(read_text.igh(words, profile)), slave)))
     if re.search(r"^[^\S\n]*(sdo|vendor_id|nodes)[^\S\n]*:", words, re.M):
         return ControllerList("ros2", tuple(read_text.ros2(words, profile, slave)))
     raise BadSet("handover.no-start-up-list", name=name)
@@ -133,7 +136,7 @@ def _first(rows: Iterator[_Row]) -> Iterator[_Row]:
 
 def _of_slave(downloads: Iterable[read_text.Download], slave: int | None) -> list[Listed]:
     """A script may write to several slaves: those of one, in the order in which they come."""
-    found: dict[tuple[str, str], list[Listed]] = {}
+    found: dict[tuple[str, str, str], list[Listed]] = {}
     for each in downloads:
         found.setdefault(each.slave, []).append(each.write)
     return chosen(list(found.values()), slave)
@@ -238,13 +241,25 @@ def _lcec(root: Element, profile: Profile, name: str, slave: int | None) -> Iter
         # A comparison that knows a part of the writes would call the rest unchanged.
         file = (elsewhere.get("filename") or "").strip()[:80]
         raise BadSet("handover.list-in-another-file", name=name, file=file)
+    written = [
+        parameter
+        for each in within.findall("modParam")
+        if not _SETS_PINS.fullmatch(parameter := (each.get("name") or "").strip()[:40])
+    ]
+    if written:
+        raise BadSet(
+            "handover.list-in-driver",
+            name=name,
+            driver=(within.get("type") or "").strip()[:40],
+            parameters=", ".join(written[:10]),
+        )
     for position, config in enumerate(within.findall("sdoConfig"), 1):
         place = prose(f"sdoConfig {position}")
         index = number(config.get("idx"), place, base=16)
         data = b"".join(
             row_of_bytes(each.get("data"), place) for each in config.findall("sdoDataRaw")
         )
-        if config.get("subIdx") == "complete":
+        if (config.get("subIdx") or "").lower() == "complete":
             yield from _parts(profile, index, 0, data, "PS", place)
             continue
         subindex = number(config.get("subIdx"), place, base=16)

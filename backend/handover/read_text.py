@@ -7,7 +7,7 @@ import io
 import re
 import shlex
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,14 +26,17 @@ from backend.handover.listed import (
 from drivers.texts.message import Text, joined, prose, text
 from profiles.schema import Profile
 
-_SIZE = {"bool": 1, "int8": 1, "uint8": 1, "sm8": 1, "int16": 2, "uint16": 2, "sm16": 2,
-         "int32": 4, "uint32": 4, "sm32": 4, "float": 4, "int64": 8, "uint64": 8,
-         "sm64": 8, "double": 8}  # fmt: skip
-#: The command of the IgH master, whose name each line of a script has.
-_COMMAND = "ethercat"
-_DOWNLOAD = re.compile(
-    r"^\s*(?:sudo\s+)?(?:\S*/)?ethercat(?P<options>\s.*)?\sdownload\s(?P<rest>.*)$"
-)
+_INTEGERS = {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4, "int64": 8,
+             "uint64": 8}  # fmt: skip
+#: Numbers that `ethercat download` can make; it names sm8 to sm64 as well and refuses them.
+_SIZE = _INTEGERS | {"bool": 1}
+_REAL = {"float": struct.Struct("<f"), "double": struct.Struct("<d")}
+#: The command of the IgH master, by its name, a path, or a variable that holds it.
+_COMMAND = re.compile(r"(?:\S*/)?ethercat|\$\{?\w+\}?", re.I)
+#: Words before a command that change nothing of what it writes.
+_BEFORE = re.compile(r"do|then|else|if|while|until|!|\{|time|exec|sudo|nice|-\w+|\w+=\S*")
+_SHOWS = ("echo", "printf", "logger")
+_REDIRECTED = re.compile(r"\d?[<>]{1,2}\s*(?:&\d|[^\s;&|]+)")
 #: Options of `ethercat` that take a word, by their short and their long name.
 _WITH_WORD = {"t": "type", "p": "position", "a": "alias", "m": "master", "d": "domain"}
 _HEADINGS = {"codesys": "line", "csv": "key"}
@@ -42,12 +45,19 @@ _MOST_YAML_LEVELS = 20
 #: Of a slave file with 20 000 writes, each a map of four fields.
 _MOST_YAML_NODES = 200_000
 #: No line that writes one value is longer; `shlex` takes the square of a word's length.
-_LONGEST_LINE = 10_000
+_LONGEST_LINE = 2_000
+#: Twice the writes that are read; each takes time, and whether it writes is known only then.
+_MOST_CANDIDATES = 40_000
 
 
 def is_script(content: str) -> bool:
     """Whether a line of it writes by ``ethercat download``."""
-    return _COMMAND in content and any(_DOWNLOAD.match(line) for line in _lines(content))
+    if "ethercat" not in content:
+        return False
+    try:
+        return any(_commands(line, place) for place, line in _candidates(content))
+    except BadRow:
+        return True  # it writes in a form that is refused with its place
 
 
 def table_of(content: str) -> tuple[str, str] | None:
@@ -85,28 +95,53 @@ def csv_table(content: str, separator: str) -> Iterator[Listed]:
 
 @dataclass(frozen=True, slots=True)
 class Download:
-    """One line of a script; ``slave`` is how it names the slave, by position or alias."""
+    """One line of a script; ``slave`` is how it names the slave: master, alias and position."""
 
-    slave: tuple[str, str]
+    slave: tuple[str, str, str]
     write: Listed
 
 
-def igh(script: str) -> Iterator[Download]:
-    """Every ``ethercat download`` of a script, in its order."""
-    for line, content in enumerate(_lines(script), 1):
-        match = _DOWNLOAD.match(content)
-        if match is None:
-            continue
-        place = line_of(line)
-        if len(content) > _LONGEST_LINE:
-            raise BadRow(text("handover.row-download-form", place=place))
-        options, plain = _words(f"{match['options'] or ''} {match['rest']}", place)
-        kind = options.get("type", "")
-        if len(plain) != 3 or kind not in _SIZE or kind in ("float", "double"):
-            raise BadRow(text("handover.row-download-form", place=place))
-        index, subindex, value = (_as_in_c(word, place) for word in plain)
-        write = listed(index, subindex, sized(value, _SIZE[kind], place), "PS", place)
-        yield Download((options.get("alias", ""), options.get("position", "")), write)
+def igh(script: str, profile: Profile) -> Iterator[Download]:
+    """Every ``ethercat download`` of a script, in its order.
+
+    Without a type the command asks the slave for it; here the profile has it.
+    """
+    for place, line in _candidates(script):
+        for words in _commands(line, place):
+            options, plain = _options(words)
+            if len(plain) != 3:
+                raise BadRow(text("handover.row-download-form", place=place))
+            index, subindex = (_as_in_c(word, place) for word in plain[:2])
+            kind = options.get("type") or _own_type(profile, index, subindex, place)
+            if kind in _REAL:
+                data = _real(plain[2], kind, place)
+            elif kind in _SIZE:
+                data = sized(_as_in_c(plain[2], place), _SIZE[kind], place)
+            else:
+                raise BadRow(text("handover.row-download-form", place=place))
+            slave = [options.get(name, "") for name in ("master", "alias", "position")]
+            write = listed(index, subindex, data, "PS", place)
+            yield Download((slave[0], slave[1], slave[2]), write)
+
+
+def _own_type(profile: Profile, index: int, subindex: int, place: Text) -> str:
+    parameter = profile.by_key.get(f"{index:04X}:{subindex:02X}")
+    if parameter is None:
+        raise BadRow(
+            text("handover.row-no-type", place=place, key=f"{index:04X}:{subindex:02X}"[:40])
+        )
+    return {"REAL32": "float"}.get(parameter.type, parameter.type.lower())
+
+
+def _real(word: str, kind: str, place: Text) -> bytes:
+    # As a C++ stream reads it: without inf and nan.
+    written = re.fullmatch(r"[+-]?(\d{1,40}\.?\d{0,40}|\.\d{1,40})(e[+-]?\d{1,3})?", word, re.I)
+    try:
+        if written is not None:
+            return _REAL[kind].pack(float(word))
+    except OverflowError:
+        pass
+    raise BadRow(text("handover.row-no-number", place=place, word=word[:40]))
 
 
 def _as_in_c(word: str, place: Text) -> int:
@@ -131,24 +166,87 @@ def _lines(content: str) -> list[str]:
     return lines
 
 
-def _words(line: str, place: Text) -> tuple[dict[str, str], list[str]]:
-    """Options by their long names, and the words that are no option."""
+def _candidates(script: str) -> Iterator[tuple[Text, str]]:
+    """Lines of a shell script that may write, with their places.
+
+    Raises:
+        BadRow: a line is too long, or there are too many.
+    """
+    found = 0
+    for at, line in enumerate(_lines(script), 1):
+        before = line[: max(line.rfind("download"), 0)]
+        if not ("$" in before or "ethercat" in before.lower()) or _in_remark(before):
+            continue
+        found += 1
+        if len(line) > _LONGEST_LINE or found > _MOST_CANDIDATES:
+            raise BadRow(text("handover.row-download-form", place=line_of(at)))
+        yield line_of(at), line
+
+
+def _in_remark(before: str) -> bool:
+    """Whether what follows is behind a # that begins a remark, and not one in quotes."""
+    return any(
+        not (before.count('"', 0, at) % 2 or before.count("'", 0, at) % 2)
+        for at in (m.end() for m in re.finditer(r"(?:^|\s)(?=#)", before[:_LONGEST_LINE]))
+    )
+
+
+def _commands(line: str, place: Text) -> list[list[str]]:
+    """Words behind ``ethercat`` of each download in a line.
+
+    Raises:
+        BadRow: the line writes in a form of which it cannot be told what.
+    """
+    plain = _REDIRECTED.sub(" ", line.replace("`", " ; "))
+    words = shlex.shlex(plain, posix=True, punctuation_chars=";&|()")
+    words.whitespace_split = True
+    found = []
+    command: list[str] = []
     try:
-        words = iter(shlex.split(line, comments=True))
+        for word in [*words, ";"]:
+            if word.strip(";&|()"):
+                command.append(word)
+                continue
+            found.append(_download(command, place))
+            command = []
     except ValueError as error:
         why = text("handover.row-refused", place=place, cause=prose(str(error)))
         raise BadRow(why) from error
+    return [each for each in found if each]
+
+
+def _download(command: list[str], place: Text) -> list[str]:
+    """Words behind ``ethercat`` where the command is a download, else none."""
+    if command and command[0] in _SHOWS:
+        return []
+    for at, word in enumerate(command):
+        if "$(" in word and "ethercat" in word and "download" in word:
+            raise BadRow(text("handover.row-download-form", place=place))
+        if _COMMAND.fullmatch(word) and "download" in command[at + 1 :]:
+            if not all(_BEFORE.fullmatch(before) for before in command[:at]):
+                raise BadRow(text("handover.row-download-form", place=place))
+            behind = command[at + 1 :]
+            behind.remove("download")
+            return behind
+    return []
+
+
+def _options(words: Sequence[str]) -> tuple[dict[str, str], list[str]]:
+    """Options by their long names, and the words that are no option."""
+    given = iter(words)
     options: dict[str, str] = {}
     plain: list[str] = []
-    for word in words:
-        if word.startswith("--") and len(word) > 2:
+    for word in given:
+        if word == "--":
+            plain += given
+        elif word.startswith("--"):
             name, equals, value = word[2:].partition("=")
             if equals or name in _WITH_WORD.values():
-                options[name] = value if equals else next(words, "")
+                options[name] = value if equals else next(given, "")
         elif re.match(r"-[a-z]", word):
             if long := _WITH_WORD.get(word[1]):
-                options[long] = word[2:] or next(words, "")
-        elif word != "--":
+                options[long] = word[2:] or next(given, "")
+        else:
             plain.append(word)
     return options, plain
 
@@ -179,7 +277,8 @@ def ros2(written: str, profile: Profile, slave: int | None) -> Iterator[Listed]:
             raise BadRow(text("handover.row-sdo-form", place=place))
         index, subindex, value = (_whole(row, f, place) for f in ("index", "sub_index", "value"))
         kind = str(row.get("type") or _profile_type(profile, index, subindex))
-        if kind not in _SIZE:
+        if kind not in _SIZE or (row.get("type") and kind not in _INTEGERS):
+            # ethercat_driver_ros2 writes what is no integer from memory that it has not set.
             raise BadRow(text("handover.row-unknown-type", place=place, type=kind[:40]))
         data = sized(value, _SIZE[kind], place)
         yield listed(index, subindex, data, "PS", place)

@@ -8,7 +8,7 @@ import json
 import pickle
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
 from drivers.dictionary import Described, ObjectInfo
 from drivers.errors import NotAllowed, Rejected
@@ -22,11 +22,13 @@ from profiles.importer import (
     import_file,
 )
 from profiles.importer.dictionary import DictionaryEntry
-from profiles.importer.process import DescriptionTask, FileTask, Task
+from profiles.importer.process import DescriptionTask, FileTask
 from profiles.loader import user_folder
 
 #: An import that takes longer is ended: a file of the greatest size takes a few seconds.
 IMPORT_LIMIT_S = 120.0
+#: Address space of an import: a description of 4 MiB takes 90 MiB, and 32 MiB is the largest one.
+IMPORT_LIMIT_MIB = 768
 #: Object 1021h "Store EDS" and 1022h, its format; 0 is plain text (CiA 301 clause 7.5.2.19).
 _STORED_EDS = Address(0x1021, 0, "OCTETS")
 _STORED_FORMAT = Address(0x1022, 0, "UINT16")
@@ -38,16 +40,28 @@ class BadDescription(NotAllowed):
     kind = "bad-description"
 
 
-async def import_in_process(task: Task, limit_s: float = IMPORT_LIMIT_S) -> dict[str, Any]:
+class Work(Protocol):
+    """What is done in the process of an import, and pickled on its way there."""
+
+    def run(self) -> dict[str, object]:
+        """The answer, as JSON carries it."""
+        ...
+
+
+async def import_in_process(
+    task: Work, limit_s: float = IMPORT_LIMIT_S, limit_mib: int = IMPORT_LIMIT_MIB
+) -> dict[str, Any]:
     """Carry out an import in a process of its own, which ends with the caller's task.
 
     Raises:
-        BadDescription: nothing usable in it, the name is in use, or it takes too long.
+        BadDescription: nothing usable in it, the name is in use, or it takes too long or more
+            memory than an import may use.
     """
     process = await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",
-        "profiles.importer.process",
+        "backend.station.import_process",
+        str(limit_mib),
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,

@@ -127,10 +127,13 @@ def build_profile(
 
 
 def _note_further_axes(description: Description, report: ImportReport) -> None:
-    """Axes behind the first, whose objects lie 800h behind each other (CiA 402-1)."""
+    """Axes behind the first, whose objects lie 800h behind each other (CiA 402-1).
+
+    Without a control word they are process data of the modules of an I/O device (ETG.5001).
+    """
     indexes = {entry.index for entry in description.entries}
     further = [n for n in range(1, 8) if 0x6040 + _AXIS_STEP * n in indexes]
-    if further:
+    if further and 0x6040 in indexes:
         report.noted(description.place, "description.further-axes", axes=len(further) + 1)
 
 

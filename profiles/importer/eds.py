@@ -24,6 +24,7 @@ from profiles.importer.values import (
     named_type,
     parse_access,
     parse_number,
+    real_of_bits,
     tidy,
     unit_of_name,
 )
@@ -249,6 +250,8 @@ class _Entries:
         if re.search(r"node[-_ ]?id", text, re.I):
             return None
         number = parse_number(text, f"{place} {key}", self._report)
+        if data_type == "REAL32" and number is not None and text.strip()[:2].lower() == "0x":
+            number = real_of_bits(int(number))
         return fit(number, data_type, key, place, self._report)
 
     def _type(self, section: Section, parent: Section, place: str) -> DataType | None:

@@ -13,6 +13,7 @@ from profiles.importer.values import (
     fit,
     parse_access,
     parse_number,
+    real_of_bits,
     tidy,
     unit_of_code,
     unit_of_name,
@@ -162,6 +163,9 @@ class DictionaryReader:
                 number = _hex_data(text, f"{place} {tag}", self._report)
             else:
                 number = parse_number(text, f"{place} {tag}", self._report)
+            in_bits = tag.endswith("Data") or text[:2].lower() in ("#x", "0x")
+            if data_type == "REAL32" and in_bits and number is not None:
+                number = real_of_bits(int(number))
             return fit(number, data_type, tag, place, self._report)
         return None
 

@@ -13,6 +13,8 @@ from profiles.schema import DataType
 
 _DEEPEST = 8
 _LONGEST_ARRAY = 255
+#: Arrays of base types (ETG.1020 clause 5): `ARRAY [0..27] OF BYTE` is an octet string of 28 bytes.
+_INLINE = re.compile(r"ARRAY\s*\[\s*(\d{1,3})\s*\.\.\s*(-?\d{1,3})\s*\]\s*OF\s+(\w+)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +64,11 @@ class EsiTypes:
         place = f"{self._file}: {name[:30]}"
         type_name = text_of(child(item, "Type"))
         flags = child(item, "Flags")
-        array = self._array(type_name)
+        given = parse_number(text_of(child(item, "SubIdx")), place, self._report)
+        # An array type without a name and with a subindex of its own is one value of many bytes.
+        array = (
+            None if given is not None and _INLINE.fullmatch(type_name) else self._array(type_name)
+        )
         if array is not None:
             first, count, base = array
             if first + count - 1 > _LONGEST_ARRAY:
@@ -77,7 +83,6 @@ class EsiTypes:
                 Member(first + n, f"{first + n}", base, None, flags)
                 for n in range(min(count, _LONGEST_ARRAY - first + 1))
             ]
-        given = parse_number(text_of(child(item, "SubIdx")), place, self._report)
         bits = parse_number(text_of(child(item, "BitSize")), place, self._report)
         return [
             Member(
@@ -101,7 +106,7 @@ class EsiTypes:
             if count is None or count < 1 or self._resolves_to_text(base, name):
                 return None
             return max(int(first or 1), 1), int(count), base
-        match = re.fullmatch(r"ARRAY\s*\[\s*(\d{1,3})\s*\.\.\s*(\d{1,3})\s*\]\s*OF\s+(\w+)", name)
+        match = _INLINE.fullmatch(name)
         if match is None or element is not None:
             return None
         return max(int(match[1]), 1), int(match[2]) - int(match[1]) + 1, match[3]
@@ -112,6 +117,8 @@ class EsiTypes:
 
     def base(self, name: str, bits: int | None) -> DataType | None:
         """The plain type behind ``name``."""
+        if _INLINE.fullmatch(name):
+            return "OCTETS"  # although some files describe it once more with a base type BYTE
         seen: set[str] = set()
         for _ in range(_DEEPEST):
             element = self._types.get(name)

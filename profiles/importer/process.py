@@ -1,4 +1,4 @@
-"""Imports in a process of their own: ``python -m profiles.importer.process``.
+"""Imports in a process of their own, which the server starts with bounded memory.
 
 A maker's file may take seconds, and it is not known what is in it. Here it holds up no motion, and
 whoever started it can end it. One task comes pickled on the standard input, from our own parent
@@ -81,6 +81,8 @@ class DevicesTask:
 
 
 Task = FileTask | DescriptionTask | DevicesTask
+#: Bytes that are kept for the answer of a process which has used up its memory.
+_RESERVE = 16 << 20
 
 
 def _written(imported: ImportedProfile, folder: Path) -> dict[str, object]:
@@ -111,18 +113,20 @@ def _written(imported: ImportedProfile, folder: Path) -> dict[str, object]:
     }
 
 
-def main() -> None:
-    """Carry out the one task of this process."""
-    task: Task = pickle.load(sys.stdin.buffer)  # noqa: S301 - from our own parent
+def main(most_mib: int = 0) -> None:
+    """Carry out the one task of this process, whose memory has been bounded to ``most_mib``."""
     answer: dict[str, object]
+    reserve = [bytearray(_RESERVE)]
     try:
+        task: Task = pickle.load(sys.stdin.buffer)  # noqa: S301 - from our own parent
         answer = {"ok": task.run()}
+    except MemoryError:
+        reserve.clear()
+        answer = {
+            "refused": {"code": "description.too-much-memory", "params": {"limit_mib": most_mib}}
+        }
     except ImportFailed as error:
         answer = {"refused": {"code": error.code, "params": dict(error.params)}}
     except OSError as error:
         answer = {"error": str(error)}
     json.dump(answer, sys.stdout)
-
-
-if __name__ == "__main__":
-    main()

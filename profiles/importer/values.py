@@ -223,9 +223,17 @@ def default_value(
     bits = _REAL_BITS.fullmatch(text.strip())
     if data_type == "REAL32" and bits is not None:
         # Nobody writes a real number in hexadecimal: these are its bits.
-        return struct.unpack(">f", bytes.fromhex(bits.group(1).rjust(8, "0")))[0], ""
+        return real_of_bits(int(bits.group(1), 16)), ""
     number = parse_number(text, f"{place} {name}", report)
     return fit(number, data_type, name, place, report), ""
+
+
+def real_of_bits(bits: int) -> float | None:
+    """A REAL32 by the number that its four bytes make (IEEE 754); None where they make none."""
+    if not 0 <= bits <= 0xFFFFFFFF:
+        return None
+    value: float = struct.unpack(">f", bits.to_bytes(4, "big"))[0]
+    return value if math.isfinite(value) else None
 
 
 def named_type(name: str, bits: int | None) -> DataType | None:

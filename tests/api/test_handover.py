@@ -8,15 +8,18 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
+from backend.api.handover import routes
 from backend.cli import app
 from backend.handover.read import MAX_BYTES
 from backend.station.demo import DemoBench
+from backend.station.description import import_in_process
 from tests.support.station import Station
 
 runner = CliRunner()
@@ -268,6 +271,20 @@ def test_bad_exports_are_explained(
     assert answer.status_code == status, answer.text
     assert words in answer.json()["detail"]
     assert len(station.ok(station.http.get(f"/drives/{x}/handovers"))) == before
+
+
+def test_an_uploaded_esi_file_is_read_in_a_process_with_bounded_memory(
+    station: Station, x: str, held: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Read in the server it would be answered that the file has no such drive."""
+    monkeypatch.setattr(routes, "import_in_process", partial(import_in_process, limit_mib=128))
+    device = b'<Device><Type ProductCode="#x1">A</Type>' + b'<a b=""/>' * 400_000 + b"</Device>"
+    devices = b"<Descriptions><Devices>" + device + b"</Devices></Descriptions>"
+    esi = base64.b64encode(b"<EtherCATInfo>" + devices + b"</EtherCATInfo>").decode()
+    asked = {"set_file": held, "format": "eni", "file": "start.xml", "esi": [esi]}
+    answer = station.http.post(f"/drives/{x}/handover", json=asked)
+    assert answer.status_code == 409, answer.text
+    assert "128 MiB of memory" in answer.json()["detail"]
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,15 @@ from backend.api.handover.models import (
 )
 from backend.drive.drive import Drive
 from backend.handover.conflicts import Conflict, changed_since, compare
-from backend.handover.files import digest, files_of, fitting, remarks, with_controller
+from backend.handover.esi import reported_controllers
+from backend.handover.files import (
+    digest,
+    files_of,
+    fitting,
+    remarks,
+    wanted_of,
+    with_controllers,
+)
 from backend.handover.model import AxisHandover, hand_over
 from backend.handover.read import MAX_BYTES, read_list
 from backend.handover.record import HandedOver, HandoverLog
@@ -37,8 +45,10 @@ from backend.parameters import set_file as parameter_set
 from backend.parameters.set_file import BadSet, ParameterSet
 from backend.people.identity import acting_person
 from backend.station.bench import Bench
+from backend.station.description import import_in_process
 from drivers.errors import NotAllowed
 from drivers.texts.message import language, text
+from profiles.importer.esi_controller import ControllersTask
 from profiles.schema import Profile, Raw
 
 router = APIRouter()
@@ -102,7 +112,12 @@ async def _export(
         await _set(bench, drive, each.set_file, each.version)
         for drive, each in zip(drives, given, strict=True)
     ]
-    axes, files = await asyncio.to_thread(_made, contents, drives, request)
+    axes = await asyncio.to_thread(_axes, contents, drives, request)
+    if request.esi:
+        task = ControllersTask(await asyncio.to_thread(_sources, request), wanted_of(axes))
+        axes = with_controllers(axes, reported_controllers(await import_in_process(task)))
+    saved = contents[0].saved
+    files = await asyncio.to_thread(files_of, axes, request.format, request.file, saved)
     name = next(iter(files))
     for drive, each, axis in zip(drives, given, axes, strict=True):
         made = HandedOver(
@@ -145,10 +160,10 @@ async def _export(
     )
 
 
-def _made(
+def _axes(
     contents: Sequence[ParameterSet], drives: Sequence[Drive], request: HandoverChoice
-) -> tuple[list[AxisHandover], dict[str, bytes]]:
-    axes = [
+) -> list[AxisHandover]:
+    return [
         fitting(
             hand_over(
                 content, drive.profile, choice=request.choice, only=request.only,
@@ -158,16 +173,16 @@ def _made(
         )
         for content, drive in zip(contents, drives, strict=True)
     ]  # fmt: skip
+
+
+def _sources(request: HandoverChoice) -> tuple[tuple[bytes, str], ...]:
     try:
-        sources = [
+        return tuple(
             (base64.b64decode(each, validate=True), f"ESI file {number}")
             for number, each in enumerate(request.esi, 1)
-        ]
+        )
     except binascii.Error as error:
         raise BadSet("api-handover.esi-file-not-base64") from error
-    if sources:
-        axes = [with_controller(axis, sources) for axis in axes]
-    return axes, files_of(axes, request.format, request.file, contents[0].saved)
 
 
 @router.post(

@@ -103,11 +103,85 @@ def test_a_list_that_lies_in_another_file_is_not_compared_in_part() -> None:
         "sudo ethercat -m 0 download --position=0 --type uint16 0x6072 0 0x3e8 # limit",
         "/usr/local/bin/ethercat download -p $AXIS -t uint16 -- 0x6072 0 01750\r",
         "ethercat download -p 0 -t uint16 \\\n  0x6072 0 1000",
+        "ethercat download -p0 0x6072 0 1000",
+        "if ! sudo -n ethercat download -p0 0x6072 0 1000 >/dev/null 2>&1; then exit 1; fi",
+        "for i in 0; do ethercat download -p $i -t uint16 0x6072 0 1000; done",
+        "sleep 1 && E=1 ethercat download -p0 -tuint16 0x6072 0 1000 || exit 1",
+        "OUT=$(ethercat -p0 download -t uint16 0x6072 0 1000)",
+        "TOOL=/opt/etherlab/bin/ethercat\n$TOOL download -p0 -t uint16 0x6072 0 1000",
+        'echo "step #1"; ethercat download -p0 -t uint16 0x6072 0 1000 # torque',
+        "# the drive's own: ethercat download -p0 0x1 0 1\nethercat download -p0 0x6072 0 1000",
+        "echo ethercat download 1\nethercat download -p0 -t uint16 0x6072 0 1000",
     ],
 )
 def test_scripts_by_hand(line: str) -> None:
     """`ethercat` reads a number that begins with 0 as octal: 01750 is 1000."""
     assert writes(f"#!/bin/sh\nset -e\n{line}\n") == TAKEN
+
+
+def test_a_script_writes_real_numbers_as_their_bits() -> None:
+    """IEEE 754: 0.5 is 3F000000h as float and 3FE0000000000000h as double."""
+    line = "ethercat download -p0 -t %s 0x2001 1 %s\n"
+    assert writes(line % ("float", "0.5")) == [("2001:01", "0000003f")]
+    assert writes(line % ("double", "5e-1")) == [("2001:01", "000000000000e03f")]
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("ethercat download -p0 0x5FFF 0 1", "5FFF:00 has no type"),
+        ("ethercat download -p0 -t sm16 0x6072 0 1", "download of index"),
+        ("ethercat download -p0 -t float 0x6072 0 nan", "not a number"),
+        ("ethercat download -p0 -t string 0x6072 0 abc", "download of index"),
+        ("find . | xargs ethercat download -p0 -t uint16 0x6072 0", "download of index"),
+        ('X="$(ethercat download -p0 -t uint16 0x6072 0 5)"', "download of index"),
+    ],
+)
+def test_no_download_of_a_script_is_passed_over(line: str, words: str) -> None:
+    with pytest.raises(BadSet, match=f"line 2: .*{words}"):
+        writes(f"ethercat download -p0 -t uint16 0x6072 0 1000\n{line}\n")
+
+
+def test_a_remark_about_the_command_makes_no_script() -> None:
+    row = (
+        "  - {index: 0x6072, sub_index: 0, type: uint16, value: 1000} # drive's: ethercat download"
+    )
+    assert writes(f"vendor_id: 1\nsdo:\n{row}\n") == TAKEN
+
+
+def test_slaves_of_two_masters_are_two() -> None:
+    line = "ethercat download -m{} -p0 -t uint16 0x6072 0 1000\n"
+    with pytest.raises(BadSet, match="2 slaves"):
+        writes(line.format(0) + line.format(1))
+
+
+@pytest.mark.parametrize("kind", ["float", "bool", "sm8", "string"])
+def test_types_that_the_driver_of_ros_2_does_not_write_are_refused(kind: str) -> None:
+    row = f"vendor_id: 1\nsdo:\n  - {{index: 0x6072, sub_index: 0, type: {kind}, value: 1}}\n"
+    with pytest.raises(BadSet, match="is not known"):
+        writes(row)
+
+
+MOTOR = '<sdoConfig idx="6072" subIdx="0"><sdoDataRaw data="E8 03"/></sdoConfig>'
+
+
+def lcec_slave(kind: str, content: str) -> str:
+    return f'<masters><master><slave type="{kind}">{content}</slave></master></masters>'
+
+
+def test_what_the_driver_of_an_lcec_slave_writes_is_not_called_unchanged() -> None:
+    """lcec_class_cia402.c writes 6091h of `gearRatio`; what sets its pins alone writes nothing."""
+    pins = '<modParam name="ciaChannels" value="1"/><modParam name="enableTorque" value="1"/>'
+    assert writes(lcec_slave("basic_cia402", pins + MOTOR)) == TAKEN
+    gear = '<modParam name="gearRatio" value="3:1"/>'
+    for content in (gear + MOTOR, gear):
+        with pytest.raises(BadSet, match=r"the driver basic_cia402 writes .* gearRatio"):
+            writes(lcec_slave("basic_cia402", pins + content))
+
+
+def test_complete_access_of_lcec_in_any_letters() -> None:
+    config = '<sdoConfig idx="1C12" subIdx="Complete"><sdoDataRaw data="01 00 00 16"/></sdoConfig>'
+    assert writes(lcec_slave("generic", config)) == [("1C12:01", "0016")]
 
 
 def test_a_script_for_two_slaves_is_read_for_one() -> None:

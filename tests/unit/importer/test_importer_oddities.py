@@ -278,6 +278,29 @@ def test_negative_values_of_the_file_keep_its_sign() -> None:
     assert (found.type, found.default_raw) == ("INT16", -1000)
 
 
+def test_real_numbers_in_hexadecimal_are_their_bits() -> None:
+    """DefaultData holds the bytes as they travel: 0000003F is 0.5 (IEEE 754), not 1056964608."""
+    data = "<MinData>000020C1</MinData><MaxData>0000C842</MaxData>"
+    for default in (
+        "<DefaultData>0000003F</DefaultData>",
+        "<DefaultValue>#x3F000000</DefaultValue>",
+    ):
+        gain = scalar(0x2510, "Gain", "REAL", 32, info=default + data)
+        result = import_file(esi(device(CONTROL + STATUS + gain)), "real.xml")
+        found = result.profile.by_key["2510:00"]
+        assert (found.type, found.default_raw) == ("REAL32", 0.5)
+        assert (found.min_raw, found.max_raw) == (-10.0, 100.0)
+        assert not any(f.code == "description.limits-swapped" for f in result.report.findings)
+    nan = scalar(0x2510, "Gain", "REAL", 32, info="<DefaultData>0000C07F</DefaultData>")
+    assert imported(CONTROL + STATUS + nan).by_key["2510:00"].default_raw is None
+
+
+def test_an_io_device_with_modules_has_no_further_axes() -> None:
+    module = scalar(0x7040, "Output of module 3", "UINT", 16, mapping="R")
+    result = import_file(esi(device(module + STATUS)), "io.xml")
+    assert not any(f.code == "description.further-axes" for f in result.report.findings)
+
+
 # 8: names of array members ----------------------------------------------------------------------
 
 ARRAY = (
@@ -317,6 +340,34 @@ def test_an_array_beyond_the_subindices_is_said() -> None:
     result = import_file(esi(device(CONTROL + STATUS + gains, types=types)), "long.xml")
     assert any("array-too-long (elements=512" in str(f) for f in result.report.findings)
     assert sum(k.startswith("2010") for k in result.profile.by_key) == 255
+
+
+def test_an_inline_array_with_a_subindex_is_one_octet_string() -> None:
+    """ETG.1020: messages of the diagnosis history (10F3h) lie at subindices 6 and following."""
+    message = "<Type>ARRAY [0..27] OF BYTE</Type><BitSize>224</BitSize>"
+    described = (
+        "<DataType><Name>ARRAY [0..27] OF BYTE</Name><BaseType>BYTE</BaseType>"
+        "<BitSize>224</BitSize>"
+        "<ArrayInfo><LBound>0</LBound><Elements>28</Elements></ArrayInfo></DataType>"
+    )
+    history = (
+        "<DataType><Name>DT10F3</Name><BitSize>512</BitSize>"
+        "<SubItem><SubIdx>0</SubIdx><Name>SubIndex 000</Name><Type>USINT</Type></SubItem>"
+        "<SubItem><SubIdx>1</SubIdx><Name>Maximum Messages</Name><Type>USINT</Type></SubItem>"
+        f"<SubItem><SubIdx>6</SubIdx><Name>Message 001</Name>{message}</SubItem>"
+        f"<SubItem><SubIdx>7</SubIdx><Name>Message 002</Name>{message}</SubItem></DataType>"
+    )
+    diagnosis = (
+        "<Object><Index>#x10F3</Index><Name>Diagnosis History</Name><Type>DT10F3</Type>"
+        "<BitSize>512</BitSize><Flags><Access>ro</Access></Flags></Object>"
+    )
+    for types in (history, described + history):
+        found = import_file(esi(device(CONTROL + STATUS + diagnosis, types=types)), "d.xml")
+        entries = [(k, p.type) for k, p in found.profile.by_key.items() if k[:4] == "10F3"]
+        assert entries == [("10F3:01", "UINT8"), ("10F3:06", "OCTETS"), ("10F3:07", "OCTETS")]
+        assert not any(
+            finding.code == "description.subindex-twice" for finding in found.report.findings
+        )
 
 
 # 9, 10, 12: enumerations, access, remarks -------------------------------------------------------

@@ -85,6 +85,7 @@ description_too-large = { $file } has { $size_bytes } bytes, more than the { $li
 description_too-many-commands = init commands behind the first { $commands }
 description_too-many-entries = the drive lists more than { $entries } entries, more than any drive has
 description_too-many-objects = objects from { NUM($index, format: "04X") }h on: too many
+description_too-much-memory = reading it takes more than the { $limit_mib } MiB of memory that an import may use
 description_transition-unknown = the init command to { NUM($index, format: "04X") }h:{ $subindex } on transition { QUOTED($transition) } has no valid transition or subindex
 description_type-as-bytes = data type { NUM($type, format: "#04x") } is shown as bytes
 description_type-by-length = data type { NUM($type, format: "#06x") } is unknown, taken by its length
