@@ -183,7 +183,7 @@ class Axis(ScaledAxis):
         drive = self.drive
         if self.cyclic_power() is not None:
             raise NotAllowed("axis.profile-homing-modes-not", drive=drive.name)
-        await self.require_certain_scales()
+        await self.require_planned_scales()
         with self.granted(cia402.MODE_NAMES[mode], envelope):
             async with self._enabled(mode, envelope):
                 yield
@@ -238,7 +238,7 @@ class Axis(ScaledAxis):
                 at its end. Where the drive has a fault, the message names it.
         """
         if not by_increments:
-            await self.require_certain_scales()
+            await self.require_planned_scales()
         with self.granted(cia402.MODE_NAMES[mode]):
             try:
                 await self.go_to_cyclic(session, State.OPERATION_ENABLED, mode, timeout_s)
