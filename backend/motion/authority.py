@@ -108,6 +108,11 @@ class MotionAuthority:
             raise NotGranted("motion.nobody-asked-motion-not", drive=name, parameter=key)
         return grant
 
+    def may_move(self, drive: str) -> bool:
+        """Whether the calling work holds a grant of this axis that is live."""
+        grant = self.held(drive)
+        return grant is not None and self._ended(grant) is None
+
     def require(
         self, grant: Grant, drive: str, name: str, key: str, *, restores: bool = False
     ) -> None:
@@ -211,7 +216,9 @@ class MotionAuthority:
 
         An axis that is only left enabled keeps its grant.
         """
-        moving = [r for r in list(self._records.get(drive, ())) if not r.grant.standing and not r.why]
+        moving = [
+            r for r in list(self._records.get(drive, ())) if not r.grant.standing and not r.why
+        ]
         for record in moving:
             self._expire(record, why)
         return bool(moving)

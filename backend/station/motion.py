@@ -131,11 +131,12 @@ class Motion:
         authority = self._bench.authority
         if connected is None or authority.mover_of(drive_id) is None:
             return
-        if connected.monitor.snapshot.state is not State.OPERATION_ENABLED:
-            return  # nothing has power yet: enabling compares the scales itself
-        line = text(
-            "scales.changed-in-motion", drive=connected.drive.name, parameter=", ".join(keys)
-        )
+        drive = connected.drive
+        word = drive.readings.get(drive.require("status_word"))
+        raw = None if word is None else word.integer
+        if raw is None or drive.decode_state(raw) is not State.OPERATION_ENABLED:
+            return  # it has no power yet: enabling compares the scales itself
+        line = text("scales.changed-in-motion", drive=drive.name, parameter=", ".join(keys))
         self._bench.journal.add(line, level="error", drive=drive_id)
         authority.end_motion(drive_id, line)
 
