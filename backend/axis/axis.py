@@ -183,7 +183,7 @@ class Axis(ScaledAxis):
         drive = self.drive
         if self.cyclic_power() is not None:
             raise NotAllowed("axis.profile-homing-modes-not", drive=drive.name)
-        await self.require_certain_scales()
+        await self.require_planned_scales()
         with self.granted(cia402.MODE_NAMES[mode], envelope):
             async with self._enabled(mode, envelope):
                 yield
@@ -238,7 +238,7 @@ class Axis(ScaledAxis):
                 at its end. Where the drive has a fault, the message names it.
         """
         if not by_increments:
-            await self.require_certain_scales()
+            await self.require_planned_scales()
         with self.granted(cia402.MODE_NAMES[mode]):
             try:
                 await self.go_to_cyclic(session, State.OPERATION_ENABLED, mode, timeout_s)
@@ -340,17 +340,22 @@ class Axis(ScaledAxis):
         if role and (key := drive.key(role)) is not None:
             await drive.command(key, value, self.grant(key))
 
+    def _may_move(self) -> bool:
+        """Neither STOP was pressed nor the permission of this work has ended."""
+        return not self.stopped and self.drive.authority.may_move(self.drive.id)
+
     async def _leave(self, before: State, mode: Mode, previous: Mode) -> None:
-        """To rest, and to the power state of before; after STOP, to Switch on disabled."""
-        if not self.stopped:
+        """To rest, and to the power state of before; without permission, to Switch on disabled."""
+        if self._may_move():
             try:
                 await self._leave_as_before(before, mode, previous)
             except NotAllowed:
-                # STOP in the middle of it refuses the words that are still to come.
-                if not self.stopped:
+                # STOP or the end of the permission refuses the words that are still to come.
+                if self._may_move():
                     raise
-            if not self.stopped:
-                return
+            else:
+                if self._may_move():
+                    return
         state = await self.state()
         if state is State.OPERATION_ENABLED:
             # The write of STOP itself is still under way, or was lost.

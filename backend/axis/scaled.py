@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from backend.axis.power import PowerState
 from backend.drive.drive import Drive
 from backend.drive.readings import Reading
+from backend.motion.grant import Grant
+from backend.scales.scale import ScaleChanged
 from backend.scales.taught import Taught
 from backend.scales.units import AxisUnits, read_units
+from drivers.errors import DriveError
 from profiles.schema import Raw
 
 
@@ -24,6 +29,14 @@ class SmallMoves:
     raw_per_inc_s: float | None
 
 
+@dataclass(frozen=True, slots=True)
+class _Planned:
+    """The units by which a motion was planned; ``grant`` is that of the whole motion."""
+
+    grant: Grant | None
+    units: AxisUnits
+
+
 class ScaledAxis(PowerState):
     """A power state whose positions and speeds have units."""
 
@@ -32,8 +45,11 @@ class ScaledAxis(PowerState):
         self._units: AxisUnits | None = None
         self._taught: Taught | None = None
         self._unit_raws: dict[str, Raw | None] = {}
-        #: None until one was made since this axis is connected.
+        self._planned: _Planned | None = None
+        #: None until one was made since this axis is connected, or since its scales changed.
         self.small_moves: SmallMoves | None = None
+        #: Called with the keys of objects of the scales that have other values than they had.
+        self.scales_changed: Callable[[list[str]], None] = lambda _keys: None
         drive.listeners.add(self._units_may_have_changed)
 
     async def units(self) -> AxisUnits:
@@ -41,22 +57,72 @@ class ScaledAxis(PowerState):
         if self._units is None:
             units = await read_units(self.drive, self._taught)
             known = self.drive.readings
-            self._unit_raws = {
-                key: known[key].raw for key in self.drive.profile.unit_keys if key in known
-            }
-            self._units = units
+            raws = {key: known[key].raw for key in self.drive.profile.unit_keys if key in known}
+            before, self._unit_raws, self._units = self._unit_raws, raws, units
+            if before and raws != before:
+                # An increment is another one now: how far the last moves went says nothing.
+                self.small_moves = None
+                self.scales_changed(
+                    sorted(key for key in raws | before if raws.get(key) != before.get(key))
+                )
+            return units
         return self._units
 
+    async def read_scales(self) -> AxisUnits:
+        """Units with the gearing that the drive has now, read from it: others may change it.
+
+        Raises:
+            DriveError: the objects that state them cannot be read.
+        """
+        self._units = None
+        return await self.units()
+
     async def require_certain_scales(self) -> AxisUnits:
-        """The units, where an envelope in them means what it says.
+        """The units, read now, where an envelope in them means what it says.
+
+        Within one motion (a grant of the calling work) they must be those that it began with:
+        places and setpoints were computed by them.
 
         Raises:
             ScaleUnknown: a scale is not certain: nothing may be moved by unit.
+            ScaleChanged: the drive has other scales than at the begin of this motion.
             DriveError: the objects that state them cannot be read.
         """
-        units = await self.units()
+        units = await self.read_scales()
         units.require_certain()
+        whole = self.drive.authority.outermost(self.drive.id)
+        planned = self._planned
+        if whole is not None and planned is not None and planned.grant is whole:
+            self._require_same(planned.units, units)
+        self._planned = _Planned(whole, units)
         return units
+
+    async def require_planned_scales(self) -> None:
+        """The last look before the axis gets power: the scales are those of the plan.
+
+        Raises:
+            ScaleUnknown, ScaleChanged, DriveError: as `require_certain_scales`.
+        """
+        whole, planned = self.drive.authority.outermost(self.drive.id), self._planned
+        before = self._units
+        if planned is not None and planned.grant is whole:
+            before = planned.units
+        units = await self.read_scales()
+        units.require_certain()
+        if before is not None:
+            self._require_same(before, units)
+
+    def _require_same(self, before: AxisUnits, now: AxisUnits) -> None:
+        if now.scales != before.scales:
+            raise ScaleChanged("scales.changed", drive=self.drive.name)
+
+    async def look_at_scales(self) -> None:
+        """Ask again for what the scales rest on; never raises. `scales_changed` reports changes."""
+        known = list(self._unit_raws)
+        with contextlib.suppress(DriveError):
+            if known:
+                await self.drive.read_many(known)
+            await self.units()
 
     @property
     def known_units(self) -> AxisUnits | None:

@@ -21,9 +21,12 @@ async def confirmed(axis: Axis, turned_rev: float) -> Taught:
     factor that is no usual unit, it stays as it was.
 
     Raises:
-        NotAllowed: no small move was made, or 606Ch has the other sign.
+        NotAllowed: no small move was made with the scales that the drive has now, or 606Ch has
+            the other sign.
         OutOfRange: too little for an eye, or too much.
     """
+    # A small move by other increments than those of now teaches nothing.
+    await axis.read_scales()
     drive, last = axis.drive, axis.small_moves
     if last is None:
         raise NotAllowed("axis.no-small-move-made", drive=drive.name)

@@ -35,6 +35,8 @@ def recall(drive: Drive, url: str, station: int) -> Pending:
             drive=drive.name, by=pending.by, since=f"{since:%Y-%m-%d %H:%M:%S}",
             values=_values(drive), url=url, station=station,
         )  # fmt: skip
+    for file in known.pending.unreadable:
+        note("restore.list-damaged", drive=drive.name, file=str(file))
     if known.pending.held_by:
         note("printed.moves-it-now", drive=drive.name, held_by=known.pending.held_by)
     return known.pending

@@ -29,7 +29,11 @@ class Note(Protocol):
     """What writes the list down; ``durable`` waits for the disk, within bounds."""
 
     def __call__(self, *, durable: bool = False) -> None:
-        """Write down what is outstanding now."""
+        """Write down what is outstanding now.
+
+        Raises:
+            NotAllowed: it cannot be written, and ``durable``: a value is about to change.
+        """
 
 
 def _no_note(*, durable: bool = False) -> None:
@@ -65,13 +69,19 @@ class PendingRestores:
 
     @contextmanager
     def temporary(self, values: Mapping[str, Raw]) -> Iterator[None]:
-        """Around a motion that changes these raw values and restores them when it ends."""
+        """Around a motion that changes these raw values and restores them when it ends.
+
+        Raises:
+            NotAllowed: the list cannot be kept on the disk. Nothing may be changed then: after a
+                kill nobody would know what to restore.
+        """
         temporary = dict(values)
+        known = all(key in self._temporary for key in temporary)
         for key, raw in temporary.items():
             self._temporary.setdefault(key, []).append(raw)
-        if temporary:
-            self._note(durable=True)
         try:
+            if temporary:
+                self._note(durable=not known)
             yield
         finally:
             for key in temporary:

@@ -92,6 +92,11 @@ class MotionAuthority:
                 return grant
         return None
 
+    def outermost(self, drive: str) -> Grant | None:
+        """The first grant of this axis that the calling work holds: that of the whole motion."""
+        known = {record.grant for record in self._records.get(drive, ())}
+        return next((grant for grant in _held.get() if grant in known), None)
+
     def require_held(self, drive: str, name: str, key: str | None = None) -> Grant:
         """Like `held`.
 
@@ -102,6 +107,11 @@ class MotionAuthority:
         if grant is None:
             raise NotGranted("motion.nobody-asked-motion-not", drive=name, parameter=key)
         return grant
+
+    def may_move(self, drive: str) -> bool:
+        """Whether the calling work holds a grant of this axis that is live."""
+        grant = self.held(drive)
+        return grant is not None and self._ended(grant) is None
 
     def require(
         self, grant: Grant, drive: str, name: str, key: str, *, restores: bool = False
@@ -200,6 +210,18 @@ class MotionAuthority:
         for record in [each for kept in self._records.values() for each in kept]:
             if record.grant.session == session:
                 self._expire(record, why)
+
+    def end_motion(self, drive: str, why: Text) -> bool:
+        """Whoever moves this axis may move it no longer, and is informed; False: nobody does.
+
+        An axis that is only left enabled keeps its grant.
+        """
+        moving = [
+            r for r in list(self._records.get(drive, ())) if not r.grant.standing and not r.why
+        ]
+        for record in moving:
+            self._expire(record, why)
+        return bool(moving)
 
     def _expire(self, record: _Record, why: Text = _TIME_OVER) -> None:
         if record.why:

@@ -8,6 +8,7 @@ from backend.drive.drive import Drive
 from backend.restore.identity import identity_of
 from backend.restore.store import RestoreList
 from backend.store.files import StorageFailed
+from drivers.texts.message import text
 
 
 def keep_list(
@@ -20,8 +21,10 @@ def keep_list(
     """Recall what is pending in a drive; write its list whenever something is changed temporarily
     or back.
 
-    ``in_motion`` says whether the next process has to stop the axis, ``failed`` is called once per
-    failure of the disk: a motion goes on without a list, as people are informed then.
+    ``in_motion`` says whether the next process has to stop the axis. Where the list cannot be
+    written before a value changes, `PendingRestores.temporary` raises, and nothing is changed.
+    ``failed`` is called once per failure of the disk at any other time: a motion that goes on is
+    not ended by it.
     """
     drive.pending_restores.recall(known.pending.values)
     well = True
@@ -36,6 +39,11 @@ def keep_list(
                 durable=durable,
             )
         except StorageFailed as error:
+            if durable:
+                raise StorageFailed(
+                    "restore.not-kept", drive=drive.name, cause=error.text,
+                    remedy=text("restore.free-the-disk"),
+                ) from error  # fmt: skip
             if well:
                 failed(error)
             well = False

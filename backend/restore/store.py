@@ -13,7 +13,7 @@ import re
 import threading
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -29,6 +29,7 @@ from profiles.schema import Raw
 A_MOMENT_S = 600.0
 #: A motion begins at most so much later because the disk is waited for.
 FLUSH_S = 0.02
+_DAMAGED = ".damaged"
 
 
 class _Value(BaseModel):
@@ -74,6 +75,7 @@ class Pending:
     ``since`` is when it noted this last (seconds since 1970), ``by`` what it was. ``moved``: it
     ended a moment ago in the middle of a motion. ``held_by`` is another process that lives and
     moves this drive with temporary values now, and ``serial`` that of the drive which was here.
+    ``unreadable`` are damaged lists of this place: what they held is not known.
     """
 
     values: tuple[PendingRestore, ...] = ()
@@ -82,6 +84,7 @@ class Pending:
     moved: bool = False
     held_by: str = ""
     serial: int | None = None
+    unreadable: tuple[Path, ...] = ()
 
 
 @dataclass
@@ -143,6 +146,8 @@ class RestoreStore:
         """The list of one drive, with what earlier processes left pending in it.
 
         ``drive_id`` is the server's name of it, by which servers before this version noted it.
+        Of a list that was written at another place the values are only offered: not every maker's
+        serial numbers differ, and the other drive may still be where it was.
         """
         own = self._folder / f"{_slug(drive)}.json"
         known, values = Pending(), dict[str, PendingRestore]()
@@ -157,14 +162,16 @@ class RestoreStore:
                 own = self._folder / f"{_slug(drive)}-{os.getpid()}.json"
                 continue
             taken.append(file)
+            here = set(note.identity.places) & set(drive.places) or not note.places
             # The older list knows what it was before both.
-            values = {v.key: _entry(v) for v in note.values} | values
+            values = {v.key: _entry(v, known=bool(here)) for v in note.values} | values
             known = Pending(
                 tuple(values.values()), noted, note.by,
                 known.moved or (note.in_motion and abs(time.time() - noted) < A_MOMENT_S),
                 known.held_by, known.serial or note.serial,
             )  # fmt: skip
         known = self._of_earlier_version(drive, drive_id, known, taken)
+        known = replace(known, unreadable=self._set_aside(drive))
         return RestoreList(
             self._folder, drive, self._by, known, own, [file for file in taken if file != own]
         )
@@ -180,6 +187,24 @@ class RestoreStore:
             except (OSError, ValidationError):
                 continue
         return sorted(found, key=lambda each: each[2])
+
+    def _set_aside(self, drive: DriveIdentity) -> tuple[Path, ...]:
+        """Damaged lists of the places of this drive, named so that no new list replaces them."""
+        names = "|".join(re.escape(_place_words(*place)) for place in drive.places)
+        ours = re.compile(rf"(?:{names})-[0-9a-f]{{8}}(?:-\d+)?\.json(?:\{_DAMAGED})?")
+        found = []
+        for file in sorted(self._folder.glob("*.json*")) if names else []:
+            if ours.fullmatch(file.name) is None:
+                continue
+            if file.suffix == _DAMAGED:
+                found.append(file)
+            elif not _sound(file):
+                aside = file.with_name(file.name + _DAMAGED)
+                try:
+                    found.append(file.rename(aside))
+                except OSError:
+                    found.append(file)
+        return tuple(found)
 
     def _of_earlier_version(
         self, drive: DriveIdentity, drive_id: str, known: Pending, taken: list[Path]
@@ -201,16 +226,32 @@ class RestoreStore:
         )  # fmt: skip
 
 
-def _entry(value: _Value) -> PendingRestore:
-    return PendingRestore(value.key, value.raw, frozenset(value.left), value.unapplied)
+def _sound(file: Path) -> bool:
+    try:
+        _List.model_validate_json(file.read_bytes())
+    except FileNotFoundError:
+        return True
+    except (OSError, ValidationError):
+        return False
+    return True
+
+
+def _entry(value: _Value, *, known: bool = True) -> PendingRestore:
+    """``known``: whether what the motion left there is known of this drive."""
+    left = frozenset(value.left) if known else frozenset()
+    return PendingRestore(value.key, value.raw, left, value.unapplied)
 
 
 def _slug(drive: DriveIdentity) -> str:
     """A name for the file: readable, and another one for another drive or place."""
     url, station = drive.places[0] if drive.places else ("", 0)
-    words = re.sub(r"[^A-Za-z0-9]+", "-", f"{url}-{station}").strip("-")[:60]
+    words = _place_words(url, station)
     whole = f"{url} {station} {drive.vendor_id} {drive.product_code} {drive.serial}"
     return f"{words}-{hashlib.sha256(whole.encode()).hexdigest()[:8]}"
+
+
+def _place_words(url: str, station: int) -> str:
+    return re.sub(r"[^A-Za-z0-9]+", "-", f"{url}-{station}").strip("-")[:60]
 
 
 def _flush(file: Path) -> None:

@@ -69,12 +69,17 @@ async def read_reported(drive: Drive) -> Reported:
     Raises:
         DriveError: an object that it has cannot be read.
     """
-    raws = {
-        key: int(reading.raw)
-        for key, reading in (await existing(drive, stating_keys(drive))).items()
-        if isinstance(reading.raw, (int, float))
-    }
-    return Reported(raws)
+    # At once where the bus can; what failed is asked for alone, to learn whether it exists.
+    readings = await drive.read_many(stating_keys(drive))
+    failed = [key for key, reading in readings.items() if reading.raw is None]
+    readings = readings | await existing(drive, failed)
+    return Reported(
+        {
+            key: int(reading.raw)
+            for key, reading in readings.items()
+            if isinstance(reading.raw, (int, float))
+        }
+    )
 
 
 def scales_of(spec: UnitSpec, reported: Reported, taught: Taught | None) -> Scales:
@@ -111,6 +116,8 @@ def _position(spec: UnitSpec, reported: Reported, said: Taught | None) -> Scale:
         return Scale(Quantity.POSITION, said.counts_per_rev, name, Origin.USER)
     if code is not None and unit is None and code != 0:
         return _uncertain(Quantity.POSITION, Uncertainty.UNREADABLE, source=f"60A8h = {code:08X}h")
+    if (empty := _zero(spec, reported)) is not None:
+        return _uncertain(Quantity.POSITION, Uncertainty.NO_RESOLUTION, name, f"{empty} = 0")
     ratio = _ratio(spec, reported)
     feed, resolution = _feed(spec, reported), _resolution(reported)
     trusted = origin_of(spec, Quantity.POSITION) is not Origin.UNKNOWN
@@ -145,6 +152,17 @@ def _by_unit(unit: SiUnit, name: str, feed: float | None, ratio: float) -> Scale
     if feed is not None and feed != 1.0 and abs(feed - per_turn) > _SAME * per_turn:
         return _uncertain(Quantity.POSITION, Uncertainty.UNIT_AND_FEED, name, "60A8h, 6092h")
     return Scale(Quantity.POSITION, per_turn / ratio, name, Origin.DRIVE, "60A8h")
+
+
+def _zero(spec: UnitSpec, reported: Reported) -> str | None:
+    """The part of a ratio that the drive has at 0; None without one.
+
+    No ratio has a 0 (CiA 402-2 clause 7): what the drive takes in its place is the maker's choice.
+    """
+    parts = [spec.gear_numerator, spec.gear_denominator]
+    parts.append(spec.feed_revolutions if reported.get(spec.feed) else None)
+    parts.append(_RESOLUTION_REVS if reported.get(_RESOLUTION) else None)
+    return next((key for key in parts if key and reported.raws.get(key) == 0), None)
 
 
 def _ratio(spec: UnitSpec, reported: Reported) -> float:

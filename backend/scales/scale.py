@@ -133,6 +133,12 @@ class ScaleUnknown(NotAllowed):
         )
 
 
+class ScaleChanged(NotAllowed):
+    """The drive has other scales than those by which a motion was planned."""
+
+    kind = "scale-changed"
+
+
 def what_to_do(scale: Scale) -> Text:
     """How a scale that is not certain becomes so."""
     if scale.uncertainty in (

@@ -212,6 +212,7 @@ class Bench:
         places = {(self.buses.url_of(port), port.station) for port in drive.ports}
         axis.stop_pending = bool(places & self._unstopped)
         axis.unattended = partial(self.motion.unattended, drive.id)
+        axis.scales_changed = partial(self.motion.scales_changed, drive.id)
         self._unstopped -= places
         drive_id = drive.id
         axis.teach(self.axis_records.get(drive_id).scales)

@@ -31,7 +31,7 @@ WATCHED_S = 0.1
 IDLE_S = 1.0
 #: During an exchange that brings state and values, everything else is asked for so often.
 ASKED_S = 1.0
-#: Option codes and ramps of STOP are asked for so often, while the axis is enabled.
+#: Option codes and ramps of STOP, and scales, are asked for so often, while the axis is enabled.
 STOP_ASKED_S = 0.9
 #: Process data older than this say nothing of the present.
 NEWEST_S = 0.05
@@ -194,7 +194,7 @@ class Monitor:
         self._last = await drive.read_many(dict.fromkeys(wanted))
         self._last_causes, self._waiting = [], list(drive.pending)
         if self._state() in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
-            await self._read_stop_settings(began_s)
+            await self._read_settings(began_s)
         if self._state() is not State.OPERATION_ENABLED:
             self._last_causes = await self.axis.blocked_by()
         self._asked_s = began_s
@@ -221,11 +221,15 @@ class Monitor:
             self._last = self._last | await drive.read_many(asked)
         return await self._snapshot()
 
-    async def _read_stop_settings(self, now_s: float) -> None:
-        """STOP has no time to ask how the drive brakes, and anybody may change it."""
+    async def _read_settings(self, now_s: float) -> None:
+        """What anybody may change while the axis has power, and nobody has time to ask for then.
+
+        How the drive brakes, for STOP; and what its scales rest on: the axis compares them.
+        """
         if now_s - self._stop_asked_s >= STOP_ASKED_S:
             self._stop_asked_s = now_s
             await self.axis.read_stop_settings()
+            await self.axis.look_at_scales()
 
     def _state_differs(self, newest: Mapping[str, Reading], telling: Sequence[str]) -> bool:
         """Whether state, warning or error code are not what they were, or are not known."""

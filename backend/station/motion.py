@@ -13,6 +13,7 @@ from backend.axis.stop.facts import AxisStop, Verdict
 from backend.station.connected_drive import ConnectedDrive
 from backend.stopping.stop_message import stop_message
 from backend.stopping.watch import StopWatch
+from drivers.cia402 import State
 from drivers.errors import Busy, DriveError, internal_error
 from drivers.texts.message import Text, text
 
@@ -123,6 +124,21 @@ class Motion:
                 yield
 
         return grants()
+
+    def scales_changed(self, drive_id: str, keys: Sequence[str]) -> None:
+        """Somebody gave this axis other units; a motion that goes on was planned with others."""
+        connected = self._bench.connected_drives.get(drive_id)
+        authority = self._bench.authority
+        if connected is None or authority.mover_of(drive_id) is None:
+            return
+        drive = connected.drive
+        word = drive.readings.get(drive.require("status_word"))
+        raw = None if word is None else word.integer
+        if raw is None or drive.decode_state(raw) is not State.OPERATION_ENABLED:
+            return  # it has no power yet: enabling compares the scales itself
+        line = text("scales.changed-in-motion", drive=drive.name, parameter=", ".join(keys))
+        self._bench.journal.add(line, level="error", drive=drive_id)
+        authority.end_motion(drive_id, line)
 
     def unattended(self, drive_id: str, why: Text) -> None:
         """Nobody may leave this axis enabled any longer: it loses its power."""

@@ -50,6 +50,10 @@ class Reconnection:
             line = text("journal.held-by-another", drive=drive.name, holder=pending.held_by)
             journal.add(line, level="warning", drive=drive.id)
 
+        for file in pending.unreadable:
+            line = text("restore.list-damaged", drive=drive.name, file=str(file))
+            journal.add(line, level="error", drive=drive.id)
+
         def failed(error: StorageFailed) -> None:
             line = text("journal.restore-list-not-kept", cause=error.text)
             journal.add(line, level="warning", drive=drive.id)

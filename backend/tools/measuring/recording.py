@@ -201,11 +201,13 @@ async def enabled(
 
     Raises:
         ScaleUnknown: a scale is not certain, so that the envelope would say nothing.
+        ScaleChanged: it is another one than that of the plan.
         Interrupted: it cannot be enabled, or the drive has a fault at the end.
     """
     inside = False
     if not by_increments:
-        await axis.require_certain_scales()
+        # Said as what it is, not as a motion that was interrupted.
+        await axis.require_planned_scales()
     entered = axis.enabled_cyclic(
         session, mode, threshold.STATE_TIMEOUT_S, by_increments=by_increments
     )

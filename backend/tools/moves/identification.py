@@ -63,7 +63,7 @@ async def identify(axis: Axis, settings: IdentifySettings, progress: Progress) -
         try:
             await _until_done(axis, spec, settings, progress)
         finally:
-            if not axis.stopped:
+            if not axis.stopped and drive.authority.may_move(drive.id):
                 await axis.control(word)
     after = {key: r.raw for key, r in (await drive.read_many(spec.keys)).items()}
     changed = {key: [before[key], raw] for key, raw in after.items() if raw != before[key]}

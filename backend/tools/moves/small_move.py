@@ -55,6 +55,8 @@ async def small_move(
         NotAllowed: no CSP in this exchange, or the axis did not follow.
     """
     drive = axis.drive
+    # What an increment is may have changed since the last small move, which permits a longer one.
+    await axis.read_scales()
     _check(axis, settings)
     require_signals(axis, session, Mode.CSP, False)
     cycle = cycle_s(session)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from typing import Literal
 
 import httpx
@@ -11,6 +12,7 @@ import pytest
 from backend.axis.axis import Envelope
 from backend.axis.cyclic import CyclicState
 from backend.drive.ports import Port
+from backend.people.identity import LOCAL, Actor, acting
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.jog import run as jogging
@@ -20,6 +22,7 @@ from backend.tools.moves import move as moving
 from backend.work.jobs import Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
+from drivers.texts.message import text
 from tests.support.servo import (
     CONTROL,
     MODE,
@@ -33,6 +36,7 @@ from tests.support.servo import (
 ENVELOPE = Envelope(5.0, 100.0, 50.0, 10.0)
 JOG = JogSettings(1, 60.0, 600.0, 5.0, 50.0)
 ENABLES = 0x0F
+ENABLED = 0x237
 
 
 def enabling(servo: Servo) -> int:
@@ -329,6 +333,61 @@ async def test_units_are_read_anew_whoever_wrote_the_gearing(x: ConnectedDrive) 
 _MOVE = {"mode": "PP", "target": 1.0, "travel_limit": 2.0, "torque_limit": 10.0}
 
 
+@pytest.mark.parametrize("mode", ["PV", "PT", "PP"])
+@pytest.mark.parametrize("had_power", [False, True])
+async def test_a_motion_whose_permission_ends_is_braked_and_loses_its_power(
+    bench: Bench, x: ConnectedDrive, servo: Servo, mode: Literal["PP", "PV", "PT"], had_power: bool
+) -> None:
+    """Log-out, a revoked token, the end of its time: halt has the bits that enable, so it may not
+    follow; a drive in profile velocity would turn for ever.
+    """
+    if had_power:
+        servo.enable()
+
+    async def work(progress: Progress) -> dict[str, object]:
+        await moving.move(x.axis, moving.MoveSettings(mode, 1.0, ENVELOPE, consent=True), progress)
+        return {}
+
+    acting.set(Actor(replace(LOCAL, session="visit")))
+    job = bench.jobs.start("move", "Move", work, drive="x", motion=True)
+    setpoint = {"PV": VELOCITY_TARGET, "PT": (0x6071, 0), "PP": TARGET}[mode]
+    async with asyncio.timeout(60):
+        await eventually(lambda: any(p == setpoint and any(data) for p, data in servo.written))
+        bench.authority.end_of("visit", text("motion.session-is-over"))
+        await job.wait()
+    assert servo.words()[-1] & ENABLES != ENABLES
+    assert {2, 11} & set(servo.words()), servo.words()
+    assert servo.number(STATUS) != ENABLED
+    assert x.axis.drive.pending_restores.entries == ()
+    assert job.state == "cancelled", job.error
+
+
+async def test_a_gear_changed_by_another_program_ends_the_motion(
+    bench: Bench, x: ConnectedDrive, servo: Servo
+) -> None:
+    """6064h and 606Ch count in the same new increments: comparing the two shows nothing."""
+    async with asyncio.timeout(60):
+        await x.axis.units()
+
+        async def work(progress: Progress) -> dict[str, object]:
+            await jog(x.axis, JOG, hold, progress)
+            return {}
+
+        hold = Hold(clock=lambda: 0.0)
+        job = bench.jobs.start("jog", "Jog", work, drive="x", motion=True)
+        await eventually(lambda: servo.number(STATUS) == ENABLED)
+        assert bench.authority.mover_of("x") is not None
+        servo.set((0x6091, 1), 7)
+        await x.monitor.refresh()
+        await job.wait()
+    assert job.state == "cancelled", (job.error, servo.words())
+    assert x.axis.drive.pending_restores.entries == ()
+    assert servo.number(STATUS) != ENABLED
+    assert any(
+        entry.message.code == "scales.changed-in-motion" for entry in bench.journal.entries()
+    )
+
+
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e300"])
 @pytest.mark.parametrize("field", ["target", "speed", "acceleration", "travel_limit"])
 async def test_numbers_that_are_none_are_refused(
@@ -413,13 +472,8 @@ async def test_jog_ends_at_the_end_of_the_number_range(x: ConnectedDrive, servo:
     assert (await task)["reason"] == "enough"
 
 
-async def test_jog_needs_a_known_resolution(
-    x: ConnectedDrive, servo: Servo, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from dataclasses import replace
-
-    units = await x.axis.units()
-    monkeypatch.setattr(x.axis, "_units", replace(units, counts_per_rev=None))
+async def test_jog_needs_a_known_resolution(x: ConnectedDrive, servo: Servo) -> None:
+    servo.set((0x6092, 1), 0)
     with pytest.raises(NotAllowed, match="increments per revolution"):
         await jog(x.axis, JOG, Hold(), quiet())
     assert servo.written == []
@@ -428,8 +482,6 @@ async def test_jog_needs_a_known_resolution(
 async def test_jog_slower_than_the_drive_can_count_is_refused(
     x: ConnectedDrive, servo: Servo
 ) -> None:
-    from dataclasses import replace
-
     with pytest.raises(OutOfRange, match="below the resolution"):
         await jog(x.axis, replace(JOG, speed_rpm=1e-6), Hold(), quiet())
     assert servo.written == []

@@ -16,6 +16,7 @@ from backend.axis.restoring import RestoreFailed
 from backend.drive.identity import read_serial
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
+from backend.store.files import StorageFailed
 from backend.tools.measuring.temporary import temporary
 from drivers.cia402 import Mode
 from drivers.errors import LinkLost
@@ -401,12 +402,34 @@ async def test_another_drive_in_its_place_owes_nothing(
     await again.close()
 
 
-async def test_a_full_disk_keeps_nobody_from_moving(
+async def test_on_a_full_disk_nothing_is_changed_for_a_motion(
     bench: Bench, x: ConnectedDrive, servo: Servo, tmp_path: Path
 ) -> None:
+    """After a kill nobody would know what to restore."""
     (tmp_path / "restore").write_text("in the way")
+    servo.written.clear()
+    with pytest.raises(StorageFailed) as refused:
+        async with temporary(x.axis, {SPEED: 200}):
+            raise AssertionError("it was changed")
+    assert refused.value.code == "restore.not-kept"
+    assert servo.written == []
+    assert not x.drive.pending_restores.in_motion
+    assert x.drive.pending_restores.outstanding == ()
+    (tmp_path / "restore").unlink()
     async with temporary(x.axis, {SPEED: 200}):
         assert held(servo)[SPEED] == 200
     assert held(servo) == WAS
-    lines = [entry.text for entry in bench.journal.entries("x")]
-    assert sum("will not know what to restore" in line for line in lines) == 1
+
+
+async def test_a_disk_that_fills_up_in_a_motion_ends_nothing_and_is_reported(
+    bench: Bench, x: ConnectedDrive, servo: Servo, tmp_path: Path
+) -> None:
+    async with temporary(x.axis, {SPEED: 200}):
+        for file in (tmp_path / "restore").iterdir():
+            file.unlink()
+        (tmp_path / "restore").rmdir()
+        (tmp_path / "restore").write_text("in the way")
+        await x.drive.write(SPEED, 210)
+    assert held(servo) == WAS
+    lines = [entry.message.code for entry in bench.journal.entries("x")]
+    assert lines.count("journal.restore-list-not-kept") == 1

@@ -47,8 +47,45 @@ def test_the_same_drive_is_found_by_its_number_or_its_place(
 ) -> None:
     RestoreStore(tmp_path, "a command").list_of(HERE, "x").write(VALUES, in_motion=True)
     pending = RestoreStore(tmp_path, "a server").list_of(other, "y").pending
-    assert set(pending.values) == (set(VALUES) if same else set())
+    here = other.places == HERE.places
+    values = {replace(v, left=v.left if here else frozenset()) for v in VALUES}
+    assert set(pending.values) == (values if same else set())
     assert pending.moved is same
+
+
+def test_two_axes_with_one_serial_number_do_not_restore_each_others_values(tmp_path: Path) -> None:
+    """Some makers give all drives one number: the values of station 1 are only offered at 2."""
+    lists = RestoreStore(tmp_path, "a server")
+    lists.list_of(HERE, "x").write(VALUES, in_motion=False)
+    second = lists.list_of(replace(HERE, places=(("ethercat://eth0", 2),)), "y")
+    assert [v.left for v in second.pending.values] == [frozenset(), frozenset()]
+    assert lists.list_of(HERE, "x").pending.values == VALUES
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\0" * 200, b'{"values": [', b'{"values": [{"key": 1}]}']
+)
+def test_a_damaged_list_is_reported_at_every_start_and_replaced_by_none(
+    tmp_path: Path, content: bytes
+) -> None:
+    """As after a power failure: what it held is not known, and that is said."""
+    lists = RestoreStore(tmp_path, "a server")
+    lists.list_of(HERE, "x").write(VALUES, in_motion=True)
+    (file,) = (tmp_path / "restore").iterdir()
+    file.write_bytes(content)
+    for earlier in ((), VALUES[:1]):
+        known = lists.list_of(HERE, "x")
+        (aside,) = known.pending.unreadable
+        assert known.pending.values == earlier
+        known.write(VALUES[:1], in_motion=False)
+        assert aside.read_bytes() == content
+        assert lists.list_of(HERE, "x").pending.values == VALUES[:1]
+        assert (
+            lists.list_of(replace(HERE, places=(("ethercat://eth0", 2),)), "y").pending.unreadable
+            == ()
+        )
+    aside.unlink()
+    assert lists.list_of(HERE, "x").pending.unreadable == ()
 
 
 def test_two_drives_of_one_place_keep_apart_lists(tmp_path: Path) -> None:

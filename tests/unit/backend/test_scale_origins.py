@@ -123,6 +123,11 @@ def test_increments_of_a_revolution(raws: dict[str, int], per_rev: float) -> Non
     [
         ({}, Uncertainty.NO_RESOLUTION),
         ({"6092:01": 0, "6092:02": 1}, Uncertainty.NO_RESOLUTION),
+        # No ratio has a 0 in it; what a drive takes in its place is its own affair.
+        ({"6092:01": 10_000, "6092:02": 0}, Uncertainty.NO_RESOLUTION),
+        ({"6092:01": 10_000, "6091:01": 0, "6091:02": 1}, Uncertainty.NO_RESOLUTION),
+        ({"6092:01": 10_000, "6091:01": 10, "6091:02": 0}, Uncertainty.NO_RESOLUTION),
+        ({"608F:01": 131_072, "608F:02": 0}, Uncertainty.NO_RESOLUTION),
         ({"6092:01": 1, "6092:02": 1, "608F:01": 131_072}, Uncertainty.FEED_OF_ONE),
         ({"60A8:00": TENTH_DEGREE, "6092:01": 10_000}, Uncertainty.UNIT_AND_FEED),
         ({"60A8:00": 0xFA010000}, Uncertainty.LINEAR),  # µm

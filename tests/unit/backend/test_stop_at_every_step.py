@@ -152,7 +152,7 @@ async def move_and_cancel(steps: Steps) -> None:
     async def work(progress: Progress) -> JobResult:
         return await move(steps.x.axis, MoveSettings("PP", 1.0, ENVELOPE), progress)
 
-    await steps.job(work, cancel_after_s=0.08)
+    await steps.job(work, cancel_after_s=0.12)
 
 
 async def jog_and_release(steps: Steps) -> None:
