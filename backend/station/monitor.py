@@ -117,6 +117,8 @@ class Monitor:
         self._last_causes: list[Text] = []
         self._waiting: list[str] = []
         self._asked_s = -math.inf
+        #: How often it was asked, and which of these the snapshot is of.
+        self._polls = self._shown = 0
         # All axes at the same instant would keep everybody else waiting for their sum.
         self._phase = next(_COUNT) * _GOLDEN % 1
 
@@ -163,21 +165,26 @@ class Monitor:
         return await self._poll(self._read)
 
     async def _poll(self, read: Callable[[], Awaitable[Snapshot]]) -> Snapshot:
-        before = self.snapshot
+        self._polls += 1
+        number = self._polls
         if await self.axis.repeat_stop():
             drive = self.axis.drive
             again = text("station.stop-sent-again", drive=drive.name)
             self._journal.add(again, level="warning", drive=drive.id)
         if self.axis.drive.exclusive.held:
-            return before
+            return self.snapshot
         try:
             snapshot = await read()
         except DriveError as error:
             self._asked_s = -math.inf
             snapshot = replace(
-                before, time=time.time(), fresh=False, problem=error.text, turning=None
+                self.snapshot, time=time.time(), fresh=False, problem=error.text, turning=None
             )
-        self.snapshot = snapshot
+        # A request may ask while the watch does: each change is news once, and what was asked
+        # earlier is no news.
+        if number < self._shown:
+            return self.snapshot
+        before, self.snapshot, self._shown = self.snapshot, snapshot, number
         self._record(before, snapshot)
         self._changed(snapshot)
         return snapshot

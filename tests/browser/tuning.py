@@ -18,7 +18,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 
 from backend.station.demo import DemoBench
 from drivers.virtual.wires.netns import unavailable
-from tests.browser.conftest import PATIENCE_MS, PHONE, _open
+from tests.browser.conftest import LAPTOP, PATIENCE_MS, PHONE, _open
 from tests.browser.driving import open_axis
 from tests.support.station import HANG_S, Station, until
 
@@ -179,6 +179,30 @@ def sweep(station: Station, axis: str, **settings: object) -> None:
         assert any(words in str(job["problem"]) for words in BUSY), job
         until(lambda: _without_fault(station, axis), 60, "the drive answers without a fault")
     raise AssertionError(job)
+
+
+def patient_page(browser: Browser, station: Station) -> Iterator[Page]:
+    """A page on a wide screen that waits long for what a busy computer makes late."""
+    opened = _open(browser, station.url, **LAPTOP)
+    page = next(opened)
+    page.set_default_timeout(45_000)
+    yield page
+    next(opened, None)
+
+
+def exchange(station: Station, cycle_us: int) -> None:
+    """Start the cyclic exchange: a slower one leaves a busy computer less to do."""
+    body = {"url": URL, "cycle_us": cycle_us}
+    assert station.ok(station.http.post("/buses/cyclic", json=body))["cyclic"]["running"]
+
+
+def report_of(station: Station, axis: str, language: str) -> str:
+    """The commissioning report of an axis, as HTML."""
+    body = {"format": "html", "language": language}
+    made = station.ok(station.http.post(f"/drives/{axis}/reports", json=body))
+    answer = station.http.get(f"/reports/{made['file']}")
+    assert answer.is_success, answer.text
+    return answer.text
 
 
 def answered(station: Station, path: str) -> Any:

@@ -39,8 +39,10 @@ TEXTS: dict[str, tuple[str, str]] = {
     "error": ("Load behind the motor (°)", "负载滞后于电机 (°)"),
     "curve": ("error", "误差"),
     "finding.measured": (
-        "The backlash is {value}{unit} at the load.",
-        "负载侧间隙为 {value}{unit}。",
+        "The backlash is {value}{unit} at the load. If that is more than the machine permits, "
+        "check coupling, keys, belt tension and gear for wear, and measure again after the repair.",
+        "负载侧间隙为 {value}{unit}。若超过机器允许值，请检查联轴器、键、同步带张力和齿轮的磨损，"
+        "维修后重新测量。",
     ),
     "finding.backlash_not_seen": (
         "No backlash shows; there is no more than {value}{unit} at the load.",

@@ -164,3 +164,46 @@ async def test_a_monitor_that_is_hurried_as_it_is_closed_ends(x: ConnectedDrive)
 
 def _set(event: asyncio.Event, _snapshot: object) -> None:
     event.set()
+
+
+async def test_a_fault_that_two_ask_for_at_once_is_logged_once(
+    x: ConnectedDrive, servo: Servo
+) -> None:
+    await x.monitor.refresh()
+    assert x.monitor.snapshot.fresh
+    overheated(servo)
+    both = await asyncio.gather(x.monitor.refresh(), polled(x))
+    await x.monitor.refresh()
+    assert all(each.faults for each in both)
+    assert faults_logged(x) == 1
+
+
+async def test_what_was_asked_before_a_fault_does_not_take_it_back(
+    x: ConnectedDrive, servo: Servo
+) -> None:
+    await x.monitor.refresh()
+    before = x.monitor.snapshot
+    held, answered = asyncio.Event(), asyncio.Event()
+
+    async def slow() -> watching.Snapshot:
+        held.set()
+        await answered.wait()
+        return before
+
+    late = asyncio.create_task(x.monitor._poll(slow))
+    await held.wait()
+    overheated(servo)
+    await x.monitor.refresh()
+    answered.set()
+    assert (await late).faults, "the newer one"
+    await x.monitor.refresh()
+    assert faults_logged(x) == 1
+
+
+def overheated(servo: Servo) -> None:
+    servo.trip()
+    servo.set((0x603F, 0), 0x4210)
+
+
+def faults_logged(x: ConnectedDrive) -> int:
+    return sum(entry.message.code == "station.fault" for entry in x.monitor._journal.entries())

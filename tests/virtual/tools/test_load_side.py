@@ -10,9 +10,11 @@ from typing import Any
 
 import pytest
 
+from backend.commands.tools import lines_of
 from backend.tools.load_side.result import LoadSideResult
 from backend.tools.load_side.run import TOOL
 from drivers.errors import NotAllowed
+from drivers.virtual.defects import WORN_BACKLASH_RAD, planted
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import settings_of
 from tests.virtual.tools.set_ups.load_side import (
@@ -69,6 +71,24 @@ async def test_backlash_stiffness_and_error_are_those_of_the_mechanics() -> None
     assert codes(found) == ["measured"]
     again = TOOL.reevaluate(kept["arrays"], kept["meta"])
     assert again.model_dump(mode="json") == found.model_dump(mode="json")
+
+
+async def test_the_backlash_of_a_worn_belt_is_found_with_the_next_step() -> None:
+    """The defect as it is planted on an axis that has no backlash otherwise."""
+    healthy = axis(gap=0.0)
+    async with direct(planted(healthy, "belt_worn"), CYCLE_S, drive=DRIVE) as bench:
+        found = await measured(bench)
+    assert codes(found)[0] == "measured"
+    assert found.backlash_deg is not None
+    truth = math.degrees(WORN_BACKLASH_RAD)
+    assert found.backlash_deg.value == pytest.approx(truth, abs=max(0.05 * truth, 2 * 360 / 2**17))
+    low, high = found.backlash_deg.ci95
+    assert low is not None
+    assert high is not None
+    assert 0.0 < low < high
+    words = lines_of(TOOL, found)[0]
+    assert words.startswith("The backlash is")
+    assert "belt tension" in words
 
 
 async def test_an_encoder_behind_a_gear_that_counts_backwards() -> None:

@@ -18,8 +18,8 @@ from typing import IO, Any
 from drivers.errors import LinkLost, LinkTimeout
 from drivers.virtual.wires.netns import Namespace, child_environment
 
-START_TIMEOUT_S = 60.0
-"""Devices may have to compile their physics first."""
+START_TIMEOUT_S = 180.0
+"""Devices may have to compile their physics first, on a computer that may be busy."""
 ANSWER_TIMEOUT_S = 5.0
 
 

@@ -34,7 +34,7 @@ import { ReportPanel, useReports } from './ReportPanel'
 import { DwellPanel, VibrationPanel } from './VibrationPanel'
 import { present, type Section, useSections } from './sections'
 import { StepPanel } from './StepPanel'
-import { preChecks, ready } from './steps'
+import { checked, preChecks } from './steps'
 
 /** The guided path; every step can also be done alone. */
 export function TunePage({ drive }: { drive: string }) {
@@ -92,7 +92,6 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
       (each) => each.cyclic_possible && summary.ports.some((port) => port.url === each.url),
     ) ?? null
   const checks = preChecks(summary, state, { possible, running: bus?.cyclic?.running ?? false })
-  const able = ready(checks)
   const missing = checks.find((each) => !each.ok && !each.optional)
   const obstacle = !open
     ? t('start.noConnection')
@@ -115,7 +114,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
     (each) => each.kind === 'sweep-mechanics' && each.profile === summary.profile,
   )
   const path: Known = {
-    ready: able && limits.agreed,
+    ready: checked(checks, limits.agreed),
     inertia: si !== null,
     changed: later(changes.at(-1)?.time ?? null, tuned && tuneJob ? tunedAt(tuned, tuneJob) : null),
     measured: ours,

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest'
 import type { AxisState, DriveSummary } from '../../api/schema'
-import { amount, engineering, interval, preChecks, ready, stepOf } from './steps'
+import { amount, checked, engineering, interval, preChecks, ready, stepOf } from './steps'
 
 const drive = { lease: { holder: null, mine: false }, pending: 0 } as unknown as DriveSummary
 const state = { fresh: true, faults: [], moving_job: null } as unknown as AxisState
@@ -30,6 +30,19 @@ describe('pre-checks', () => {
   it('let a warning pass', () => {
     const warned = { ...state, faults: [{ kind: 'warning', name: 'hot' }] } as unknown as AxisState
     expect(ready(preChecks(drive, warned, cyclic))).toBe(true)
+  })
+})
+
+describe('the step of the pre-checks', () => {
+  const moving = { ...state, moving_job: 'j1' } as AxisState
+  it('stays done while a measurement runs, for which the consent was used up', () => {
+    expect(checked(preChecks(drive, moving, cyclic), false)).toBe(true)
+  })
+  it('is not done without the consent, or while something else is missing', () => {
+    expect(checked(preChecks(drive, state, cyclic), false)).toBe(false)
+    expect(checked(preChecks(drive, state, cyclic), true)).toBe(true)
+    const silent = { ...moving, fresh: false } as AxisState
+    expect(checked(preChecks(drive, silent, cyclic), true)).toBe(false)
   })
 })
 

@@ -48,6 +48,14 @@ export function preChecks(
 /** Whether a measurement may be asked for. */
 export const ready = (checks: Check[]): boolean => checks.every((each) => each.ok || each.optional)
 
+/**
+ * Whether the step *Pre-checks* is done. While the axis moves it stays so: that another motion has to
+ * wait, and needs a consent of its own, is not what the step is about.
+ */
+export const checked = (checks: Check[], agreed: boolean): boolean =>
+  ready(checks.filter((each) => each.name !== 'idle')) &&
+  (agreed || checks.some((each) => each.name === 'idle' && !each.ok))
+
 /** Number and count of the steps of a job that counts them; null for others, and before the first. */
 export function stepOf(step: MessageInfo): { now: number; of: number } | null {
   const first = step.params?.part0
