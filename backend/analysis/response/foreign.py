@@ -355,7 +355,7 @@ def _fitted(lines: _Lines) -> ProductFit | None:
     if np.count_nonzero(use) < LEAST_LINES:
         raise NoResponse("incoherent", coherence=float(np.median(lines.coherence)))
     weight = 1.0 / np.hypot(lines.noise, 0.03)
-    found = fit_product(lines.frequency_hz[use], lines.response[use], weight[use], lines.noise[use])
+    found = fit_product(lines.frequency_hz[use], lines.response[use], weight[use])
     if found is None:
         return None
     model = found.model
