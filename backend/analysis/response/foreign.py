@@ -198,8 +198,8 @@ def _by_periods(u: FloatArray, y: FloatArray, rate: float, period: int) -> _Line
     both = [x[x.size - count * period :] for x in (u, y)]
     found = []
     for slopes_of in (_common_slope, _slope_of_each):
-        rows = [_level(x.reshape(count, period), slopes_of(x, period)) for x in both]
-        found.append(_mean_of_periods(*rows, rate))
+        of_in, of_out = (_level(x.reshape(count, period), slopes_of(x, period)) for x in both)
+        found.append(_mean_of_periods(of_in, of_out, rate))
     noise = [float(np.median(lines.noise)) for lines in found]
     return found[int(noise[1] < threshold.LESS_NOISE * noise[0])]
 
