@@ -842,6 +842,26 @@ class foreign:
     855a6a86."""
     FEWEST_EMPTY = 8
     """[count] Empty lines that show distortion, at least. Origin: 855a6a86."""
+    POOL_EMPTY = 8
+    """[count] Lines to each side whose distortion, or whose correlation from period to period, is
+    looked at together. Origin: tests/unit/analysis/test_foreign_rough.py."""
+    FEWEST_ALIKE = 4
+    """[count] Fewer periods do not show whether they resemble their predecessors. Origin:
+    tests/unit/analysis/test_foreign_rough.py."""
+    ENDS = 16
+    """[count] The ends of a period are so small a part of it: long enough to average noise, short
+    enough to see where the period begins and ends. Origin:
+    tests/unit/analysis/test_foreign_rough.py."""
+    # FEEDBACK, MOST_FEEDBACK: One deviation of what feedback adds, relative to the share of noise:
+    # |T| of a damped loop is at most 1.3 to 2, which 1.96 deviations are to reach. A larger share
+    # of noise than the second says no more.
+    FEEDBACK = 0.75
+    """[ratio] Origin: tests/unit/analysis/test_foreign_rough.py."""
+    MOST_FEEDBACK = 4.0
+    """[ratio] Origin: tests/unit/analysis/test_foreign_rough.py."""
+    LESS_NOISE = 0.7
+    """[ratio] Each period has a slope of its own where that leaves less than this of the noise.
+    Origin: tests/unit/analysis/test_foreign_rough.py."""
 
 
 class frf:

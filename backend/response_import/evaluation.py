@@ -17,6 +17,7 @@ from backend.analysis.response.collocated import (
     as_frf,
     contradiction,
     mechanical_model,
+    path_delay_s,
     rigid_part,
 )
 from backend.analysis.response.foreign import ForeignResponse, NoResponse, evaluate
@@ -228,7 +229,7 @@ def _axis(
     """Inertia, friction, notches and gains; only where the structure is stated."""
     if settings.structure != "motor_speed" or found.fit is None:
         return None
-    delay = found.fit.model.delay_s
+    delay = path_delay_s(found.fit.model, settings.output_filter_hz)
     wrong = contradiction(found, settings.output_filter_hz, delay)
     if wrong is not None:
         return {"verdict": "not-collocated", "contradiction": asdict(wrong)}
@@ -260,7 +261,8 @@ def _candidates(
         return []
     if settings.loop_delay_s is None:
         return []
-    frf = as_frf(found, settings.output_filter_hz, found.fit.model.delay_s, signals.sample_rate_hz)
+    delay = path_delay_s(found.fit.model, settings.output_filter_hz)
+    frf = as_frf(found, settings.output_filter_hz, delay, signals.sample_rate_hz)
     loops = DriveLoops(
         settings.current_bandwidth_hz, settings.loop_delay_s,
         highest_speed_bandwidth_hz=0.25 * found.valid_band_hz[1],

@@ -53,6 +53,21 @@ def without_filter(found: ForeignResponse, filter_hz: float | None) -> ForeignRe
     return replace(found, response=np.asarray(found.response * lag))
 
 
+def path_delay_s(model: ProductModel, filter_hz: float | None) -> float:
+    """Delay between both recorded signals, in seconds; negative where the input is recorded later.
+
+    A fit may put a lead (negative delay) beside a fast real pole whose lag takes it away again:
+    within the lines neither exists, and what is left of both is no more than their difference.
+    """
+    if model.delay_s >= 0.0:
+        return model.delay_s
+    own = _friction_pole(model, filter_hz)
+    fast = [
+        c for i, c in enumerate(model.poles_hz) if i != own and c != _filter_pole(model, filter_hz)
+    ]
+    return min(0.0, model.delay_s + sum(1.0 / (TURN * corner) for corner in fast))
+
+
 def contradiction(
     found: ForeignResponse, filter_hz: float | None, delay_s: float
 ) -> Contradiction | None:
@@ -85,6 +100,10 @@ def rigid_part(found: ForeignResponse, filter_hz: float | None) -> RigidPart | N
     gain = abs(fit.model.gain) * TURN * corner
     pick = np.zeros(fit.covariance.shape[0])
     pick[0] = pick[2 + pole] = 1.0
+    for i, sign in _below_the_load(fit.model):
+        # log of (resonance / antiresonance)², which the gain above both has in addition.
+        gain *= fit.model.pairs[i].frequency_hz ** (2 * sign)
+        pick[2 + len(fit.model.poles_hz) + 2 * i] = 2.0 * sign
     spread = float(np.sqrt(max(float(pick @ fit.covariance @ pick), 0.0)))
     # What is common to all lines, as the band counts it.
     common = float(np.median(found.band.level))
@@ -92,12 +111,34 @@ def rigid_part(found: ForeignResponse, filter_hz: float | None) -> RigidPart | N
     return RigidPart(1.0 / gain, (1.0 / (gain * factor), factor / gain), 1.0 / abs(fit.model.gain))
 
 
+def _below_the_load(model: ProductModel) -> list[tuple[int, int]]:
+    """Pairs (number, 1 or -1) below the first antiresonance that a load can have.
+
+    From a torque to the speed of the same shaft an antiresonance comes first. A resonance before
+    it, with its antiresonance, is what a fit makes of friction or noise at the lowest lines: the
+    inertia is what shows above both.
+    """
+    order = sorted(range(len(model.pairs)), key=lambda i: model.pairs[i].frequency_hz)
+    found: list[tuple[int, int]] = []
+    for one, two in zip(order[::2], order[1::2], strict=False):
+        kinds = (model.pairs[one].kind, model.pairs[two].kind)
+        if kinds != ("resonance", "antiresonance"):
+            break
+        found += [(one, 1), (two, -1)]
+    return found
+
+
+def _filter_pole(model: ProductModel, filter_hz: float | None) -> float | None:
+    """Corner of the real pole that is the stated filter's."""
+    if filter_hz is None or len(model.poles_hz) < 2:
+        return None
+    return min(model.poles_hz, key=lambda corner: abs(float(np.log(corner / filter_hz))))
+
+
 def _friction_pole(model: ProductModel, filter_hz: float | None) -> int | None:
     """Number of the lowest real pole that is not the filter's."""
-    rows = [(corner, i) for i, corner in enumerate(model.poles_hz)]
-    if filter_hz is not None and len(rows) > 1:
-        away = [abs(float(np.log(corner / filter_hz))) for corner, _ in rows]
-        rows.pop(int(np.argmin(away)))
+    of_filter = _filter_pole(model, filter_hz)
+    rows = [(corner, i) for i, corner in enumerate(model.poles_hz) if corner != of_filter]
     return min(rows)[1] if rows else None
 
 

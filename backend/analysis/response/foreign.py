@@ -20,6 +20,7 @@ from backend.analysis.response.repeat_band import RepeatBand, line_scatter, repe
 from backend.analysis.signals.arrays import (
     ComplexArray,
     FloatArray,
+    IntArray,
     magnitude_db,
     neighbour_mean,
     phase_deg,
@@ -88,6 +89,44 @@ class ForeignResponse:
 
 
 @dataclass(frozen=True)
+class EmptyLines:
+    """Motion on lines that are not excited, relative to the excited lines around it.
+
+    ``number`` [lines] is each one's bin in a period, whose parity tells even from odd distortion;
+    ``power`` [lines] is the squared ratio.
+    """
+
+    frequency_hz: FloatArray
+    number: IntArray
+    power: FloatArray
+
+    def within(self, low_hz: float, high_hz: float) -> EmptyLines:
+        """Those between two frequencies."""
+        use = (self.frequency_hz >= low_hz) & (self.frequency_hz <= high_hz)
+        return EmptyLines(self.frequency_hz[use], self.number[use], self.power[use])
+
+    def sizes(self) -> tuple[float | None, float | None]:
+        """Effective value over all even and all odd ones; None where there are too few."""
+        found: list[float | None] = []
+        for parity in (0, 1):
+            power = self.power[self.number % 2 == parity]
+            enough = power.size >= threshold.FEWEST_EMPTY
+            found.append(float(np.sqrt(np.mean(power))) if enough else None)
+        return found[0], found[1]
+
+    def scatter_at(self, f: FloatArray) -> FloatArray:
+        """One component at the lines ``f``, from the empty ones near each: the larger parity."""
+        out = np.zeros(f.size)
+        for parity in (0, 1):
+            use = self.number % 2 == parity
+            if np.count_nonzero(use) < threshold.FEWEST_EMPTY:
+                continue
+            near = neighbour_mean(self.power[use], threshold.POOL_EMPTY)
+            out = np.maximum(out, np.interp(f, self.frequency_hz[use], near))
+        return np.asarray(np.sqrt(out / 2.0))
+
+
+@dataclass(frozen=True)
 class _Lines:
     """An estimate before its band: ``noise`` relative, one component."""
 
@@ -98,7 +137,7 @@ class _Lines:
     period_s: float | None = None
     used: int = 0
     dropped: int = 0
-    empty: tuple[float | None, float | None] = (None, None)
+    empty: EmptyLines | None = None
     independent: bool = True
 
 
@@ -140,19 +179,36 @@ def _cut(lines: _Lines, band_hz: tuple[float, float] | None) -> _Lines:
     count = int(np.count_nonzero(use))
     if count < LEAST_LINES:
         raise NoResponse("few-lines", lines=count, least=LEAST_LINES)
+    kept = lines.frequency_hz[use]
     return replace(
-        lines, frequency_hz=lines.frequency_hz[use], response=lines.response[use],
+        lines, frequency_hz=kept, response=lines.response[use],
         coherence=lines.coherence[use], noise=lines.noise[use],
+        empty=lines.empty.within(kept[0], kept[-1]) if lines.empty is not None else None,
     )  # fmt: skip
 
 
 def _by_periods(u: FloatArray, y: FloatArray, rate: float, period: int) -> _Lines:
-    """Mean over the settled periods; noise by how they differ."""
+    """Mean over the settled periods; noise by how they differ.
+
+    Periods that wander (a position that friction or a disturbance moves on, a speed that drifts)
+    are evaluated once with the slope that all have in common and once each with its own; the
+    evaluation whose periods differ less is kept.
+    """
     count = u.size // period
-    rows_u, rows_y = (x[x.size - count * period :].reshape(count, period) for x in (u, y))
+    both = [x[x.size - count * period :] for x in (u, y)]
+    found = []
+    for slopes_of in (_common_slope, _slope_of_each):
+        of_in, of_out = (_level(x.reshape(count, period), slopes_of(x, period)) for x in both)
+        found.append(_mean_of_periods(of_in, of_out, rate))
+    noise = [float(np.median(lines.noise)) for lines in found]
+    return found[int(noise[1] < threshold.LESS_NOISE * noise[0])]
+
+
+def _mean_of_periods(rows_u: FloatArray, rows_y: FloatArray, rate: float) -> _Lines:
+    """Of level periods [periods, samples]."""
+    count, period = rows_u.shape
     dropped = transient_periods(rows_u, rows_y)
-    # A drift between the periods is no motion of the axis at its lines.
-    spectra_u, spectra_y = (_spectra(rows[dropped:]) for rows in (rows_u, rows_y))
+    spectra_u, spectra_y = (np.fft.rfft(rows[dropped:], axis=1) for rows in (rows_u, rows_y))
     mean_u, mean_y = spectra_u.mean(axis=0), spectra_y.mean(axis=0)
     used = count - dropped
     deviation = np.std(spectra_u, axis=0, ddof=1) / np.sqrt(used)
@@ -162,40 +218,67 @@ def _by_periods(u: FloatArray, y: FloatArray, rate: float, period: int) -> _Line
     g = mean_y[lines] / mean_u[lines]
     error = spectra_y[:, lines] - g * spectra_u[:, lines]
     variance = np.sum(np.abs(error) ** 2, axis=0) / max(used - 1, 1) / used
+    variance = variance * _alike_periods(error)
     relative = np.sqrt(neighbour_mean(variance / np.abs(mean_y[lines]) ** 2, 2) / 2.0)
     return _Lines(
         lines * (rate / period), np.asarray(g), np.ones(lines.size), np.asarray(relative),
-        period / rate, used, dropped, _on_empty(mean_u, mean_y, lines, g),
+        period / rate, used, dropped, _on_empty(mean_u, mean_y, lines, g, rate / period),
     )  # fmt: skip
 
 
-def _spectra(rows: FloatArray) -> ComplexArray:
+def _alike_periods(error: ComplexArray) -> FloatArray:
+    """Factor [lines] on the variance of a mean, from errors [periods, lines] of zero mean.
+
+    What changes slowly from period to period (the samples of a recorder whose clock is not the
+    drive's, warm-up) makes errors that resemble their predecessors, so that the periods count as
+    fewer: (1 + r)/(1 - r) with the correlation r of neighbours (Bayley & Hammersley, 1946).
+    """
+    count = error.shape[0]
+    if count < threshold.FEWEST_ALIKE:
+        return np.ones(error.shape[1])
+    power = neighbour_mean(np.sum(np.abs(error) ** 2, axis=0), threshold.POOL_EMPTY)
+    products = np.sum((error[1:] * error[:-1].conj()).real, axis=0)
+    # Errors without correlation have -1/n about their own mean.
+    r = neighbour_mean(products, threshold.POOL_EMPTY) / np.maximum(power, 1e-300) + 1.0 / count
+    r = np.clip(r, 0.0, 1.0 - 2.0 / (count + 1))
+    return np.asarray((1.0 + r) / (1.0 - r))
+
+
+def _common_slope(x: FloatArray, period: int) -> FloatArray:
+    """Change over a period [periods], the same for all: a drift, and not the signal itself."""
+    means = x.reshape(-1, period).mean(axis=1)
+    return np.full(means.size, np.polyfit(np.arange(means.size), means, 1)[0])
+
+
+def _slope_of_each(x: FloatArray, period: int) -> FloatArray:
+    """Change over each period [periods], by samples a period apart about its beginning.
+
+    What repeats itself cancels in their difference; a straight line between both ends keeps the
+    rest from leaking into all lines.
+    """
+    apart = x[period:] - x[:-period]
+    width = max(period // threshold.ENDS, 1)
+    first = np.arange(x.size // period) * period - width // 2
+    first = np.clip(first, 0, apart.size - width)
+    sums = np.concatenate([[0.0], np.cumsum(apart)])
+    return np.asarray((sums[first + width] - sums[first]) / width)
+
+
+def _level(rows: FloatArray, slopes: FloatArray) -> FloatArray:
+    """Periods [periods, samples] without their mean and slope."""
     steps = np.linspace(-0.5, 0.5, rows.shape[1], endpoint=False)
-    drift = rows[:, -1] - rows[:, 0]
-    slope = np.median(drift) if rows.shape[0] > 1 else 0.0
-    # Only what all periods share, and only where it is a drift and not the signal itself.
-    means = rows.mean(axis=1)
-    slope = float(np.polyfit(np.arange(means.size), means, 1)[0]) if means.size > 1 else slope
-    level = rows - means[:, None] - slope * steps
-    return np.asarray(np.fft.rfft(level, axis=1))
+    return np.asarray(rows - rows.mean(axis=1)[:, None] - slopes[:, None] * steps)
 
 
 def _on_empty(
-    mean_u: ComplexArray, mean_y: ComplexArray, lines: np.ndarray, g: ComplexArray
-) -> tuple[float | None, float | None]:
-    """Motion on empty bins between the lines relative to that on lines around, even and odd."""
+    mean_u: ComplexArray, mean_y: ComplexArray, lines: np.ndarray, g: ComplexArray, step_hz: float
+) -> EmptyLines:
+    """Motion on the empty bins between the lines relative to that on lines around."""
     empty = np.setdiff1d(np.arange(lines[0], lines[-1] + 1), lines)
-    found: list[float | None] = []
-    for parity in (0, 1):
-        bins = empty[empty % 2 == parity]
-        if bins.size < threshold.FEWEST_EMPTY:
-            found.append(None)
-            continue
-        near = np.asarray(np.interp(bins, lines, g.real) + 1j * np.interp(bins, lines, g.imag))
-        around = np.interp(bins, lines, np.abs(mean_y[lines]))
-        left = np.abs(mean_y[bins] - near * mean_u[bins]) / around
-        found.append(float(np.sqrt(np.mean(left**2))))
-    return found[0], found[1]
+    near = np.asarray(np.interp(empty, lines, g.real) + 1j * np.interp(empty, lines, g.imag))
+    around = np.interp(empty, lines, np.abs(mean_y[lines]))
+    left = np.abs(mean_y[empty] - near * mean_u[empty]) / around
+    return EmptyLines(empty * step_hz, empty.astype(np.int64), np.asarray(left**2))
 
 
 def _by_window(u: FloatArray, y: FloatArray, rate: float) -> _Lines:
@@ -231,11 +314,12 @@ def _with_band(lines: _Lines) -> ForeignResponse:
     if fit is None:
         left = np.asarray(np.log(np.abs(g)) + 1j * np.unwrap(np.angle(g)))
     scatter = line_scatter(left, lines.noise)
-    known = [e for e in lines.empty if e is not None]
-    if known:
-        # What lies on the empty lines lies on the excited ones, too.
-        scatter = np.maximum(scatter, max(known) / np.sqrt(2.0))
+    if lines.empty is not None:
+        # What lies on the empty lines lies on the excited ones near them, too.
+        scatter = np.maximum(scatter, lines.empty.scatter_at(f))
     band = repeat_band(f, scatter, fit.model if fit is not None else None, modes)
+    if not lines.independent:
+        band = _with_feedback(band, lines.coherence)
     coherence = lines.coherence
     if lines.independent:
         # What one run's line is made of: the linear part against noise and distortion.
@@ -244,7 +328,23 @@ def _with_band(lines: _Lines) -> ForeignResponse:
         f, g, np.asarray(coherence), lines.noise,
         np.sqrt(np.maximum(scatter**2 - lines.noise**2, 0.0)), band, fit, modes, "noise",
         "local polynomial", lines.period_s, lines.used, lines.dropped, _band_hz(f, coherence),
-        0.0, lines.empty,
+        0.0, lines.empty.sizes() if lines.empty is not None else (None, None),
+    )  # fmt: skip
+
+
+def _with_feedback(band: RepeatBand, coherence: FloatArray) -> RepeatBand:
+    """With what a controller may have put into an input that does not repeat itself.
+
+    Where the input holds the answer to the output's noise v, cross spectra give G·(1 - T·x) with
+    the closed loop's T and the share x of noise to caused output (Söderström & Stoica, *System
+    Identification*, 1989, section 10.3). One record does not show whether a loop was closed.
+    """
+    seen = neighbour_mean(coherence, threshold.POOL_EMPTY)
+    noise = np.minimum(1.0 / np.maximum(seen, 1e-3) - 1.0, threshold.MOST_FEEDBACK)
+    own = threshold.FEEDBACK * noise
+    return replace(
+        band, real=np.hypot(band.real, own), imag=np.hypot(band.imag, own),
+        level=np.hypot(band.level, own),
     )  # fmt: skip
 
 
