@@ -66,6 +66,7 @@ station_no-port = { $profile_title } has no { $kind } port
     .remedy = choose one of its links
 station_no-port-must-drive = a { $profile_title } has no { $kind } port: the drive belongs to another family
     .remedy = choose a profile of drives with { $kind }
+station_no-status-word = { $drive }: the status word could not be read
 station_no-virtual-drive = no virtual drive is on { $url } at station { $station }
     .remedy = choose an axis of the demo bench
 station_not-open = { $value } is not open

@@ -66,6 +66,7 @@ station_no-port = { $profile_title } 没有 { $kind } 端口
     .remedy = 请选择其链路之一
 station_no-port-must-drive = { $profile_title } 没有 { $kind } 端口：这一定是其他系列的驱动器
     .remedy = 请选择带 { $kind } 的驱动器配置文件
+station_no-status-word = { $drive }：无法读取状态字
 station_no-virtual-drive = { $url } 的站 { $station } 上没有虚拟驱动器
     .remedy = 请选择演示调试台的轴
 station_not-open = { $value } 未打开

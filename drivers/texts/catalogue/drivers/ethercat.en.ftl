@@ -19,6 +19,7 @@ ethercat_came-bytes-type = { $address } came with { $bytes } bytes, its type { $
 ethercat_cannot-interface-names-letters = { QUOTED($interface) } cannot be an interface: names have 1 to { $name_limit } letters
     .remedy = choose one of the interfaces that the page Connect lists
 ethercat_check-when-silent = power, cable (computer to IN of the first drive) and the interface's name
+ethercat_check-wired = check that the interface is a wired Ethernet one
 ethercat_configure-cyclic-data-first = configure the cyclic data first
     .remedy = start the exchange on the page Connect
 ethercat_cycle-not-possible = a cycle of { NUM($cycle_us, format: "g") } µs is not possible
@@ -157,12 +158,23 @@ ethercat_interface-gone = the interface { $interface } has disappeared
     .remedy = it is opened again automatically once it is back
 ethercat_interface-not-open = the interface { $interface } is not open
 ethercat_interface-not-opened = the interface { $interface } could not be opened ({ $check })
+ethercat_interfaces-there-are = there are: { $names }
 ethercat_link-lost =
     { $cable }: the link was lost { $times ->
         [one] { $times } time
         [255] 255 times or more
        *[other] { $times } times
     }; check plug and cable
+ethercat_mailbox-at-work = the mailbox service is already in use
+ethercat_mailbox-channel = the mailbox channel is wrong
+ethercat_mailbox-header = the mailbox header is invalid
+ethercat_mailbox-length = the mailbox data have a wrong length
+ethercat_mailbox-no-memory = the drive has no memory for the mailbox
+ethercat_mailbox-other = mailbox error { NUM($number, format: "#06x") }
+ethercat_mailbox-protocol = the mailbox protocol is not supported
+ethercat_mailbox-service = the mailbox service is not supported
+ethercat_mailbox-syntax = syntax error in the mailbox header
+ethercat_mailbox-too-short = the mailbox data are too short
 ethercat_message-bytes-between-our = a message of { $length_bytes } bytes between our processes
 ethercat_more-slaves-segment = more than { $max_stations } slaves on one segment
 ethercat_motion-ended = the motion was ended

@@ -19,6 +19,7 @@ ethercat_came-bytes-type = { $address } 收到 { $bytes } 字节，其类型 { $
 ethercat_cannot-interface-names-letters = { QUOTED($interface) } 不能是接口：名称为 1 至 { $name_limit } 个字符
     .remedy = 请选择“连接”页面列出的接口之一
 ethercat_check-when-silent = 电源、电缆（计算机接第一个驱动器的 IN）和网络接口名称
+ethercat_check-wired = 请确认该接口是有线以太网接口
 ethercat_configure-cyclic-data-first = 请先配置循环数据
     .remedy = 请在“连接”页面启动交换
 ethercat_cycle-not-possible = 不能使用 { NUM($cycle_us, format: "g") } µs 的周期
@@ -148,11 +149,22 @@ ethercat_interface-gone = 接口 { $interface } 已断开
     .remedy = 恢复后会自动重新打开
 ethercat_interface-not-open = 接口 { $interface } 未打开
 ethercat_interface-not-opened = 无法打开接口 { $interface }（{ $check }）
+ethercat_interfaces-there-are = 现有接口：{ $names }
 ethercat_link-lost =
     { $cable }：链路中断 { $times ->
         [255] 255 次或更多
        *[other] { $times } 次
     }；请检查插头和电缆
+ethercat_mailbox-at-work = 该邮箱服务已在使用中
+ethercat_mailbox-channel = 邮箱通道错误
+ethercat_mailbox-header = 邮箱头无效
+ethercat_mailbox-length = 邮箱数据长度错误
+ethercat_mailbox-no-memory = 驱动器没有用于邮箱的内存
+ethercat_mailbox-other = 邮箱错误 { NUM($number, format: "#06x") }
+ethercat_mailbox-protocol = 不支持该邮箱协议
+ethercat_mailbox-service = 不支持该邮箱服务
+ethercat_mailbox-syntax = 邮箱头有语法错误
+ethercat_mailbox-too-short = 邮箱数据过短
 ethercat_message-bytes-between-our = 进程间的消息有 { $length_bytes } 字节
 ethercat_more-slaves-segment = 一个网段上超过 { $max_stations } 个从站
 ethercat_motion-ended = 运动已结束
