@@ -381,7 +381,8 @@ class Mailbox:
 
     def _raise_error(self, payload: bytes) -> None:
         code = int.from_bytes(payload[2:4], "little")
-        reason = text(_ERRORS.get(code, "ethercat.mailbox-other"), number=code)
+        known = _ERRORS.get(code)
+        reason = text("ethercat.mailbox-other", number=code) if known is None else text(known)
         raise ProtocolError("ethercat.drive-refused-mail", text=reason)
 
 

@@ -57,6 +57,7 @@ axis_restoring-took-longer-given = { $drive }: restoring took longer than { NUM(
     .remedy = check the axis: mode, torque limit and power state may not be restored
 axis_rev-cannot-reported-eye = { $drive }: { NUM($value, format: "g") } rev is too small to be judged by eye
     .remedy = make a longer small move, until the shaft turns visibly
+axis_signal-not-fit = it does not fit
 axis_stays-not-go = { $drive } stays in “{ $state }” and does not change to “{ $goal }”: { $why }
 axis_still-moves-after-quick = { $drive } still moves { NUM($timeout_s, format: "g") } s after quick stop
     .remedy = use the machine's emergency stop

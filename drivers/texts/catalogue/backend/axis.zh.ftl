@@ -57,6 +57,7 @@ axis_restoring-took-longer-given = { $drive }：恢复超过 { NUM($timeout_s, f
     .remedy = 请检查轴：模式、转矩限值和功率状态可能未恢复
 axis_rev-cannot-reported-eye = { $drive }：{ NUM($value, format: "g") } rev 无法用肉眼判断
     .remedy = 请作更长的小幅运动，直到轴明显转动
+axis_signal-not-fit = 容纳不下
 axis_stays-not-go = { $drive } 停留在“{ $state }”，未进入“{ $goal }”：{ $why }
 axis_still-moves-after-quick = { $drive } 在快速停止 { NUM($timeout_s, format: "g") } s 后仍在运动
     .remedy = 请使用机器的急停

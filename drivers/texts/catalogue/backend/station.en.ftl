@@ -21,6 +21,8 @@ station_cyclic-exchange-just-being = { $url }: the cyclic exchange is just being
 station_cyclic-exchange-runs-already = { $url }: the cyclic exchange runs already
     .remedy = end it first
 station_doctor-knows-not = { $value }: the doctor supports EtherCAT and CANopen only
+station_drive-list-entry-unusable = { $file }, drive { $number }: { $place }: { $cause }
+station_drive-list-not-read = { $file } cannot be read: { $cause }
 station_drive-station-cannot-list = the drive at station { $station } cannot list its own objects: CANopen has no such service, and it carries no EDS (1021h: { $cause })
 station_drive-station-carries-eds = the drive at station { $station } carries its EDS in the maker's own format (1022h = { $packed })
 station_drive-station-not-hold = the drive at station { $station } of { $url } does not hold the settings of { $drive }: { $parameter } { $key } is { $value } there and { $here } here ({ $different_count } of { $shared_count } differ)
@@ -80,6 +82,7 @@ station_partners-of-one-name = { $ids } are all called { QUOTED($value) }
     .remedy = give the identifier of the one that is meant, or rename one
 station_put-back-motion-left = Restore values left by a motion in { $drive_name }
 station_read-anew = Read { $drive_name } anew
+station_setting-changed = { $drive }: { $parameter } is now { $now }
 station_settings-just-being-changed = { $drive }: its settings are just being changed
     .remedy = try again when they have been
 station_shares-cyclic-exchange-moves = { $drive } shares its cyclic exchange with { $other_drive }, which moves

@@ -21,6 +21,8 @@ station_cyclic-exchange-just-being = { $url }：正在更改循环交换
 station_cyclic-exchange-runs-already = { $url }：周期通信已在运行
     .remedy = 请先结束它
 station_doctor-knows-not = { $value }：诊断功能只支持 EtherCAT 和 CANopen
+station_drive-list-entry-unusable = { $file }，第 { $number } 个驱动器：{ $place }：{ $cause }
+station_drive-list-not-read = 无法读取 { $file }：{ $cause }
 station_drive-station-cannot-list = 站 { $station } 的驱动器不能列出自身的对象：CANopen 没有此服务，且它未存储 EDS（1021h：{ $cause }）
 station_drive-station-carries-eds = 站 { $station } 的驱动器以厂家自有格式存储 EDS（1022h = { $packed }）
 station_drive-station-not-hold = { $url } 站 { $station } 的驱动器与 { $drive } 的设置不符：{ $parameter } { $key } 在驱动器中为 { $value }，此处为 { $here }（{ $shared_count } 项中有 { $different_count } 项不同）
@@ -80,6 +82,7 @@ station_partners-of-one-name = { $ids } 的名称都是 { QUOTED($value) }
     .remedy = 请给出所指轴的标识符，或重命名其中一个
 station_put-back-motion-left = 恢复运动在 { $drive_name } 中留下的数值
 station_read-anew = 重新读取 { $drive_name }
+station_setting-changed = { $drive }：{ $parameter } 现为 { $now }
 station_settings-just-being-changed = { $drive }：正在更改其设置
     .remedy = 请在更改完成后重试
 station_shares-cyclic-exchange-moves = { $drive } 与正在运动的 { $other_drive } 共用循环交换
