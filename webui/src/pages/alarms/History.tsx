@@ -98,7 +98,11 @@ function Past({ drive, entry }: { drive: string; entry: PastFaultInfo }) {
     const row = rows.find((each) => each.key === value.key)
     return row ? [{ row, value }] : []
   })
-  const name = entry.name_message ? <Said message={entry.name_message} words={entry.name} /> : say(entry.name)
+  const name = entry.name_message ? (
+    <Said message={entry.name_message} words={entry.name} />
+  ) : (
+    say(entry.name)
+  )
   if (entry.error) {
     return (
       <li>
