@@ -358,7 +358,7 @@ class Cyclic(Protocol):
         """Whether clocks in the drives rule the instant; None: the bus has none."""
 
     @property
-    def left_over(self) -> tuple[tuple[CyclicSignal, str], ...]:
+    def left_over(self) -> tuple[tuple[CyclicSignal, Text], ...]:
         """Signals of the last `configure` that are not exchanged, each with the reason."""
 
     async def configure(

@@ -42,9 +42,9 @@ class GainBlock(Frozen):
 
 
 class HistorySlot(Frozen):
-    """One remembered fault that has parameters of its own."""
+    """One remembered fault that has parameters of its own; ``name`` empty: named by its number."""
 
-    name: str
+    name: str = ""
     code_key: str
     fields: tuple[str, ...] = ()
 

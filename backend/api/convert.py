@@ -61,11 +61,15 @@ def bus(bench: Bench, url: str, link: Link) -> models_bench.Bus:
     if session is not None and session.state is not None:
         info = models_bench.CyclicInfo(
             running=session.running,
-            problem="" if session.trouble is None else session.trouble.words(language()),
+            problem=words_of(session.trouble),
+            problem_message=message_or_none(session.trouble),
             cycle_us=session.state.cycle_s * 1e6,
             dc=session.state.dc,
             channels=list(session.state.channels),
-            left_over=dict(session.state.left_over),
+            left_over={channel: words_of(why) for channel, why in session.state.left_over},
+            left_over_messages={
+                channel: message_of(why) for channel, why in session.state.left_over
+            },
         )
     return models_bench.Bus(
         url=url,

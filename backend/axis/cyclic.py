@@ -22,7 +22,7 @@ from drivers.link import (
     ScopeBlock,
     Unsubscribe,
 )
-from drivers.texts.message import Text
+from drivers.texts.message import Text, text
 
 #: Signals mapped as far as they fit, the important ones first.
 INPUT_ROLES = (
@@ -47,7 +47,7 @@ class CyclicState:
     cycle_s: float
     dc: bool | None
     channels: tuple[str, ...]
-    left_over: tuple[tuple[str, str], ...]
+    left_over: tuple[tuple[str, Text], ...]
 
 
 class CyclicSession:
@@ -101,7 +101,7 @@ class CyclicSession:
             cycle_s=cycle_s,
             dc=self.cyclic.dc,
             channels=tuple(signal.channel for signal in mapped),
-            left_over=tuple((c, reasons.get(c, "does not fit")) for c in sorted(left)),
+            left_over=tuple((c, reasons.get(c, text("axis.signal-not-fit"))) for c in sorted(left)),
         )
         return self.state
 

@@ -11,20 +11,25 @@ from backend.drive.drive import Drive
 from backend.drive.faults import integer
 from backend.drive.readings import Reading
 from drivers.errors import NotAllowed
+from drivers.texts.message import Text, prose, text
 from profiles.functions import FaultHistory, HistorySlot
 from profiles.schema import Fault
 
 
 @dataclass(frozen=True, slots=True)
 class PastFault:
-    """One remembered fault. ``fault`` is None where the code is not in the profile."""
+    """One remembered fault. ``fault`` is None where the code is not in the profile.
 
-    name: str
+    ``name`` states which record it is: words of the profile, or a message with its number.
+    """
+
+    name: Text
     code: int | None
     code_text: str
     fault: Fault | None
     values: tuple[Reading, ...]
-    error: str = ""
+    problem: Text | None = None
+    """Why the record could not be read."""
 
 
 def history_of(drive: Drive) -> FaultHistory | None:
@@ -55,7 +60,10 @@ async def read_history(axis: Axis) -> list[PastFault]:
 async def _slots(drive: Drive, history: FaultHistory) -> list[PastFault]:
     keys = [key for slot in history.slots for key in (slot.code_key, *slot.fields)]
     readings = await drive.read_many(dict.fromkeys(keys))
-    found = [_past(drive.profile.faults, history, slot, readings) for slot in history.slots]
+    found = [
+        _past(drive.profile.faults, history, slot, readings, _name(slot, number))
+        for number, slot in enumerate(history.slots, start=1)
+    ]
     return [each for each in found if each is not None]
 
 
@@ -72,11 +80,17 @@ async def _selected(axis: Axis, history: FaultHistory) -> list[PastFault]:
                     "axis.record-cannot-selected", drive=drive.name, parameter=select, value=number
                 )
             readings = await drive.read_many((code, *history.fields))
-            slot = HistorySlot(name=f"record {number}", code_key=code, fields=history.fields)
-            past = _past(drive.profile.faults, history, slot, readings)
+            slot = HistorySlot(code_key=code, fields=history.fields)
+            name = _name(slot, number)
+            past = _past(drive.profile.faults, history, slot, readings, name)
             if past is not None:
                 found.append(past)
     return found
+
+
+def _name(slot: HistorySlot, number: int) -> Text:
+    """The name that the profile has for this record, else its number."""
+    return prose(slot.name) if slot.name else text("axis.record", number=number)
 
 
 def _past(
@@ -84,17 +98,19 @@ def _past(
     history: FaultHistory,
     slot: HistorySlot,
     readings: dict[str, Reading],
+    name: Text,
 ) -> PastFault | None:
     """One record, or None for an empty one."""
     reading = readings[slot.code_key]
     code = integer(reading)
     if code is None:
-        return PastFault(slot.name, None, "", None, (), reading.error or "it could not be read")
+        problem = reading.problem or text("axis.record-not-read")
+        return PastFault(name, None, "", None, (), problem)
     if code in history.empty_codes:
         return None
     fault = named_fault(faults, history, code)
-    text = fault.code if fault else _code_text(history, code)
-    return PastFault(slot.name, code, text, fault, tuple(readings[key] for key in slot.fields))
+    shown = fault.code if fault else _code_text(history, code)
+    return PastFault(name, code, shown, fault, tuple(readings[key] for key in slot.fields))
 
 
 def named_fault(faults: Sequence[Fault], history: FaultHistory, code: int) -> Fault | None:

@@ -10,7 +10,7 @@ from contextlib import asynccontextmanager
 from backend.drive.drive import Drive
 from backend.drive.identity import confirm_identity
 from drivers.errors import DriveError, LinkTimeout
-from drivers.texts.message import joined, parts_of
+from drivers.texts.message import Text, joined, parts_of, text
 from profiles.schema import Raw
 
 #: Deadline of a cleanup.
@@ -53,7 +53,7 @@ async def _put_back(drive: Drive, before: dict[str, Raw], earlier: BaseException
     except DriveError as error:
         if not isinstance(error, RestoreFailed):
             was = {key: drive.pending_restores.original(key, raw) for key, raw in before.items()}
-            values = ", ".join(f"{key} (was {raw})" for key, raw in was.items())
+            values = joined((value_before(key, raw) for key, raw in was.items()), ", ")
             error = RestoreFailed(
                 "axis.perhaps-not-restored", drive=name, values=values, cause=error.text
             )
@@ -62,7 +62,7 @@ async def _put_back(drive: Drive, before: dict[str, Raw], earlier: BaseException
 
 
 async def _restore(drive: Drive, before: dict[str, Raw]) -> None:
-    failed: list[str] = []
+    failed: list[Text] = []
     left = dict(before)
     same = False
     try:
@@ -76,15 +76,24 @@ async def _restore(drive: Drive, before: dict[str, Raw]) -> None:
                     await drive.put_back(key, raw)
                 del left[key]
             except DriveError as error:
-                failed.append(
-                    f"{key} (was {drive.pending_restores.original(key, raw)}): {error.message}"
-                )
+                failed.append(not_restored(drive, key, raw, error))
     finally:
         drive.pending_restores.add(left)
     if failed:
         raise RestoreFailed(
-            "axis.not-restored-running-server", drive=drive.name, failed="; ".join(failed)
+            "axis.not-restored-running-server", drive=drive.name, failed=joined(failed)
         )
+
+
+def value_before(key: str, raw: Raw) -> Text:
+    """A parameter with the raw value that it had."""
+    return text("axis.value-before", parameter=key, before=raw)
+
+
+def not_restored(drive: Drive, key: str, raw: Raw, cause: DriveError) -> Text:
+    """One parameter that was not restored: what it was at first, and why."""
+    before = drive.pending_restores.original(key, raw)
+    return text("axis.parameter-not-restored", parameter=key, before=before, cause=cause.text)
 
 
 def _put_first_error_first(earlier: BaseException | None, late: DriveError) -> None:

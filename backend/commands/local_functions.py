@@ -12,6 +12,7 @@ from backend.drive.faults import read_active_faults
 from backend.drive.terminals import read_terminals
 from backend.functions import gear as gears
 from backend.scales.gear_calculator import Mechanics
+from drivers.texts.message import language
 
 
 async def terminals(place: Place) -> list[Terminal]:
@@ -44,8 +45,10 @@ async def faults(place: Place) -> Faults:
         ],
         [
             Past(
-                entry.name, entry.code_text, entry.fault.name if entry.fault else None,
-                {reading.key: reading.value for reading in entry.values}, entry.error,
+                entry.name.words(language()), entry.code_text,
+                entry.fault.name if entry.fault else None,
+                {reading.key: reading.value for reading in entry.values},
+                "" if entry.problem is None else entry.problem.words(language()),
             )
             for entry in past
         ],

@@ -50,7 +50,7 @@ def _error_field(profile: Profile) -> FaultHistory | None:
     return FaultHistory(
         kind="slots",
         size=len(keys),
-        slots=tuple(HistorySlot(name=f"entry {n}", code_key=k) for n, k in enumerate(keys, 1)),
+        slots=tuple(HistorySlot(code_key=key) for key in keys),
         source="CiA 301, 1003h",
     )
 

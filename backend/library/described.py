@@ -13,6 +13,7 @@ from backend.library.index import Described, Folder
 from backend.recording.chunks import SUFFIX as RECORDING
 from backend.recording.library import RecordingLibrary
 from backend.recording.reader import RecordingReader
+from drivers.texts.answers import sentence
 
 _REPORT = re.compile(r"^\d{8}-\d{6}-report-(?P<axis>.+?)(-\d+)?\.\w+$")
 
@@ -47,7 +48,7 @@ def _recording(library: RecordingLibrary, path: Path) -> Described:
     stored = library.describe(path.name)
     tags, notes = stored.remarks.tags, stored.remarks.notes
     if stored.summary is None:
-        return Described(Addition(facts={"problem": stored.problem}), notes, tags)
+        return Described(Addition(facts=sentence("problem", stored.problem)), notes, tags)
     header = stored.summary.header
     axes = [axis for axis in header.get("axes", []) if isinstance(axis, dict)]
     return Described(

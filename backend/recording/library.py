@@ -13,6 +13,7 @@ from backend.recording.chunks import SUFFIX
 from backend.recording.reader import BadRecording, RecordingReader, Summary
 from backend.store.files import checked_name, write_atomically
 from drivers.errors import NotAllowed
+from drivers.texts.message import Text
 
 _NOTES = ".json"
 EXPORTS = {"csv": ".csv", "csv_raw": ".raw.csv", "rrd": ".rrd", "mcap": ".mcap"}
@@ -45,7 +46,7 @@ class Stored:
     modified: float
     bytes: int
     exports: tuple[str, ...]
-    problem: str = ""
+    problem: Text | None = None
 
     def words(self) -> str:
         """Everything that a search looks through, in lower case."""
@@ -66,7 +67,7 @@ class RecordingLibrary:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.retention = self._read_retention()
-        self._seen: dict[str, tuple[tuple[int, int], Summary | None, str]] = {}
+        self._seen: dict[str, tuple[tuple[int, int], Summary | None, Text | None]] = {}
 
     # --- names ------------------------------------------------------------------------
 
@@ -138,9 +139,9 @@ class RecordingLibrary:
         if seen is None or seen[0] != stamp:
             try:
                 with RecordingReader(path) as reader:
-                    seen = (stamp, reader.summary(), "")
+                    seen = (stamp, reader.summary(), None)
             except BadRecording as error:
-                seen = (stamp, None, error.message)
+                seen = (stamp, None, error.text)
             self._seen[path.name] = seen
         exports = tuple(kind for kind in EXPORTS if self.export_path(path.name, kind).is_file())
         return Stored(

@@ -11,6 +11,8 @@ from typing import Any, BinaryIO, Literal
 from backend.recording import chunks
 from backend.recording.chunks import Samples
 from drivers.errors import NotAllowed
+from drivers.texts.answers import message_in, sentence
+from drivers.texts.message import Text, text
 
 
 class BadRecording(NotAllowed):
@@ -70,7 +72,7 @@ class Summary:
     channels: tuple[Channel, ...]
     state: Literal["complete", "interrupted", "failed"]
     reason: str
-    problem: str
+    problem: Text | None
     samples: int
     lost: int
     first_s: float | None
@@ -216,7 +218,9 @@ class RecordingReader:
         """What it holds; of an interrupted file the samples are counted."""
         end = self._end()
         scan = None if end is not None else self._scan()
-        facts = end or {"reason": "interrupted", "problem": "it was cut off: a crash or full disk"}
+        facts: dict[str, Any] = end or {"reason": "interrupted"} | sentence(
+            "problem", text("recording.cut-off")
+        )
         reason = str(facts.get("reason", ""))
         state: Literal["complete", "interrupted", "failed"] = "complete"
         if end is None:
@@ -229,7 +233,7 @@ class RecordingReader:
             channels=self.channels,
             state=state,
             reason=reason,
-            problem=str(facts.get("problem", "")),
+            problem=message_in(facts, "problem"),
             samples=scan.samples if scan else int(facts.get("samples", 0)),
             lost=scan.lost if scan else int(facts.get("lost", 0)),
             first_s=scan.first_s if scan else facts.get("first_s"),

@@ -21,6 +21,7 @@ from backend.store.free_space import RESERVE_BYTES, free_bytes
 from drivers.computer.files import write_parts
 from drivers.link import ScopeBlock
 from drivers.texts import limits
+from drivers.texts.answers import sentence
 
 #: Blocks that may wait for the disk. At 16 channels × 4 kHz it holds two minutes.
 MAX_QUEUED_BYTES = 64 * 1024 * 1024
@@ -243,7 +244,7 @@ class RecordingWriter:
         try:
             os.ftruncate(self._file.fileno(), self._good)
             os.lseek(self._file.fileno(), self._good, os.SEEK_SET)
-            self._end({"reason": "failed", "problem": error.message})
+            self._end({"reason": "failed"} | sentence("problem", error.text))
         except OSError:
             # A full disk takes no end chunk either, and one that is gone takes nothing: the
             # reader does without, and finds the last whole chunk by itself.

@@ -39,7 +39,7 @@ from backend.work.jobs import Job, JobRunner
 from backend.work.journal import Journal, Level
 from drivers.errors import Busy, DriveError, NotAllowed, why_of
 from drivers.link import Found, Link
-from drivers.texts.message import Text, prose, text
+from drivers.texts.message import Text, text
 from profiles.loader import ProfileError
 
 log = logging.getLogger(__name__)
@@ -383,7 +383,7 @@ class Bench:
         await self.records.open()
         saved, problems = self._list.load()
         for problem in problems:
-            self.journal.add(prose(problem), level="error")
+            self.journal.add(problem, level="error")
         for item in saved:
             try:
                 first, *others = item.ports

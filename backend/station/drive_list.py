@@ -10,6 +10,7 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from backend.store.files import write_atomically
+from drivers.texts.message import Text, prose, text
 
 VERSION = 1
 
@@ -49,25 +50,34 @@ class DriveList:
     def store(self, drives: Iterable[SavedDrive]) -> None:
         """Replace the file, whole or not at all."""
         content = {"version": VERSION, "drives": [asdict(drive) for drive in drives]}
-        text = json.dumps(content, indent=2, ensure_ascii=False)
-        write_atomically(self._path, text.encode())
+        written = json.dumps(content, indent=2, ensure_ascii=False)
+        write_atomically(self._path, written.encode())
 
-    def load(self) -> tuple[list[SavedDrive], list[str]]:
-        """The drives, and a sentence for each entry that is of no use; nothing where no file is."""
+    def load(self) -> tuple[list[SavedDrive], list[Text]]:
+        """The drives, and a message for each entry that is of no use; nothing where no file is."""
         try:
             content = json.loads(self._path.read_text("utf-8"))
             entries = content["drives"]
         except FileNotFoundError:
             return [], []
         except (OSError, ValueError, KeyError, TypeError) as error:
-            return [], [f"{self._path.name} cannot be read: {error}"]
+            cause = prose(str(error))
+            return [], [text("station.drive-list-not-read", file=self._path.name, cause=cause)]
         drives: list[SavedDrive] = []
-        problems: list[str] = []
+        problems: list[Text] = []
         for number, entry in enumerate(entries if isinstance(entries, list) else [], start=1):
             try:
                 drives.append(_DRIVE.validate_python(entry))
             except ValidationError as error:
                 first = error.errors()[0]
                 place = ".".join(str(part) for part in first["loc"])
-                problems.append(f"{self._path.name}, drive {number}: {place}: {first['msg']}")
+                problems.append(
+                    text(
+                        "station.drive-list-entry-unusable",
+                        file=self._path.name,
+                        number=number,
+                        place=place,
+                        cause=prose(first["msg"]),
+                    )
+                )
         return drives, problems

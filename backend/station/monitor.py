@@ -253,7 +253,7 @@ class Monitor:
         drive = self.axis.drive
         status = self._last[drive.require("status_word")]
         if not isinstance(status.raw, int):
-            raise DriveError(status.error or "the status word could not be read", drive=drive.name)
+            raise DriveError(status.problem or "station.no-status-word", drive=drive.name)
         return drive.decode_state(status.raw)
 
     async def _snapshot(self) -> Snapshot:

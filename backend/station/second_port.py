@@ -72,7 +72,7 @@ async def require_same_drive(drive: Drive, other: Port) -> None:
             drive=drive.name,
             station=other.station,
             url=other.link.url,
-            error=next(iter(theirs.values())).error,
+            error=next(iter(theirs.values())).problem,
         )
     ours = await drive.read_many([p.key for p in shared])
     different = [

@@ -61,7 +61,7 @@ class CanopenCyclic:
         self.load: BusLoad | None = None
         self._fixed_pdos: dict[int, tuple[FixedPdo, ...]] = {}
         self.dc = None
-        self.left_over: tuple[tuple[CyclicSignal, str], ...] = ()
+        self.left_over: tuple[tuple[CyclicSignal, Text], ...] = ()
         """Signals of the last `configure` that are not exchanged, and why."""
         self.unguarded: frozenset[int] = frozenset()
         """Stations with outputs whose drive offers no watchdog (1016h) against our silence."""
@@ -156,7 +156,7 @@ class CanopenCyclic:
         planned = plan_within_load(
             inputs, cyclic, cycle_s, self._settings.bitrate, self._fixed_pdos
         )
-        why = "the drive has no cyclic mode: it is commanded by SDO"
+        why = text("canopen.commanded-by-sdo")
         self.left_over = (*planned.left_over, *((s, why) for s in by_sdo))
         if not planned.pdos:
             raise NotAllowed("canopen.none-signals-travel-pdo")

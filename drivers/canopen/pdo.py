@@ -16,6 +16,7 @@ from drivers.canopen.fixed_pdo import FixedPdo, chosen
 from drivers.canopen.frames import RPDO, TPDO
 from drivers.codec import size_of
 from drivers.link import CyclicSignal
+from drivers.texts.message import Text, text
 
 MAX_ENTRIES = 4
 """Entries per PDO that every drive takes: DS_C has only subindices 1 to 4 (003:432-475)."""
@@ -116,7 +117,7 @@ class LoadedPlan:
     """PDOs within the bus load, the signals left out with the reason, and the load."""
 
     pdos: tuple[PdoPlan, ...]
-    left_over: tuple[tuple[CyclicSignal, str], ...]
+    left_over: tuple[tuple[CyclicSignal, Text], ...]
     load: BusLoad | None
 
 
@@ -140,7 +141,7 @@ def plan_within_load(
         NotAllowed: even those need more than 80 % of the bus.
     """
     kept_in, kept_out = list(inputs), list(outputs)
-    dropped: list[tuple[CyclicSignal, str]] = []
+    dropped: list[tuple[CyclicSignal, Text]] = []
     while True:
         pdos, left = plan(kept_in, kept_out, fixed)
         sizes = [p.size for p in pdos]
@@ -155,9 +156,9 @@ def plan_within_load(
             if rank < 0:
                 require_room(sizes, cycle_s, bitrate)
             owner.remove(least)
-            dropped.append((least, f"the bus would be more than {LIMIT:.0%} full"))
+            dropped.append((least, text("canopen.bus-would-be-full", percent=round(LIMIT * 100))))
             continue
-        unfit = tuple((s, "it does not fit into the drive's PDOs") for s in left)
+        unfit = tuple((s, text("canopen.not-fit-pdos")) for s in left)
         return LoadedPlan(pdos, (*unfit, *dropped), load)
 
 

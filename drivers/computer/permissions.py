@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.computer.sockets import interface_flags, require_ethercat
+from drivers.texts.message import Text, joined, text
 
 NEEDED = {"CAP_NET_RAW": 13, "CAP_NET_ADMIN": 12}
 USEFUL = {"CAP_SYS_NICE": 23, "CAP_IPC_LOCK": 14}
@@ -34,18 +35,20 @@ class Permissions:
         """Whether EtherCAT can be opened on this interface."""
         return self.exists and self.up and not self.missing
 
-    def words(self) -> str:
-        """What is missing, in one sentence for the user."""
+    @property
+    def text(self) -> Text:
+        """What is missing, as one message for the user."""
         if not self.exists:
-            return f"there is no network interface {self.interface!r} on this computer"
+            return text("computer.no-interface", interface=self.interface)
         parts = []
-        if self.missing:
-            parts.append(
-                f"{' and '.join(self.missing)} {'is' if len(self.missing) == 1 else 'are'} missing"
-            )
+        if len(self.missing) == len(NEEDED):
+            first, second = self.missing
+            parts.append(text("computer.capabilities-missing", first=first, second=second))
+        else:
+            parts += [text("computer.capability-missing", name=name) for name in self.missing]
         if not self.up:
-            parts.append(f"the interface {self.interface} is switched off")
-        return "; ".join(parts) or "everything needed is granted"
+            parts.append(text("computer.interface-off", interface=self.interface))
+        return joined(parts) if parts else text("computer.everything-granted")
 
 
 def check(interface: str, *, status: str | None = None, python: str | None = None) -> Permissions:
@@ -59,8 +62,8 @@ def check(interface: str, *, status: str | None = None, python: str | None = Non
     """
     if status is None and sys.platform != "linux":
         require_ethercat(interface)
-    text = Path("/proc/self/status").read_text("ascii") if status is None else status
-    held = _effective(text)
+    read = Path("/proc/self/status").read_text("ascii") if status is None else status
+    held = _effective(read)
     missing = tuple(name for name, bit in NEEDED.items() if not held >> bit & 1)
     advised = tuple(name for name, bit in USEFUL.items() if not held >> bit & 1)
     exists = interface in {name for _, name in socket.if_nameindex()}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from drivers.texts.message import Language, Text
+from drivers.texts.message import Language, Text, prose
 
 _ONE, _SEVERAL = "_message", "_messages"
 
@@ -32,6 +32,14 @@ def sentence(name: str, message: Text | None) -> dict[str, object]:
         name: "" if message is None else message.words(),
         f"{name}{_ONE}": None if message is None else message.to_wire(),
     }
+
+
+def message_in(answer: Mapping[str, object], name: str) -> Text | None:
+    """What `sentence` put under this name; the words alone where an older version wrote them."""
+    wire, words = answer.get(f"{name}{_ONE}"), answer.get(name)
+    if isinstance(wire, Mapping) and "code" in wire and "params" in wire:
+        return Text.from_wire(wire)
+    return prose(str(words)) if words else None
 
 
 def in_language(answer: Mapping[str, object], language: Language) -> dict[str, object]:

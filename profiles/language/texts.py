@@ -117,7 +117,7 @@ def _page_texts(functions: Functions) -> Iterator[str]:
         yield block.help
     if (history := functions.history) is not None:
         yield history.notes
-        yield from (slot.name for slot in history.slots)
+        yield from (slot.name for slot in history.slots if slot.name)
     yield functions.terminals.notes
     if functions.probe is not None:
         yield functions.probe.notes

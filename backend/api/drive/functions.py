@@ -105,7 +105,8 @@ def _history(
 def _past(past: PastFault) -> PastFaultInfo:
     fault = past.fault
     return PastFaultInfo(
-        name=past.name,
+        name=words_of(past.name),
+        name_message=message_of(past.name) if past.name.code else None,
         code=past.code_text,
         known=fault is not None,
         title=fault.name if fault else "",
@@ -115,7 +116,8 @@ def _past(past: PastFault) -> PastFaultInfo:
         reset=fault.reset if fault else "",
         # Frozen in the drive: a later read of the same selector would show another record.
         values=[_frozen(reading) for reading in past.values],
-        error=past.error,
+        error=words_of(past.problem),
+        error_message=message_or_none(past.problem),
     )
 
 

@@ -18,6 +18,9 @@ class PastFaultInfo(Message):
     """One fault that the drive remembers, with what it froze."""
 
     name: str = Field(description="which record: last fault, record 3 …")
+    name_message: MessageInfo | None = Field(
+        default=None, description="of name; None where the profile names the record"
+    )
     code: str
     known: bool = Field(description="False where the profile has no such fault")
     title: str
@@ -27,6 +30,7 @@ class PastFaultInfo(Message):
     reset: str
     values: list[ParameterValue]
     error: str = ""
+    error_message: MessageInfo | None = Field(default=None, description="of error")
 
 
 class FaultHistoryInfo(Message):

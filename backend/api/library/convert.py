@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from backend.api.errors import message_or_none
 from backend.api.library.models import (
     AxisInfo,
     LibraryEntry,
@@ -13,6 +14,8 @@ from backend.api.library.models import (
 )
 from backend.library.entries import AxisIdentity, Entry, Version
 from backend.library.three_way import Triple
+from drivers.texts.answers import in_language, message_in
+from drivers.texts.message import language
 from profiles.schema import Parameter, Raw
 
 #: Kept for searching and for the index; nothing for people.
@@ -50,7 +53,8 @@ def version(known: Version) -> VersionInfo:
         bytes=known.bytes,
         sha256=known.sha256,
         axis=axis(known.axis),
-        facts=_facts(known.facts),
+        facts=_facts(in_language(known.facts, language())),
+        problem_message=message_or_none(message_in(known.facts, "problem")),
     )
 
 

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from backend.api.models import Message, Raw
 from backend.api.sets.models import SetFileInfo
+from backend.tools.wire_message import MessageInfo
 
 LibraryKind = Literal["set", "recording", "measurement", "report"]
 TagText = Annotated[str, Field(min_length=1, max_length=60)]
@@ -38,6 +39,9 @@ class VersionInfo(Message):
     axis: AxisInfo
     facts: dict[str, int | float | str | bool | None] = Field(
         description="what a list shows of this kind: parameters, channels, duration_s …"
+    )
+    problem_message: MessageInfo | None = Field(
+        default=None, description="of facts.problem: why the file cannot be used"
     )
 
 

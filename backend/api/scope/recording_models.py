@@ -8,6 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from backend.api.models import Message
+from backend.tools.wire_message import MessageInfo
 
 ExportKind = Literal["csv", "csv_raw", "rrd", "mcap"]
 
@@ -86,6 +87,7 @@ class RecordingInfo(Message):
     exports: list[ExportKind]
     reason: str = Field(description="why it ended")
     problem: str
+    problem_message: MessageInfo | None = Field(default=None, description="of problem")
 
 
 class RecordingList(Message):

@@ -11,7 +11,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.responses import FileResponse
 
 from backend.api import convert
-from backend.api.errors import NotFound
+from backend.api.errors import NotFound, message_or_none, words_of
 from backend.api.models import JobInfo
 from backend.api.scope.recording_models import (
     ArmRequest,
@@ -85,6 +85,7 @@ def _stored(stored: Stored) -> RecordingInfo:
     summary = stored.summary
     header: dict[str, Any] = summary.header if summary else {}
     remarks = stored.remarks
+    problem = stored.problem or (summary.problem if summary else None)
     own_tags = [str(tag) for tag in header.get("tags", [])]
     return RecordingInfo(
         name=stored.name,
@@ -114,7 +115,8 @@ def _stored(stored: Stored) -> RecordingInfo:
         bytes=stored.bytes,
         exports=[kind for kind in get_args(ExportKind) if kind in stored.exports],
         reason=summary.reason if summary else "",
-        problem=stored.problem or (summary.problem if summary else ""),
+        problem=words_of(problem),
+        problem_message=message_or_none(problem),
     )
 
 
@@ -158,7 +160,8 @@ def _running(recordings: Recordings, recorder: Recorder) -> RecordingInfo:
         bytes=written.bytes,
         exports=[],
         reason="",
-        problem=recorder.problem,
+        problem=words_of(recorder.problem),
+        problem_message=message_or_none(recorder.problem),
     )
 
 

@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from backend.api import convert
 from backend.api.context import Connection, Controlled, TheBench
-from backend.api.errors import NotFound, message_of, words_of
+from backend.api.errors import NotFound, message_of, message_or_none, words_of
 from backend.api.models import JobInfo
 from backend.api.station.models_ethercat import (
     AliasRequest,
@@ -58,11 +58,12 @@ async def ethercat_segment(bench: TheBench, url: Annotated[str, Query()]) -> Eth
     Answers as well while the segment cannot be asked; ``problem`` then states the reason.
     """
     link = opened_segment(bench, url)
-    survey, problem = Survey((), ()), ""
+    survey: Survey = Survey((), ())
+    problem: Text | None = None
     try:
         survey = await link.survey()
     except DriveError as error:
-        problem = error.message
+        problem = error.text
     quality = link.quality()
     figures = link.exchange
     report = None if link.private_network else _permissions(link.permissions())
@@ -70,7 +71,8 @@ async def ethercat_segment(bench: TheBench, url: Annotated[str, Query()]) -> Eth
         url=url,
         connected=quality.connected,
         state=words_of(quality.state),
-        problem=problem,
+        problem=words_of(problem),
+        problem_message=message_or_none(problem),
         stations=[
             _station(bench, url, seen, survey, clocks=figures is not None and figures.dc)
             for seen in survey.stations
@@ -372,7 +374,8 @@ def _permissions(report: permissions.Permissions) -> EthercatPermissions:
     return EthercatPermissions(
         interface=report.interface,
         ready=report.ready,
-        text=report.words(),
+        text=words_of(report.text),
+        text_message=message_of(report.text),
         missing=list(report.missing),
         advised=list(report.advised),
         commands=list(report.commands),

@@ -77,10 +77,14 @@ class CyclicInfo(Message):
         default="",
         description="why it does not run although it is wanted; it is set up again by itself",
     )
+    problem_message: MessageInfo | None = Field(default=None, description="of problem")
     cycle_us: float
     dc: bool | None = Field(description="distributed clocks in use; None where there are none")
     channels: list[str] = Field(description="drive/key of what comes with every cycle")
     left_over: dict[str, str] = Field(description="what did not fit, and why; it is polled")
+    left_over_messages: dict[str, MessageInfo] = Field(
+        default_factory=dict, description="of left_over"
+    )
 
 
 class CyclicRequest(Message):

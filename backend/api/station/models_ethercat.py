@@ -82,6 +82,7 @@ class EthercatPermissions(Message):
     interface: str
     ready: bool
     text: str
+    text_message: MessageInfo | None = Field(default=None, description="of text")
     missing: list[str] = Field(description="capabilities without which EtherCAT is impossible")
     advised: list[str] = Field(description="capabilities that only make cycles more punctual")
     commands: list[str]
@@ -94,6 +95,7 @@ class EthercatSegment(Message):
     connected: bool
     state: str
     problem: str = Field(description="why the stations could not be asked; empty if they were")
+    problem_message: MessageInfo | None = Field(default=None, description="of problem")
     stations: list[SegmentStation]
     late_frames: int = Field(description="frames that came back after they were given up")
     host_restarts: int

@@ -8,6 +8,7 @@ from backend.axis.cyclic import OUTPUT_ROLES
 from backend.drive.drive import Drive
 from backend.drive.readings import Reading
 from backend.station.bench import Bench
+from drivers.texts.message import Text, text
 
 #: Commands, which a motion writes twenty times a second, are no settings; the mode is one.
 _COMMANDS = tuple(role for role in OUTPUT_ROLES if role != "mode")
@@ -31,8 +32,8 @@ class ChangedSettings:
         """Nobody records or looks any more."""
         self._known.clear()
 
-    def among(self, drive_id: str, readings: Iterable[Reading]) -> list[tuple[str, str]]:
-        """Key and words of each setting that is another one now."""
+    def among(self, drive_id: str, readings: Iterable[Reading]) -> list[tuple[str, Text]]:
+        """Key and message of each setting that is another one now."""
         connected = self._bench.connected_drives.get(drive_id)
         if connected is None:
             return []
@@ -45,10 +46,15 @@ class ChangedSettings:
             before = self._known.get(place, reading.raw)
             self._known[place] = reading.raw
             if before != reading.raw and drive.parameter(reading.key).access == "rw":
-                found.append((reading.key, _words(drive, reading)))
+                found.append((reading.key, _changed(drive, reading)))
         return found
 
 
-def _words(drive: Drive, reading: Reading) -> str:
+def _changed(drive: Drive, reading: Reading) -> Text:
     parameter = drive.parameter(reading.key)
-    return f"{drive.name}: {parameter.name} is now {reading.value} {parameter.unit}".strip()
+    return text(
+        "station.setting-changed",
+        drive=drive.name,
+        parameter=parameter.name,
+        now=f"{reading.value} {parameter.unit}".strip(),
+    )

@@ -104,13 +104,14 @@ async def past_faults(connected: ConnectedDrive, *, timeout_s: float) -> dict[st
 
 def _past(drive: Drive, past: PastFault) -> dict[str, Any]:
     return {
-        "name": past.name,
+        **sentence("name", past.name),
         "code": past.code_text,
         "title": past.fault.name if past.fault else "",
-        "error": past.error,
+        **sentence("error", past.problem),
         "values": [
             {"key": r.key, "name": drive.parameter(r.key).name,
-             "unit": drive.parameter(r.key).unit, "value": _plain(r.value), "error": r.error}
+             "unit": drive.parameter(r.key).unit, "value": _plain(r.value)}
+            | sentence("error", r.problem)
             for r in past.values
         ],
     }  # fmt: skip

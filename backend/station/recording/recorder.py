@@ -24,7 +24,7 @@ from backend.station.recording.streams import describe_streams
 from backend.store.files import StorageFailed
 from drivers.errors import NotAllowed, OutOfRange, with_remedy
 from drivers.link import ScopeBlock
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 
 FORMAT = 1
 #: Reading the settings of a slow drive must not keep a recording from beginning.
@@ -92,7 +92,7 @@ class Recorder:
         self.path = path
         self.settings = settings
         self.phase: Phase = "preparing"
-        self.problem = ""
+        self.problem: Text | None = None
         self.ended_by: EndReason = "stopped"
         self.began = time.time()
         self._bench = bench
@@ -322,10 +322,10 @@ class Recorder:
         if self._writer is not None:
             with contextlib.suppress(StorageFailed):  # `_failed` shows it
                 await asyncio.to_thread(self._writer.close, {"reason": reason, "problem": ""})
-            if empty and not self.problem:
+            if empty and self.problem is None:
                 # Nothing was asked to be kept: the trigger never came.
                 await asyncio.to_thread(self.path.unlink, missing_ok=True)
-                self.problem = "the trigger did not come; nothing was recorded"
+                self.problem = text("recording.trigger-did-not-come")
         self._ended(self)
 
     async def _leave(self) -> None:
@@ -344,7 +344,7 @@ class Recorder:
         return reported
 
     def _failed(self, error: StorageFailed) -> None:
-        self.problem = error.message
+        self.problem = error.text
         self._bench.journal.add(
             text("journal.recording-failed", name=self.name, cause=with_remedy(error)),
             level="error",

@@ -23,7 +23,6 @@ from backend.station.recording.streams import describe_streams
 from backend.work.journal import Entry
 from drivers.errors import DriveError
 from drivers.link import ScopeBlock
-from drivers.texts.message import prose
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -146,7 +145,7 @@ class RerunFeed:
             self._settings.forget()
             return
         for _, changed in self._settings.among(drive, readings):
-            self._events.append(Entry(time.time(), "info", drive, "", prose(changed)))
+            self._events.append(Entry(time.time(), "info", drive, "", changed))
 
     # --- the feed ---------------------------------------------------------------------
 

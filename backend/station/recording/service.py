@@ -165,7 +165,7 @@ class Recordings:
         for key, change in self._changed.among(drive, readings):
             for recorder in list(self.running.values()):
                 if recorder.concerns(drive) and not recorder.records(drive, key):
-                    recorder.event("parameter", change, drive=drive)
+                    recorder.event("parameter", change.words(), drive=drive)
 
     # --- stored ones ------------------------------------------------------------------
 

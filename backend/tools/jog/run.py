@@ -161,7 +161,7 @@ async def _observe(axis: Axis) -> tuple[int, int, State]:
         raw = readings[key].raw
         if not isinstance(raw, int):
             raise DriveError(
-                "jog.not-read-jogging", drive=drive.name, parameter=key, error=readings[key].error
+                "jog.not-read-jogging", drive=drive.name, parameter=key, error=readings[key].problem
             )
         values.append(raw)
     return values[1], values[2], drive.decode_state(values[0])

@@ -6,14 +6,20 @@ from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 
 from backend.axis.axis import Axis
-from backend.axis.restoring import CLEANUP_TIMEOUT_S, RestoreFailed, shielded
+from backend.axis.restoring import (
+    CLEANUP_TIMEOUT_S,
+    RestoreFailed,
+    not_restored,
+    shielded,
+    value_before,
+)
 from backend.axis.stop.quick_stop import quick_stop_keys, raise_quick_stop_from
 from backend.drive.optional import existing
 from backend.tools.moves.procedures import run_procedure
 from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
-from drivers.texts.message import joined, text
+from drivers.texts.message import Text, joined, text
 from profiles.schema import Raw
 
 
@@ -66,7 +72,7 @@ async def put_back(axis: Axis, before: Mapping[str, Raw]) -> None:
         RestoreFailed: naming what could not be restored.
     """
     drive = axis.drive
-    failed: list[str] = []
+    failed: list[Text] = []
     left = dict(before)
     changed = drive.pending_restores.unapplied
     try:
@@ -77,9 +83,7 @@ async def put_back(axis: Axis, before: Mapping[str, Raw]) -> None:
                     changed = True
                 del left[key]
             except DriveError as error:
-                failed.append(
-                    f"{key} (was {drive.pending_restores.original(key, raw)}): {error.message}"
-                )
+                failed.append(not_restored(drive, key, raw, error))
     finally:
         # When this is cut off in the middle, too, it is known what is missing.
         drive.pending_restores.add(left)
@@ -92,10 +96,10 @@ async def put_back(axis: Axis, before: Mapping[str, Raw]) -> None:
             back = {}
             if not isinstance(error, DriveError):
                 raise
-            failed.append(f"write settings: {error.message}")
+            failed.append(text("measuring.write-settings-failed", cause=error.text))
     drive.pending_restores.settle(back)
     if failed:
-        raise RestoreFailed("measuring.not-restored", drive=drive.name, failed="; ".join(failed))
+        raise RestoreFailed("measuring.not-restored", drive=drive.name, failed=joined(failed))
 
 
 async def put_back_in_time(axis: Axis, before: Mapping[str, Raw]) -> None:
@@ -109,7 +113,7 @@ async def put_back_in_time(axis: Axis, before: Mapping[str, Raw]) -> None:
         await shielded(lambda: put_back(axis, before), CLEANUP_TIMEOUT_S, drive.name)
     except LinkTimeout as error:
         pending = {entry.key: entry.raw for entry in drive.pending_restores.entries}
-        left = ", ".join(f"{key} (was {pending[key]})" for key in before if key in pending)
+        left = joined((value_before(key, pending[key]) for key in before if key in pending), ", ")
         advice = (error.remedy_text, text("measuring.not-restored/remedy"))
         raise RestoreFailed(
             "measuring.not-restored-2",

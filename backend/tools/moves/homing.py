@@ -83,7 +83,7 @@ async def home(axis: Axis, settings: HomingSettings, progress: Progress) -> JobR
 def _integer(name: str, reading: Reading) -> int:
     if not isinstance(reading.raw, int):
         raise LinkTimeout(
-            "moves.not-read-homing", drive=name, parameter=reading.key, error=reading.error
+            "moves.not-read-homing", drive=name, parameter=reading.key, error=reading.problem
         )
     return reading.raw
 

@@ -328,7 +328,7 @@ async def _still_inside(axis: Axis, watch: _Watch) -> int:
                 "moves.not-read-during-motion",
                 drive=drive.name,
                 parameter=key,
-                error=readings[key].error,
+                error=readings[key].problem,
             )
         raws.append(raw)
     status, position, velocity = raws

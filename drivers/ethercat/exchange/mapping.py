@@ -20,7 +20,7 @@ from drivers.ethercat.exchange.assignment import (
 from drivers.link import Address, CyclicSignal
 from drivers.motion.setpoints import TARGETS
 from drivers.texts import limits
-from drivers.texts.message import joined, text
+from drivers.texts.message import Text, joined, text
 from profiles.schema import Parameter, PdoPart, PdoSet, Profile
 
 CONTROL_WORD = Address(0x6040, 0, "UINT16")
@@ -123,8 +123,8 @@ class StationPlan:
     rx: Assigned
     tx: Assigned
     mapped: tuple[CyclicSignal, ...]
-    left_over: tuple[tuple[CyclicSignal, str], ...]
-    """Signals for polling, each with the reason as text."""
+    left_over: tuple[tuple[CyclicSignal, Text], ...]
+    """Signals for polling, each with the reason."""
 
 
 def plan_station(
@@ -161,11 +161,11 @@ def _with_signals(
     station: int,
     inputs: Sequence[CyclicSignal],
     outputs: Sequence[CyclicSignal],
-    rx: tuple[Assigned, dict[tuple[int, int], str]],
-    tx: tuple[Assigned, dict[tuple[int, int], str]],
+    rx: tuple[Assigned, dict[tuple[int, int], Text]],
+    tx: tuple[Assigned, dict[tuple[int, int], Text]],
 ) -> StationPlan:
     mapped: list[CyclicSignal] = []
-    left: list[tuple[CyclicSignal, str]] = []
+    left: list[tuple[CyclicSignal, Text]] = []
     for signals, (taken, reasons) in ((inputs, tx), (outputs, rx)):
         present = {(entry.index, entry.subindex) for entry in taken.entries if entry.code != "x"}
         for signal in signals:
@@ -173,7 +173,7 @@ def _with_signals(
             if place in present:
                 mapped.append(signal)
             else:
-                left.append((signal, reasons.get(place, "not in the drive's fixed process data")))
+                left.append((signal, reasons.get(place, text("ethercat.not-in-fixed-data"))))
     return StationPlan(station, rx[0], tx[0], tuple(mapped), tuple(left))
 
 
@@ -183,7 +183,7 @@ def _direction(
     wish: Sequence[Address],
     needed: int,
     profile: Profile | None,
-) -> tuple[Assigned, dict[tuple[int, int], str]]:
+) -> tuple[Assigned, dict[tuple[int, int], Text]]:
     if profile is None or profile.pdo is None:
         index = _GENERIC_RX if direction == "rx" else _GENERIC_TX
         return _filled(station, direction, wish, needed, profile, _Room(index, _GENERIC_ENTRIES))
@@ -229,9 +229,9 @@ def _filled(
     needed: int,
     profile: Profile | None,
     room: _Room,
-) -> tuple[Assigned, dict[tuple[int, int], str]]:
+) -> tuple[Assigned, dict[tuple[int, int], Text]]:
     entries: list[Entry] = []
-    reasons: dict[tuple[int, int], str] = {}
+    reasons: dict[tuple[int, int], Text] = {}
     carried = _reached(room.kept_entries)
     used = sum(entry.size for entry in room.kept_entries)
     for number, address in enumerate(wish):
@@ -239,11 +239,11 @@ def _filled(
             continue
         reason = _unmappable(address, direction, profile)
         entry = _entry(address)
-        if not reason and len(entries) >= room.most:
-            reason = f"the drive maps {room.most} objects in one direction and they are used up"
-        if not reason and room.bytes is not None and used + entry.size > room.bytes:
-            reason = f"the drive takes {room.bytes} bytes in one direction and they are used up"
-        if not reason:
+        if reason is None and len(entries) >= room.most:
+            reason = text("ethercat.objects-used-up", count=room.most)
+        if reason is None and room.bytes is not None and used + entry.size > room.bytes:
+            reason = text("ethercat.bytes-used-up", bytes=room.bytes)
+        if reason is None:
             entries.append(entry)
             used += entry.size
         elif number < needed:
@@ -264,21 +264,18 @@ def _filled(
     return room.assigned(entries), reasons
 
 
-def _unmappable(address: Address, direction: str, profile: Profile | None) -> str:
+def _unmappable(address: Address, direction: str, profile: Profile | None) -> Text | None:
     if address.index is None or size_of(address.type) is None:
-        return "only objects of fixed length can be mapped"
+        return text("ethercat.fixed-length-only")
     if profile is None:
-        return ""
+        return None
     parameter = profile.by_key.get(str(address))
     if parameter is None:
-        return (
-            ""
-            if address in (CONTROL_WORD, STATUS_WORD, POSITION_ACTUAL)
-            else ("the profile does not know it")
-        )
+        known = address in (CONTROL_WORD, STATUS_WORD, POSITION_ACTUAL)
+        return None if known else text("ethercat.not-in-profile")
     if direction not in parameter.pdo:
-        return "the drive does not map it in this direction"
-    return ""
+        return text("ethercat.not-in-this-direction")
+    return None
 
 
 def _entry(address: Address) -> Entry:

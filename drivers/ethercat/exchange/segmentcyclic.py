@@ -77,7 +77,7 @@ class EthercatCyclic:
         self._fields: dict[str, tuple[str, int]] = {}
         self._reader: RingReader | None = None
         self.dc = False
-        self.left_over: tuple[tuple[CyclicSignal, str], ...] = ()
+        self.left_over: tuple[tuple[CyclicSignal, Text], ...] = ()
         """Signals that did not fit, each with the reason as text; poll them."""
 
     # Cyclic --------------------------------------------------------------------------------

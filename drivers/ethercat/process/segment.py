@@ -32,6 +32,7 @@ from drivers.ethercat.process import promiscuous
 from drivers.ethercat.wire import frames
 from drivers.ethercat.wire.steps import Read, Write
 from drivers.texts import limits
+from drivers.texts.message import text
 
 IO_MAP_BYTES = 4096
 MAX_STATIONS = 199
@@ -100,12 +101,12 @@ class Segment:
             for descriptor in open_sockets() - before:
                 os.close(descriptor)
             self._unlock()
+            report = permissions.check(self.interface)
             raise LinkLost(
                 "ethercat.interface-not-opened",
-                remedy="; ".join(permissions.check(self.interface).commands)
-                or "check that the interface is a wired Ethernet one",
+                remedy="; ".join(report.commands) or "ethercat.check-wired",
                 interface=self.interface,
-                check=permissions.check(self.interface).words(),
+                check=report.text,
             ) from error
         self.socket_fd = min(open_sockets() - before)
         self._index = socket.if_nametoindex(self.interface)
@@ -319,9 +320,8 @@ class Segment:
         report = permissions.check(self.interface)
         if not report.exists or not report.up:
             names = ", ".join(name for _, name in socket.if_nameindex())
-            raise LinkLost(
-                report.words(), remedy="; ".join(report.commands) or f"there are: {names}"
-            )
+            others = text("ethercat.interfaces-there-are", names=names)
+            raise LinkLost(report.text, remedy="; ".join(report.commands) or others)
 
     def _unlock(self) -> None:
         if self._lock is not None:

@@ -15,6 +15,7 @@ from typing import Literal, NamedTuple
 
 from drivers.errors import LinkLost, LinkTimeout, ProtocolError
 from drivers.ethercat.wire.steps import Pause, Read, Steps, Write
+from drivers.texts.message import text
 
 MAILBOX_ERROR = 0
 COE = 3
@@ -28,15 +29,15 @@ SM1_PDI = 0x80F
 _FULL = 0x08
 
 _ERRORS = {
-    1: "syntax error in the mailbox header",
-    2: "the mailbox protocol is not supported",
-    3: "the mailbox channel is wrong",
-    4: "the mailbox service is not supported",
-    5: "the mailbox header is invalid",
-    6: "the mailbox data are too short",
-    7: "the drive has no memory for the mailbox",
-    8: "the mailbox data have a wrong length",
-    9: "the mailbox service is already at work",
+    1: "ethercat.mailbox-syntax",
+    2: "ethercat.mailbox-protocol",
+    3: "ethercat.mailbox-channel",
+    4: "ethercat.mailbox-service",
+    5: "ethercat.mailbox-header",
+    6: "ethercat.mailbox-too-short",
+    7: "ethercat.mailbox-no-memory",
+    8: "ethercat.mailbox-length",
+    9: "ethercat.mailbox-at-work",
 }
 
 _RESEND_S = 0.02
@@ -380,8 +381,9 @@ class Mailbox:
 
     def _raise_error(self, payload: bytes) -> None:
         code = int.from_bytes(payload[2:4], "little")
-        text = _ERRORS.get(code, f"mailbox error {code:#06x}")
-        raise ProtocolError("ethercat.drive-refused-mail", text=text)
+        known = _ERRORS.get(code)
+        reason = text("ethercat.mailbox-other", number=code) if known is None else text(known)
+        raise ProtocolError("ethercat.drive-refused-mail", text=reason)
 
 
 def _overtaken() -> Overtaken:

@@ -37,7 +37,7 @@ def test_a_bad_entry_spoils_only_itself(tmp_path: Path) -> None:
     loaded, problems = drives.load()
     assert loaded == [Z]
     assert len(problems) == 3
-    assert "drive 2: ports.0.station" in problems[1]
+    assert "drive 2: ports.0.station" in problems[1].words()
 
 
 def test_a_damaged_file_is_reported_and_not_fatal(tmp_path: Path) -> None:
@@ -46,7 +46,8 @@ def test_a_damaged_file_is_reported_and_not_fatal(tmp_path: Path) -> None:
         path.write_text(text, "utf-8")
         loaded, problems = DriveList(path).load()
         assert (loaded, len(problems)) == ([], 1)
-        assert "bench.json cannot be read" in problems[0]
+        assert "bench.json cannot be read" in problems[0].words()
+        assert "无法读取" in problems[0].words("zh")
 
 
 async def test_a_full_disk_keeps_nobody_from_connecting_a_drive(tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ def _slots() -> FaultHistory:
 async def test_slots_with_snapshots(profile: Profile, link: MemoryLink) -> None:
     link.objects |= {(0x200A, 0x13): b"\2\0", (0x200A, 0x14): b"\0\0", (0x200A, 0x16): b"\x37\1"}
     (past,) = await read_history(_axis(profile, link, _slots()))
-    assert (past.name, past.code, past.code_text) == ("last fault", 2, "Er.002")
+    assert (past.name.words(), past.code, past.code_text) == ("last fault", 2, "Er.002")
     assert past.fault is not None
     assert past.fault.name == "Overvoltage"
     assert [value.raw for value in past.values] == [0x137]
@@ -76,7 +76,8 @@ async def test_an_unreadable_slot_says_so_and_the_others_are_read(
     link.objects |= {(0x200A, 0x14): b"\2\0", (0x200A, 0x16): b"\0\0"}
     first, second = await read_history(_axis(profile, link, _slots()))
     assert first.code is None
-    assert "does not exist" in first.error
+    assert first.problem is not None
+    assert "does not exist" in first.problem.words()
     assert second.code == 2
 
 
@@ -106,9 +107,9 @@ async def test_a_selector_brings_every_record_and_is_put_back(
     recorder = Recorder({**link.objects, (0x200D, 0x24): b"\1\0"})
     axis = _axis(profile, recorder, _selected())
     found = await read_history(axis)
-    assert [(past.name, past.code_text) for past in found] == [
-        ("record 0", "Er.002"),
-        ("record 1", "Er.007"),
+    assert [(past.name.words("zh"), past.code_text) for past in found] == [
+        ("记录 0", "Er.002"),
+        ("记录 1", "Er.007"),
     ]
     assert [past.values[0].raw for past in found] == [310, 305]
     assert recorder.objects[0x200D, 0x24] == b"\1\0"

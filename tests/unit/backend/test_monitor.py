@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import cast
 
@@ -12,10 +12,12 @@ import pytest
 
 from backend.axis.cyclic import CyclicSession
 from backend.drive.drive import Drive
+from backend.drive.readings import Reading
 from backend.station import monitor as watching
 from backend.station.connected_drive import ConnectedDrive
 from backend.work.journal import Journal
 from drivers.cia402 import State
+from drivers.texts.message import text
 from tests.support.servo import STATUS, Servo
 
 STATUS_KEY, POSITION_KEY, ERROR_KEY = "6041:00", "6064:00", "603F:00"
@@ -94,6 +96,18 @@ async def test_a_dead_mailbox_is_reported_although_process_data_go_on(
     servo.mute = False
     clock.now_s += 0.1
     assert (await polled(x)).fresh
+
+
+async def test_why_the_status_word_is_not_known_stays_a_message(
+    x: ConnectedDrive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gone = text("ethercat.station-no-longer-answers")
+
+    async def unread(keys: Iterable[str]) -> dict[str, Reading]:
+        return {key: Reading(key, None, None, None, gone) for key in keys}
+
+    monkeypatch.setattr(x.drive, "read_many", unread)
+    assert (await x.monitor.refresh()).problem == gone
 
 
 @pytest.mark.parametrize("key", [STATUS_KEY, ERROR_KEY])

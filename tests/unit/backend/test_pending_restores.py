@@ -128,6 +128,7 @@ async def test_it_is_named_and_put_back_by_itself(
     reported = await lost_in_the_middle(x, servo)
     for key, raw in WAS.items():
         assert f"{key} (was {raw})" in reported.message
+        assert f"{key}（原为 {raw}）" in reported.text.words("zh")
     assert {entry.key: entry.raw for entry in x.drive.pending_restores.entries} == WAS
     await back(bench, servo)
     assert held(servo) == WAS

@@ -230,7 +230,9 @@ def test_reserve_of_the_disk_is_kept(tmp_path: Path) -> None:
     assert "nearly full" in failures[0].message
     with RecordingReader(tmp_path / "a.sdrec") as reader:
         assert reader.summary().state == "failed", "there was room for the end chunk"
-        assert "nearly full" in reader.summary().problem
+        problem = reader.summary().problem
+        assert problem is not None
+        assert problem.code == "recording.disk-nearly-full-mib-left"
         assert len(list(reader.blocks())) == 1
     with contextlib.suppress(StorageFailed):
         writer.close({})

@@ -307,7 +307,7 @@ async def test_a_drive_without_cyclic_modes_is_commanded_by_sdo(
     cyclic = _cyclic(link)
     mapped = await cyclic.configure([STATUS, POSITION], [CONTROL, TARGET], 0.002)
     assert mapped == (STATUS, POSITION)
-    assert "commanded by SDO" in cyclic.left_over[0][1]
+    assert "commanded by SDO" in cyclic.left_over[0][1].words()
     await cyclic.start()
     assert not cyclic.owns(5)
     await link.write(5, CONTROL.address, b"\x06\x00")

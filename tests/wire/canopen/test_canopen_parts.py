@@ -300,7 +300,7 @@ def test_the_less_important_signals_make_room() -> None:
     kept = {s.address.index for p in planned.pdos for s in p.signals}
     assert {0x6041, 0x6064, 0x6065, 0x6040, 0x607A, 0x60FF} <= kept
     assert [s.address.index for s, _ in planned.left_over] == [0x606A, 0x6069, 0x6068, 0x6067]
-    assert all("80% full" in why for _, why in planned.left_over)
+    assert all("80% full" in why.words() for _, why in planned.left_over)
 
 
 def test_a_lost_station_is_made_harmless() -> None:

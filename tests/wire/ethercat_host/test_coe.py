@@ -205,8 +205,9 @@ def test_counters_run_from_2_to_7_and_never_repeat() -> None:
 def test_mailbox_errors_come_in_words() -> None:
     slave = ScriptedSlave(lambda _: [])
     slave.queue(struct.pack("<HH", 1, 2), protocol=0)
-    with pytest.raises(ProtocolError, match="protocol is not supported"):
+    with pytest.raises(ProtocolError, match="protocol is not supported") as refused:
         slave.run(sdo.upload(slave.box(), 0x6041, 0))
+    assert "不支持该邮箱协议" in refused.value.text.words("zh")
 
 
 def test_complete_access_with_and_without_the_pad_byte() -> None:

@@ -46,14 +46,14 @@ def test_what_does_not_fit_is_left_for_polling_with_the_reason() -> None:
     plan = plan_station(1, wish, [signal(0x607A)], profile)
     assert [s.channel for s in plan.mapped] == ["606C", "607A"]
     assert [s.channel for s, _ in plan.left_over] == ["6077", "60F4"]
-    assert "maps 3 objects" in plan.left_over[0][1]
+    assert "maps 3 objects" in plan.left_over[0][1].words()
 
 
 def test_bytes_are_limited_too() -> None:
     profile = with_limits(servo_profile(), max_bytes=8)
     plan = plan_station(1, [signal(0x606C), signal(0x6077, "INT16")], [signal(0x607A)], profile)
     assert [e.index for e in plan.tx.entries] == [0x6041, 0x6064, 0x6077], "6 + 2 bytes fit"
-    assert "8 bytes" in plan.left_over[0][1]
+    assert "8 bytes" in plan.left_over[0][1].words()
 
 
 def test_outputs_that_do_not_fit_are_refused_by_name() -> None:
@@ -64,7 +64,7 @@ def test_outputs_that_do_not_fit_are_refused_by_name() -> None:
 
 def test_objects_that_the_drive_does_not_map_are_polled() -> None:
     plan = plan_station(1, [signal(0x2001, "UINT16", 1)], [signal(0x607A)], servo_profile())
-    assert plan.left_over[0][1] == "the drive does not map it in this direction"
+    assert plan.left_over[0][1].words() == "the drive does not map it in this direction"
 
 
 def test_a_drive_that_forbids_remapping_gets_the_fixed_set_with_most_of_the_wish() -> None:
@@ -76,7 +76,7 @@ def test_a_drive_that_forbids_remapping_gets_the_fixed_set_with_most_of_the_wish
     assert plan.rx.write is False
     assert plan.rx.size == 2 + 1 + 4 + 4 + 2
     assert [s.channel for s in plan.mapped] == ["606C", "607A", "60FF"]
-    assert plan.left_over[0][1] == "not in the drive's fixed process data"
+    assert plan.left_over[0][1].words() == "not in the drive's fixed process data"
 
 
 def test_a_wish_that_no_fixed_set_carries_is_refused() -> None:

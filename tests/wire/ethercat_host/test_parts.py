@@ -238,7 +238,7 @@ def test_permissions_name_what_is_missing_and_the_command() -> None:
     report = permissions.check("lo", status=status, python="/usr/bin/env")
     assert report.missing == ("CAP_NET_ADMIN",)
     assert report.advised == ("CAP_SYS_NICE", "CAP_IPC_LOCK")
-    assert report.words() == "CAP_NET_ADMIN is missing"
+    assert report.text.words() == "CAP_NET_ADMIN is missing"
     assert report.commands[0].startswith(
         "sudo setcap cap_net_raw,cap_net_admin,cap_sys_nice,cap_ipc_lock+ep /"
     )
@@ -250,7 +250,7 @@ def test_permissions_name_what_is_missing_and_the_command() -> None:
 def test_permissions_without_the_interface() -> None:
     report = permissions.check("nosuch0")
     assert not report.ready
-    assert "no network interface 'nosuch0'" in report.words()
+    assert "no network interface 'nosuch0'" in report.text.words()
 
 
 def test_short_turns_need_no_permission() -> None:

@@ -5090,11 +5090,20 @@ export interface components {
                 [key: string]: string;
             };
             /**
+             * Left Over Messages
+             * @description of left_over
+             */
+            left_over_messages?: {
+                [key: string]: components["schemas"]["MessageInfo"];
+            };
+            /**
              * Problem
              * @description why it does not run although it is wanted; it is set up again by itself
              * @default
              */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /** Running */
             running: boolean;
         };
@@ -5798,6 +5807,8 @@ export interface components {
             ready: boolean;
             /** Text */
             text: string;
+            /** @description of text */
+            text_message?: components["schemas"]["MessageInfo"] | null;
         };
         /**
          * EthercatSegment
@@ -5823,6 +5834,8 @@ export interface components {
              * @description why the stations could not be asked; empty if they were
              */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /** Real Time */
             real_time: string[];
             /**
@@ -7814,7 +7827,7 @@ export interface components {
         };
         /**
          * HistorySlot
-         * @description One remembered fault that has parameters of its own.
+         * @description One remembered fault that has parameters of its own; ``name`` empty: named by its number.
          */
         HistorySlot: {
             /** Code Key */
@@ -7824,7 +7837,10 @@ export interface components {
              * @default []
              */
             fields: string[];
-            /** Name */
+            /**
+             * Name
+             * @default
+             */
             name: string;
         };
         /**
@@ -9700,6 +9716,8 @@ export interface components {
              * @default
              */
             error: string;
+            /** @description of error */
+            error_message?: components["schemas"]["MessageInfo"] | null;
             /** Kind */
             kind: ("fault" | "warning") | null;
             /**
@@ -9712,6 +9730,8 @@ export interface components {
              * @description which record: last fault, record 3 …
              */
             name: string;
+            /** @description of name; None where the profile names the record */
+            name_message?: components["schemas"]["MessageInfo"] | null;
             /** Remedies */
             remedies: string[];
             /** Reset */
@@ -10651,6 +10671,8 @@ export interface components {
             person: string;
             /** Problem */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /**
              * Reason
              * @description why it ended
@@ -13330,6 +13352,8 @@ export interface components {
             notes: string;
             /** Number */
             number: number;
+            /** @description of facts.problem: why the file cannot be used */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /**
              * Saved
              * Format: date-time

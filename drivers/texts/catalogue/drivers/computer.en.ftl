@@ -1,6 +1,11 @@
+computer_capabilities-missing = { $first } and { $second } are missing
+computer_capability-missing = { $name } is missing
 computer_ethercat-not-available-servodeck = EtherCAT on { $value } is not available: servodeck runs EtherCAT on Linux only
     .remedy = run servodeck on a computer with Linux at the machine and open its page from here; Modbus, MLink and CANopen by slcan work on this one
+computer_everything-granted = everything needed is granted
+computer_interface-off = the interface { $interface } is switched off
 computer_memory-not-locked = the system does not let this process lock its memory; CAP_IPC_LOCK or a larger memlock limit grants it
+computer_no-interface = there is no network interface { QUOTED($interface) } on this computer
 computer_no-real-time = the system grants no real-time scheduling (SCHED_FIFO), so single cycles may be some milliseconds late on a busy computer; CAP_SYS_NICE or an rtprio limit grants it
 computer_not-available-looks-linux = { $what } is not available: it reads information that only Linux provides
     .remedy = run it on the computer with Linux at the machine

@@ -1,6 +1,11 @@
+computer_capabilities-missing = 缺少 { $first } 和 { $second }
+computer_capability-missing = 缺少 { $name }
 computer_ethercat-not-available-servodeck = { $value } 上不能使用 EtherCAT：servodeck 仅在 Linux 上运行 EtherCAT
     .remedy = 请在机器旁的 Linux 计算机上运行 servodeck，并从此处打开其页面；本机可使用 Modbus、MLink 和 slcan 的 CANopen
+computer_everything-granted = 所需权限均已授予
+computer_interface-off = 接口 { $interface } 已关闭
 computer_memory-not-locked = 系统不允许本进程锁定内存；CAP_IPC_LOCK 或更大的 memlock 限值可授予该权限
+computer_no-interface = 本计算机没有网络接口 { QUOTED($interface) }
 computer_no-real-time = 系统未授予实时调度（SCHED_FIFO），计算机繁忙时个别周期可能延迟数毫秒；CAP_SYS_NICE 或 rtprio 限值可授予该权限
 computer_not-available-looks-linux = { $what } 不可用：它读取 Linux 关于自身的信息
     .remedy = 请在机器旁装有 Linux 的计算机上运行

@@ -23,3 +23,4 @@ measuring_torque-too-little = { NUM($torque_nm, format: ".3g") } Nm are too litt
 measuring_travel-too-little = a travel of { NUM($travel_rev, format: ".3g") } rev is too little for the base motion
 measuring_values-put-back-axis = { $drive }: values can be restored only while the axis is disabled and at standstill
     .remedy = stop and disable the axis first
+measuring_write-settings-failed = write settings: { $cause }

@@ -23,3 +23,4 @@ measuring_torque-too-little = { NUM($torque_nm, format: ".3g") } Nm 不足以克
 measuring_travel-too-little = { NUM($travel_rev, format: ".3g") } rev 的行程不足以进行基础运动
 measuring_values-put-back-axis = { $drive }：只能在轴静止且未使能时恢复数值
     .remedy = 请先停止并断使能
+measuring_write-settings-failed = 写入设置：{ $cause }

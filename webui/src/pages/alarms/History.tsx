@@ -11,6 +11,7 @@ import { ProblemNote } from '../../widgets/ProblemNote'
 import { ProcedureButton } from '../../widgets/Procedures'
 import { useRows } from '../../widgets/profile-text/rows'
 import { useSay } from '../../widgets/profile-text/texts'
+import { Said } from '../../widgets/Said'
 import { useAction } from '../../widgets/useAction'
 import { useFetched } from '../../widgets/useFunctions'
 
@@ -97,17 +98,25 @@ function Past({ drive, entry }: { drive: string; entry: PastFaultInfo }) {
     const row = rows.find((each) => each.key === value.key)
     return row ? [{ row, value }] : []
   })
+  const name = entry.name_message ? (
+    <Said message={entry.name_message} words={entry.name} />
+  ) : (
+    say(entry.name)
+  )
   if (entry.error) {
     return (
       <li>
-        <strong>{say(entry.name)}</strong> <span className="warn-text">{entry.error}</span>
+        <strong>{name}</strong>{' '}
+        <span className="warn-text">
+          <Said message={entry.error_message} words={entry.error} />
+        </span>
       </li>
     )
   }
   return (
     <li className={entry.kind ?? ''}>
       <h3>
-        <small className="dim">{say(entry.name)}</small> <span className="mono">{entry.code}</span>{' '}
+        <small className="dim">{name}</small> <span className="mono">{entry.code}</span>{' '}
         {entry.known ? <ProfileText drive={drive} text={entry.title} /> : t('history.notInProfile')}
       </h3>
       {values.length > 0 && (
@@ -118,7 +127,11 @@ function Past({ drive, entry }: { drive: string; entry: PastFaultInfo }) {
               <div key={row.key} className="pair">
                 <dt>{row.name}</dt>
                 <dd className="num">
-                  {value.error || `${shown(row, value.value, value.raw)} ${row.unit}`}
+                  {value.error ? (
+                    <Said message={value.error_message} words={value.error} />
+                  ) : (
+                    `${shown(row, value.value, value.raw)} ${row.unit}`
+                  )}
                 </dd>
               </div>
             ))}

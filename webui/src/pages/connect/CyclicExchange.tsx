@@ -4,6 +4,7 @@ import { api, ask } from '../../api/client'
 import type { Bus } from '../../api/schema'
 import { useT } from '../../i18n'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { Said } from '../../widgets/Said'
 import { useAction } from '../../widgets/useAction'
 
 const CYCLES_US = [250, 500, 1000, 2000, 4000, 8000]
@@ -47,7 +48,7 @@ export function CyclicExchange({ bus, onChange }: { bus: Bus; onChange: () => Pr
         ) : now?.problem ? (
           <>
             <span className="grow warn-text" role="status">
-              {t('segment.recovering')} {now.problem}
+              {t('segment.recovering')} <Said message={now.problem_message} words={now.problem} />
             </span>
             <Button loading={act.busy} onClick={() => void stop()}>
               {t('segment.endRecovery')}
@@ -74,7 +75,8 @@ export function CyclicExchange({ bus, onChange }: { bus: Bus; onChange: () => Pr
           <ul className="scroll-list">
             {left.map(([channel, why]) => (
               <li key={channel}>
-                <span className="mono">{channel}</span> {why}
+                <span className="mono">{channel}</span>{' '}
+                <Said message={now?.left_over_messages?.[channel]} words={why} />
               </li>
             ))}
           </ul>

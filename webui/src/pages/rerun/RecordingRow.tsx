@@ -8,6 +8,7 @@ import { dateTime, duration } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
 import { JobNote, useJobEnd } from '../../widgets/JobNote'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { Said } from '../../widgets/Said'
 import { useAction } from '../../widgets/useAction'
 import { Remarks } from './Remarks'
 import { size } from './viewer'
@@ -65,7 +66,7 @@ export function RecordingRow({
             size: size(recording.bytes),
           })}
           {recording.lost > 0 && ` · ${t('recordings.lost', { count: recording.lost })}`}{' '}
-          {recording.problem}
+          <Said message={recording.problem_message} words={recording.problem} />
         </p>
         {(recording.kept || recording.tags.length > 0) && (
           <p>

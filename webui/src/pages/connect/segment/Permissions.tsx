@@ -1,7 +1,7 @@
 import { useEffect, useState } from 'react'
 import { api, ask } from '../../../api/client'
 import type { EthercatPermissions } from '../../../api/schema'
-import { useT } from '../../../i18n'
+import { useSay, useT } from '../../../i18n'
 
 const REAL = /^ethercat:\/\/(?!virtual)[^/\s]+$/
 
@@ -26,11 +26,12 @@ export function InterfacePermissions({ url }: { url: string }) {
 /** Missing permissions as text, with the commands that grant them. */
 export function Permissions({ report }: { report: EthercatPermissions }) {
   const t = useT()
+  const say = useSay()
   return (
     <div className={`note ${report.ready ? 'good' : 'warn'}`} role="status">
       <p>
         <strong className="mono">{report.interface}</strong>{' '}
-        {report.ready ? t('segment.permitted') : report.text}
+        {report.ready ? t('segment.permitted') : say.message(report.text_message, report.text)}
       </p>
       {report.advised.length > 0 && (
         <p>{t('segment.advised', { names: report.advised.join(', ') })}</p>

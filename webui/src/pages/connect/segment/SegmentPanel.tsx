@@ -37,7 +37,11 @@ export function SegmentPanel({ url }: { url: string }) {
   return (
     <div className="segment">
       <h3>{t('segment.title')}</h3>
-      {segment.problem !== '' && <p className="note fault">{segment.problem}</p>}
+      {segment.problem !== '' && (
+        <p className="note fault">
+          <Said message={segment.problem_message} words={segment.problem} />
+        </p>
+      )}
       {segment.permissions &&
         (!segment.permissions.ready || segment.permissions.missing.length > 0) && (
           <Permissions report={segment.permissions} />
