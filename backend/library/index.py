@@ -21,6 +21,7 @@ from backend.library.entries import Addition, Kind
 from backend.store.database import Store
 from backend.store.library_tables import Item, Tag
 from drivers.errors import NotAllowed
+from drivers.texts.answers import sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +127,7 @@ class Index:
         try:
             found = folder.describe(path)
         except NotAllowed as error:
-            found = Described(Addition(facts={"problem": error.message}))
+            found = Described(Addition(facts=sentence("problem", error.text)))
         except FileNotFoundError:
             return None
         facts = {**found.addition.facts, "stamp": stamp}

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from backend.api.models import Message, Raw
 from backend.api.sets.models import SetFileInfo
+from backend.tools.wire_message import MessageInfo
 
 LibraryKind = Literal["set", "recording", "measurement", "report"]
 TagText = Annotated[str, Field(min_length=1, max_length=60)]
@@ -39,6 +40,7 @@ class VersionInfo(Message):
     facts: dict[str, int | float | str | bool | None] = Field(
         description="what a list shows of this kind: parameters, channels, duration_s …"
     )
+    problem_message: MessageInfo | None = Field(default=None, description="of facts.problem")
 
 
 class LibraryEntry(Message):
@@ -63,6 +65,7 @@ class LibraryPage(Message):
     entries: list[LibraryEntry]
     total: int
     problems: list[str] = Field(description="files that could not be added to the library")
+    problem_messages: list[MessageInfo] = Field(default_factory=list, description="of problems")
     shared: bool = Field(description="other stations may have the same library")
 
 
@@ -115,6 +118,7 @@ class ThreeWayRow(Message):
         "energises",
     ] = Field(description="theirs, drive: changed only there; both: to the same; conflict: not")
     problem: str = ""
+    problem_message: MessageInfo | None = Field(default=None, description="of problem")
     motor_individual: bool = False
     selected: bool = Field(description="proposed for writing")
 
@@ -130,4 +134,5 @@ class ThreeWay(Message):
     same_profile: bool
     same_serial: bool | None
     warnings: list[str]
+    warning_messages: list[MessageInfo] = Field(default_factory=list, description="of warnings")
     rows: list[ThreeWayRow]

@@ -5198,6 +5198,11 @@ export interface components {
              * @description of the file; null for the latest
              */
             version?: number | null;
+            /**
+             * Warning Messages
+             * @description of warnings
+             */
+            warning_messages?: components["schemas"]["MessageInfo"][];
             /** Warnings */
             warnings: string[];
         };
@@ -5234,6 +5239,8 @@ export interface components {
              * @default
              */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /**
              * Selected
              * @description proposed for writing
@@ -8726,6 +8733,11 @@ export interface components {
             /** Entries */
             entries: components["schemas"]["LibraryEntry"][];
             /**
+             * Problem Messages
+             * @description of problems
+             */
+            problem_messages?: components["schemas"]["MessageInfo"][];
+            /**
              * Problems
              * @description files that could not be added to the library
              */
@@ -9053,6 +9065,8 @@ export interface components {
              * @default
              */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /** Profile */
             profile: string;
             /** Saved */
@@ -9184,6 +9198,8 @@ export interface components {
              * @description why not; empty where it is changeable
              */
             fixed_why: string;
+            /** @description of fixed_why */
+            fixed_why_message?: components["schemas"]["MessageInfo"] | null;
             /**
              * Motion
              * @description null: it cannot be written
@@ -10203,6 +10219,11 @@ export interface components {
             requires_stop: boolean;
             /** Source */
             source: string;
+            /**
+             * Step Messages
+             * @description of steps
+             */
+            step_messages?: components["schemas"]["MessageInfo"][];
             /** Steps */
             steps: string[];
             /** Title */
@@ -10267,6 +10288,8 @@ export interface components {
             title: string;
             /** Why */
             why: string;
+            /** @description of why */
+            why_message?: components["schemas"]["MessageInfo"] | null;
         };
         /**
          * ProfileTexts
@@ -12683,6 +12706,8 @@ export interface components {
              * @default
              */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /** Profile */
             profile: string;
             /** Saved */
@@ -13037,6 +13062,11 @@ export interface components {
             theirs: string;
             /** Theirs Version */
             theirs_version: number | null;
+            /**
+             * Warning Messages
+             * @description of warnings
+             */
+            warning_messages?: components["schemas"]["MessageInfo"][];
             /** Warnings */
             warnings: string[];
         };
@@ -13069,6 +13099,8 @@ export interface components {
              * @default
              */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /**
              * Selected
              * @description proposed for writing
@@ -13330,6 +13362,8 @@ export interface components {
             notes: string;
             /** Number */
             number: number;
+            /** @description of facts.problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /**
              * Saved
              * Format: date-time

@@ -5,6 +5,7 @@ import type { LibraryEntry } from '../../api/schema'
 import { type T, useT } from '../../i18n'
 import { dateTime, duration } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
+import { Said } from '../../widgets/Said'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { size } from '../rerun/viewer'
@@ -104,7 +105,11 @@ export function LibraryRow({
             ))}
           </p>
           <p className="dim">{factsOf(t, entry)}</p>
-          {typeof problem === 'string' && <p className="warn-text">{problem}</p>}
+          {typeof problem === 'string' && (
+            <p className="warn-text">
+              <Said message={entry.latest.problem_message} words={problem} />
+            </p>
+          )}
           {[entry.latest.notes, entry.notes].filter(Boolean).map((notes) => (
             <p className="notes" key={notes}>
               {notes}
