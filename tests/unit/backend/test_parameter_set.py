@@ -16,6 +16,7 @@ from backend.parameters.set_file import BadSet
 from backend.tools import parameters
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed, OutOfRange, Rejected
 from drivers.link import Address
+from drivers.texts.answers import in_language
 from drivers.texts.message import text
 from tests.support.memory_link import MemoryLink
 
@@ -206,3 +207,14 @@ async def test_existing_file_is_not_replaced_unasked(drive: Drive, tmp_path) -> 
     library.store("a", await written(drive))
     with pytest.raises(NotAllowed, match="exists already"):
         library.store("a", await written(drive))
+
+
+async def test_what_could_not_be_read_is_reported_in_any_language(
+    drive: Drive, link: MemoryLink
+) -> None:
+    why = text("sets.row-twice")
+    link.read_errors[0x2005, 3] = Rejected(why, abort_code=0x08000000)
+    result = await parameters.read_all(drive, ["2005:03", "2005:10"], silent)
+    assert result["read"] == 1
+    assert result["failed"] == {"2005:03": why.words()}
+    assert in_language(result, "zh")["failed"] == {"2005:03": why.words("zh")}
