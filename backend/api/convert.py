@@ -274,6 +274,7 @@ def parameter_row(
 
 def procedure(known: Procedure) -> models_axis.ProcedureInfo:
     """A procedure of the profile."""
+    steps = describe(known)
     return models_axis.ProcedureInfo(
         name=known.name,
         title=known.title,
@@ -281,7 +282,8 @@ def procedure(known: Procedure) -> models_axis.ProcedureInfo:
         warning=known.warning,
         requires_stop=known.requires_stop,
         confirm=[step.text for step in known.steps if isinstance(step, ConfirmStep)],
-        steps=describe(known),
+        steps=[step.words(language()) for step in steps],
+        step_messages=[message_of(step) for step in steps],
         source=known.source,
         notes=known.notes,
     )
@@ -345,7 +347,8 @@ def matches(kind: str, found: Found) -> list[models_bench.ProfileMatch]:
             profile=match.profile.drive,
             title=match.profile.title,
             confidence=match.confidence,
-            why=match.why,
+            why=words_of(match.why),
+            why_message=message_of(match.why),
         )
         for match in match_profiles(kind, found)
     ]
@@ -373,7 +376,8 @@ def difference(row: Difference) -> models_sets.DiffRow:
         default_raw=default,
         default_value=value(default),
         status=row.status,
-        problem=row.problem,
+        problem=words_of(row.problem),
+        problem_message=message_or_none(row.problem),
         motor_individual=bool(known and known.motor_individual),
         selected=row.selected,
     )

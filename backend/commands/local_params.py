@@ -22,6 +22,7 @@ from backend.tools import parameters
 from backend.tools.measuring.restore import settle
 from backend.tools.moves import procedures
 from drivers.errors import NotAllowed
+from drivers.texts.message import language
 from profiles.schema import Raw
 
 
@@ -140,7 +141,8 @@ def _compared(row: parameter_set.Difference) -> Compared:
         return raw if raw is None or row.parameter is None else row.parameter.to_value(raw)
 
     name, unit = (row.parameter.name, row.parameter.unit) if row.parameter else ("?", "")
+    problem = "" if row.problem is None else row.problem.words(language())
     return Compared(
         row.key, name, unit, row.ours, value(row.ours), row.theirs, value(row.theirs),
-        row.status, row.problem, row.selected,
+        row.status, problem, row.selected,
     )  # fmt: skip

@@ -24,6 +24,7 @@ from drivers.errors import NotAllowed
 from drivers.texts.checks import check_line
 from drivers.texts.imports import failure_text, finding_line, summary_text
 from drivers.texts.message import language, reason_of, text
+from drivers.texts.motion_classes import refusal_text
 from profiles import drive_names, load_profile
 from profiles.check import check as check_profile
 from profiles.check import coverage, motion_counts, unclassified
@@ -216,7 +217,11 @@ def classify_object(
             now = decisions.classify(
                 drive, key, cast(Motion, motion), reason=reason, safe_in_motion=safe_in_motion
             )
-    except (decisions.CannotClassify, ValueError) as error:
+    except decisions.CannotClassify as error:
+        raise NotAllowed(
+            refusal_text(error), parameter=key, remedy="command.see-not-listed"
+        ) from error
+    except ValueError as error:
         raise NotAllowed(
             reason_of(error), parameter=key, remedy="command.see-not-listed"
         ) from error

@@ -234,7 +234,7 @@ def hand_over(
             why = text("handover.left-out-locks")
         seen.add(row.key)
         if row.problem or why is not None or parameter is None or row.raw is None:
-            bad = prose(row.problem) if row.problem else text("handover.left-out-bad-row")
+            bad = row.problem or text("handover.left-out-bad-row")
             left.append(LeftOut(row.key, bad if row.problem or why is None else why))
             continue
         writes.append(write_of(parameter, row.raw))

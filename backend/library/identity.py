@@ -7,14 +7,11 @@ from typing import Literal
 
 from backend.drive.drive import Drive
 from backend.parameters.set_file import ParameterSet
+from drivers.texts.message import Text, text
 
 What = Literal["vendor", "product", "serial", "revision", "firmware"]
 #: What makes it another drive: writing needs consent. The others are only reported.
 _OTHER_DRIVE = frozenset({"vendor", "product", "serial"})
-_WORDS: dict[What, str] = {
-    "vendor": "vendor id", "product": "product code", "serial": "serial number",
-    "revision": "revision", "firmware": "firmware",
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +27,10 @@ class Difference:
         """Whether writing needs consent."""
         return self.what in _OTHER_DRIVE
 
-    def __str__(self) -> str:
-        return f"it was saved from {_WORDS[self.what]} {self.theirs}, this drive has {self.ours}"
+    @property
+    def text(self) -> Text:
+        """The difference as a message."""
+        return text("library.saved-from", what=self.what, theirs=self.theirs, ours=self.ours)
 
 
 def differences(content: ParameterSet, drive: Drive) -> list[Difference]:

@@ -12,6 +12,7 @@ from backend.parameters import set_file as parameter_set
 from backend.parameters.set_file import SUFFIX, BadSet, ParameterSet
 from backend.store.files import StorageFailed, checked_name
 from drivers.errors import NotAllowed
+from drivers.texts.message import Text, text
 
 _TAKEN = "imported"
 
@@ -114,12 +115,12 @@ class LibrarySets:
             return
         self.library.delete(self.entry(name).id)
 
-    def take_in(self) -> dict[str, str]:
+    def take_in(self) -> dict[str, Text]:
         """Take in the files of the folder; returns those that cannot be, and why.
 
         A file is moved after its contents are stored: a crash between stores nothing twice.
         """
-        problems: dict[str, str] = {}
+        problems: dict[str, Text] = {}
         for path in sorted(self.folder.glob(f"*{SUFFIX}"), key=lambda p: p.stat().st_mtime):
             if path.name.startswith("."):
                 continue
@@ -131,9 +132,11 @@ class LibrarySets:
             except StorageFailed:
                 raise
             except (BadSet, NotAllowed) as error:
-                problems[path.name] = error.message
+                problems[path.name] = error.text
             except OSError as error:
-                problems[path.name] = f"{path.name} cannot be read: {error.strerror}"
+                problems[path.name] = text(
+                    "library.set-cannot-be-read", name=path.name, cause=error.strerror
+                )
         return problems
 
 

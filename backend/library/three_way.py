@@ -9,6 +9,7 @@ from typing import Literal
 from backend.drive.drive import Drive
 from backend.drive.readings import Reading
 from backend.parameters.set_file import Row, compare
+from drivers.texts.message import Text
 from profiles.schema import Parameter, Raw
 
 Status = Literal[
@@ -31,7 +32,7 @@ class Triple:
     theirs: Raw | None
     ours: Raw | None
     status: Status
-    problem: str = ""
+    problem: Text | None = None
     selected: bool = False
 
 

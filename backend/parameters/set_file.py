@@ -19,7 +19,8 @@ from backend.drive.readings import Reading
 from backend.motion.alternatives import refused
 from backend.motion.classes import motion_of
 from backend.parameters.toml_keys import deepest_key
-from drivers.errors import DriveError, NotAllowed
+from drivers.errors import DriveError, NotAllowed, with_remedy
+from drivers.texts.message import Text, text
 from profiles.schema import Parameter, Profile, Raw
 
 FORMAT = "servodeck parameter set"
@@ -48,7 +49,7 @@ class Row:
     raw: Raw | None
     name: str = ""
     unit: str = ""
-    problem: str = ""
+    problem: Text | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +80,7 @@ class Difference:
     theirs: Raw | None
     ours: Raw | None
     status: Status
-    problem: str = ""
+    problem: Text | None = None
     selected: bool = False
 
 
@@ -226,11 +227,12 @@ def _table(content: dict[str, Any], field: str, name: str) -> dict[str, Any]:
 
 def _row(row: object, number: int) -> Row:
     if not isinstance(row, dict) or not isinstance(row.get("key"), str):
-        return Row(f"row {number}", None, problem=f"row {number} has no key")
+        return Row(f"#{number}", None, problem=text("sets.row-no-key", row=number))
     raw = row.get("raw")
     name, unit = str(row.get("name", "")), str(row.get("unit", ""))
     if isinstance(raw, bool) or not isinstance(raw, (int, float, str)):
-        return Row(row["key"], None, name, unit, f"row {number}: raw {raw!r} is not a value")
+        why = text("sets.row-no-value", row=number, raw=repr(raw))
+        return Row(row["key"], None, name, unit, why)
     return Row(row["key"], raw, name, unit)
 
 
@@ -241,7 +243,8 @@ def compare(drive: Drive, rows: Iterable[Row], ours: dict[str, Reading]) -> list
     for row in rows:
         parameter = drive.profile.by_key.get(row.key)
         if row.key in seen:
-            result.append(Difference(parameter, row.key, row.raw, None, "invalid", "given twice"))
+            twice = text("sets.row-twice")
+            result.append(Difference(parameter, row.key, row.raw, None, "invalid", twice))
             continue
         seen.add(row.key)
         result.append(_difference(drive, parameter, row, ours.get(row.key)))
@@ -257,25 +260,24 @@ def _difference(
 ) -> Difference:
     now = ours.raw if ours else None
     if parameter is None:
-        text = f"{drive.profile.title} has no parameter {row.key}"
-        return Difference(None, row.key, row.raw, None, "not_in_drive", row.problem or text)
+        lacks = text("sets.row-no-parameter", profile_title=drive.profile.title, key=row.key)
+        return Difference(None, row.key, row.raw, None, "not_in_drive", row.problem or lacks)
     if row.raw is None:
         return Difference(parameter, row.key, None, now, "invalid", row.problem)
-    why = drive.unreachable_why(parameter)
-    if why is not None or (ours is not None and ours.error):
-        problem = why.words() if why is not None else ours.error if ours else ""
+    problem = drive.unreachable_why(parameter) or (None if ours is None else ours.problem)
+    if problem is not None:
         return Difference(parameter, row.key, row.raw, None, "not_in_drive", problem)
     if parameter.access == "ro":
         return Difference(parameter, row.key, row.raw, now, "read_only")
     try:
         drive.check(parameter, row.raw)
     except DriveError as error:
-        return Difference(parameter, row.key, row.raw, now, "invalid", error.message)
+        return Difference(parameter, row.key, row.raw, now, "invalid", error.text)
     if row.raw == now:
         return Difference(parameter, row.key, row.raw, now, "same")
     if motion_of(parameter) == "energises":
         no = refused(drive.name, drive.profile, parameter)
-        problem = f"{no.message}; {no.remedy}"
+        problem = with_remedy(no)
         return Difference(parameter, row.key, row.raw, now, "energises", problem)
     return Difference(
         parameter, row.key, row.raw, now, "differs", selected=not parameter.motor_individual

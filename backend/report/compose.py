@@ -126,7 +126,7 @@ def _step_verdict(view: StepAnswer, kind: str, words: Words) -> Note:
 
 
 def _warnings(facts: Facts, words: Words) -> list[Block]:
-    found = [Note(each, "fault") for each in facts.trouble]
+    found = [Note(each.words(words.language), "fault") for each in facts.trouble]
     if facts.unsaved:
         found.append(Note(words("warn.unsaved", keys=", ".join(facts.unsaved)), "warn"))
     if facts.pending:
@@ -137,7 +137,10 @@ def _warnings(facts: Facts, words: Words) -> list[Block]:
         if c.now
     ]
     found += _stale(facts, words)
-    found += [Note(words("warn.unusable", why=each), "warn") for each in facts.unusable]
+    found += [
+        Note(words("warn.unusable", why=each.words(words.language)), "warn")
+        for each in facts.unusable
+    ]
     return list(found) or [Note(words("none"))]
 
 

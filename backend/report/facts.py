@@ -9,6 +9,7 @@ from datetime import datetime
 from backend.health.records import Condition
 from backend.tools.autotune.result import VerdictInfo
 from backend.tools.tool import ToolResult
+from drivers.texts.message import Text
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,8 @@ class Measured:
 
 @dataclass(frozen=True)
 class Facts:
-    """``unsaved`` and ``pending`` name parameters; ``trouble`` are sentences of the drive.
+    """``unsaved`` and ``pending`` name parameters; ``trouble`` is what the drive
+    and the station report.
 
     ``last_change`` is None where nothing was changed.
     """
@@ -95,10 +97,10 @@ class Facts:
     changes: tuple[ChangedSetting, ...] = ()
     last_change: datetime | None = None
     measured: tuple[Measured, ...] = ()
-    unusable: tuple[str, ...] = ()
+    unusable: tuple[Text, ...] = ()
     unsaved: tuple[str, ...] = ()
     pending: tuple[str, ...] = ()
-    trouble: tuple[str, ...] = ()
+    trouble: tuple[Text, ...] = ()
     handed_over: tuple[HandedOverFile, ...] = ()
     condition: Condition | None = None
     #: Whether the drive was asked; a report of files alone has no data of its settings.

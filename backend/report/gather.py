@@ -19,6 +19,7 @@ from backend.station.connected_drive import ConnectedDrive
 from backend.station.evaluation import evaluate
 from backend.tools.registry import TOOLS
 from drivers.errors import DriveError, NotAllowed
+from drivers.texts.message import Text, joined, prose, text
 from profiles.schema import Parameter, Raw
 
 #: The order in which an axis is commissioned, and a report is read.
@@ -83,32 +84,32 @@ def _alike(kind: str, heads: Mapping[str, Head]) -> list[list[tuple[datetime, st
 
 def measured_from(
     store: MeasurementStore, chosen: Iterable[tuple[str, str]]
-) -> tuple[tuple[Measured, ...], tuple[str, ...]]:
-    """Chosen files evaluated again, and sentences about those that cannot be. Takes seconds.
+) -> tuple[tuple[Measured, ...], tuple[Text, ...]]:
+    """Chosen files evaluated again, and messages about those that cannot be. Takes seconds.
 
     Raises:
         NotAllowed: there is no file of a name.
     """
     found: list[Measured] = []
-    unusable: list[str] = []
+    unusable: list[Text] = []
     for newest, earlier in chosen:
         try:
             measured = _measured(store, newest)
         except (BadMeasurement, DriveError) as error:
-            unusable.append(_sentence(newest, error))
+            unusable.append(_why(newest, error))
             continue
         if earlier:
             try:
                 measured = replace(measured, earlier=_measured(store, earlier))
             except (BadMeasurement, DriveError) as error:
-                unusable.append(_sentence(earlier, error))
+                unusable.append(_why(earlier, error))
         found.append(measured)
     return tuple(found), tuple(unusable)
 
 
-def _sentence(file: str, error: DriveError) -> str:
+def _why(file: str, error: DriveError) -> Text:
     """What names the file as its value has it in the text already."""
-    return error.message if error.value == file else f"{file}: {error.message}"
+    return error.text if error.value == file else joined((prose(file), error.text), ": ")
 
 
 def _measured(store: MeasurementStore, file: str) -> Measured:
@@ -137,8 +138,9 @@ async def live_facts(
     settings, trouble = await _changes(drive, changes)
     snapshot = connected.monitor.snapshot
     if not snapshot.fresh:
-        trouble.append(f"{drive.name}: {snapshot.problem or 'does not answer'}")
-    trouble += [f"{fault.code} {fault.name}" for fault in snapshot.faults]
+        why = snapshot.problem or text("report.drive-does-not-answer")
+        trouble.append(joined((prose(drive.name), why), ": "))
+    trouble += [prose(f"{fault.code} {fault.name}") for fault in snapshot.faults]
     named = drive.profile.by_key
     return Facts(
         identity=_identity(bench, drive),
@@ -173,9 +175,9 @@ def _identity(bench: Bench, drive: Drive) -> Identity:
 
 async def _changes(
     drive: Drive, changes: Sequence[Change]
-) -> tuple[tuple[ChangedSetting, ...], list[str]]:
+) -> tuple[tuple[ChangedSetting, ...], list[Text]]:
     rows: list[ChangedSetting] = []
-    trouble: list[str] = []
+    trouble: list[Text] = []
     for each in net(changes):
         parameter = drive.profile.by_key.get(each.key)
         if parameter is None:
@@ -186,7 +188,7 @@ async def _changes(
                 raw = await drive.raw(each.key)
                 now = "" if raw == each.after else shown(parameter, raw)
             except DriveError as error:
-                trouble.append(error.message)
+                trouble.append(error.text)
         rows.append(
             ChangedSetting(
                 each.key, parameter.name, shown(parameter, each.before),

@@ -8,7 +8,7 @@ from typing import Literal
 
 from drivers.errors import NotAllowed
 from drivers.link import Found
-from drivers.texts.message import reason_of
+from drivers.texts.message import Text, reason_of, text
 from profiles import load_all, load_profile
 from profiles.loader import ProfileError
 from profiles.schema import LinkSpec, Profile
@@ -20,7 +20,7 @@ class Match:
 
     profile: Profile
     confidence: Literal["certain", "likely", "possible"]
-    why: str
+    why: Text
 
 
 def match_profiles(kind: str, found: Found) -> list[Match]:
@@ -35,16 +35,19 @@ def match_profiles(kind: str, found: Found) -> list[Match]:
             if identity.vendor_id != found.vendor_id:
                 continue
             if identity.product_code is not None and identity.product_code == found.product_code:
-                matches.append(Match(profile, "certain", "vendor and product code agree"))
+                matches.append(Match(profile, "certain", text("station.match-product")))
             else:
-                matches.append(Match(profile, "likely", "the vendor agrees"))
+                matches.append(Match(profile, "likely", text("station.match-vendor")))
             continue
         if any(re.search(p, found.name, re.IGNORECASE) for p in identity.name_patterns):
-            matches.append(Match(profile, "likely", f"its name {found.name!r} fits"))
+            why = text("station.match-name", name=found.name)
+            matches.append(Match(profile, "likely", why))
         else:
-            silent = "the manual prints" if identity.vendor_id is None else "the drive tells"
-            text = f"it answers over {kind}; {silent} no identity to compare"
-            matches.append(Match(profile, "possible", text))
+            # Silent is the drive, or already its manual.
+            silent = "manual" if identity.vendor_id is None else "drive"
+            matches.append(
+                Match(profile, "possible", text("station.match-bus", bus=kind, silent=silent))
+            )
     order = ("certain", "likely", "possible")
     return sorted(matches, key=lambda m: order.index(m.confidence))
 

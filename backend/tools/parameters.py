@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from backend.drive.drive import Drive
@@ -16,9 +16,10 @@ from backend.motion.grant import NotGranted
 from backend.parameters import set_file as parameter_set
 from backend.parameters.set_file import ParameterSet
 from backend.work.jobs import JobResult
-from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed
+from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, with_remedy
 from drivers.link import Progress
-from drivers.texts.message import text
+from drivers.texts.answers import sentence
+from drivers.texts.message import Text, text
 from profiles.schema import Raw
 
 #: Tag of the sets that are made before something is loaded.
@@ -42,9 +43,12 @@ async def read_all(drive: Drive, keys: Sequence[str] | None, progress: Progress)
     """
     wanted = readable_keys(drive) if keys is None else list(keys)
     readings = await drive.read_many(wanted, progress)
-    failed = {key: r.error for key, r in readings.items() if r.error and not r.unused}
-    read = sum(not r.error for r in readings.values())
-    return {"read": read, "failed": failed}
+    failed = {k: r.problem for k, r in readings.items() if r.problem is not None and not r.unused}
+    return {
+        "read": sum(r.problem is None for r in readings.values()),
+        "failed": {key: why.words() for key, why in failed.items()},
+        "failed_messages": {key: why.to_wire() for key, why in failed.items()},
+    }
 
 
 async def read_settings(
@@ -63,13 +67,12 @@ async def read_settings(
     return readings
 
 
-def without(keys: Sequence[str]) -> str:
-    """What a set lacks, as text to be added to a sentence; empty where it lacks nothing."""
+def without(keys: Sequence[str]) -> Text | None:
+    """What a set lacks, to be added to a sentence; None where it lacks nothing."""
     if not keys:
-        return ""
+        return None
     named = ", ".join(keys[:_NAMED]) + (" …" if len(keys) > _NAMED else "")
-    plural = "s" if len(keys) > 1 else ""
-    return f" without {len(keys)} setting{plural} that could not be read ({named})"
+    return text("set.without", count=len(keys), keys=named)
 
 
 async def save_set(
@@ -104,7 +107,15 @@ class Written:
     wanted: Raw
     after: Raw | None
     ok: bool
-    problem: str = ""
+    problem: Text | None = None
+
+    def answer(self) -> dict[str, object]:
+        """As a row of the job's result."""
+        row: dict[str, object] = {
+            "key": self.key, "before": self.before, "wanted": self.wanted, "after": self.after,
+            "ok": self.ok,
+        }  # fmt: skip
+        return row | sentence("problem", self.problem)
 
 
 async def load_set(
@@ -154,7 +165,7 @@ async def load_set(
         "written": sum(row.ok for row in report),
         "failed": sum(not row.ok for row in report),
         "backup": backup,
-        "rows": [asdict(row) for row in report],
+        "rows": [row.answer() for row in report],
     }
 
 
@@ -178,7 +189,7 @@ def _check_identity(drive: Drive, content: ParameterSet, accepted: bool) -> bool
             drive=drive.name,
             value=other[0].theirs,
             limit=other[0].ours,
-            other=str(other[0]),
+            other=other[0].text,
         )
     return bool(other)
 
@@ -219,11 +230,9 @@ async def _write_verified(drive: Drive, key: str, raw: Raw) -> Written:
     except LinkLost:
         raise
     except DriveError as error:
-        problem = error.message
-        if isinstance(error, NotGranted):
-            problem += f"; {error.remedy}"
+        problem = with_remedy(error) if isinstance(error, NotGranted) else error.text
         return Written(key, before, raw, None, ok=False, problem=problem)
     if after != raw:
-        text = f"the drive keeps {after} instead of {raw}"
-        return Written(key, before, raw, after, ok=False, problem=text)
+        kept = text("set.keeps-other-value", after=after, raw=raw)
+        return Written(key, before, raw, after, ok=False, problem=kept)
     return Written(key, before, raw, after, ok=True)

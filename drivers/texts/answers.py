@@ -1,8 +1,9 @@
 """Answers of tools as plain values: each sentence next to its message, in any language.
 
 A message is a code and facts under ``<name>_message``, several are a list under
-``<name>_messages``; their sentences stand under ``<name>`` (``<name>s`` of a list, where that is
-the plural) for programs that read sentences. Files of older versions have the sentences alone.
+``<name>_messages`` (a map where the sentences are one); their sentences stand under ``<name>``
+(``<name>s`` of a list, where that is the plural) for programs that read sentences. Files of older
+versions have the sentences alone.
 """
 
 from __future__ import annotations
@@ -50,6 +51,10 @@ def in_language(answer: Mapping[str, object], language: Language) -> dict[str, o
             stem = name.removesuffix(_SEVERAL)
             words = [Text.from_wire(each).words(language) for each in value]
             shown[stem if stem in shown else f"{stem}s"] = words
+        elif name.endswith(_SEVERAL) and isinstance(value, Mapping):
+            shown[name.removesuffix(_SEVERAL)] = {
+                key: Text.from_wire(each).words(language) for key, each in value.items()
+            }
         elif name.endswith(_ONE) and isinstance(value, Mapping) and "code" in value:
             shown[name.removesuffix(_ONE)] = Text.from_wire(value).words(language)
     return shown

@@ -23,22 +23,33 @@ _MAX_REASON = 500
 
 
 class CannotClassify(Exception):
-    """The class of this object is not a person's to give; the message states the reason."""
+    """The class of this object is not a person's to give.
+
+    ``code`` of the catalogue states the reason, with its facts as ``params``.
+    """
+
+    def __init__(self, code: str, **params: str) -> None:
+        super().__init__(code, params)
+        self.code = code
+        self.params = params
 
 
-def why_fixed(profile: Profile, parameter: Parameter) -> str:
-    """Why a person cannot change the motion class of this object; empty where it is possible."""
+def why_fixed(profile: Profile, parameter: Parameter) -> str | None:
+    """Why a person cannot change the motion class of this object, as a code of the catalogue.
+
+    None where it is possible.
+    """
     if parameter.access == "ro":
-        return "it cannot be written, so it has no motion class"
+        return "motion.class-not-writable"
     if not is_own(profile.drive):
-        return "it comes with servodeck and has its classes from the manual"
+        return "motion.class-from-manual"
     if standard_rule(parameter.key) is not None:
-        return "its class is that of the standard (CiA 301, CiA 402)"
+        return "motion.class-of-standard"
     if any(
         rule.origin == "profile" and rule.covers(parameter.key) for rule in profile.motion_rules
     ):
-        return "its class stands in the profile"
-    return ""
+        return "motion.class-in-profile"
+    return None
 
 
 def classify(
@@ -55,7 +66,7 @@ def classify(
     parameter = _changeable(drive, key)
     reported = " ".join(reason.split())[:_MAX_REASON]
     if not reported:
-        raise CannotClassify(f"{parameter.key}: say why it has this class")
+        raise CannotClassify("motion.class-needs-reason", key=parameter.key)
     rule = MotionRule(
         keys=(parameter.key,),
         motion=motion,
@@ -82,9 +93,11 @@ def _changeable(drive: str, key: str) -> Parameter:
     profile = load_profile(drive)
     parameter = profile.parameter(key)
     if parameter is None:
-        raise CannotClassify(f"{profile.title} has no parameter {key}")
+        raise CannotClassify("motion.class-of-no-parameter", profile_title=profile.title, key=key)
     if why := why_fixed(profile, parameter):
-        raise CannotClassify(f"{profile.title}: {parameter.key} {parameter.name}: {why}")
+        raise CannotClassify(
+            why, profile_title=profile.title, key=parameter.key, name=parameter.name
+        )
     return parameter
 
 

@@ -226,6 +226,7 @@ async def test_files_of_the_station_are_listed_and_not_copied(
     by_name = {e["name"]: e for e in page["entries"]}
     assert by_name[name]["latest"]["axis"]["name"] == "Feed-axis"
     assert "bad.sdmeas" in by_name["bad.sdmeas"]["latest"]["facts"]["problem"]
+    assert by_name["bad.sdmeas"]["latest"]["problem_message"]["code"].startswith("library.")
     report = await http.get(f"/library/{by_name[name]['id']}/content")
     assert report.text == "<script>alert(1)</script>"
     assert report.headers["content-disposition"].startswith("attachment;")

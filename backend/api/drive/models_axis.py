@@ -91,6 +91,7 @@ class ProcedureInfo(Message):
     requires_stop: bool
     confirm: list[str] = Field(description="texts the user must agree to")
     steps: list[str]
+    step_messages: list[MessageInfo] = Field(default_factory=list, description="of steps")
     source: str
     notes: str
 

@@ -8,7 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path
 
 from backend.api.context import Me, TheBench, ThePeople
-from backend.api.errors import NotFound
+from backend.api.errors import NotFound, message_or_none, words_of
 from backend.api.security.gate import require_right
 from backend.api.station.models_description import PROFILE_NAME, MotionClass, MotionClassRequest
 from backend.audit.asked import note_before
@@ -16,9 +16,10 @@ from backend.people.rights import Right
 from backend.station.bench import Bench
 from drivers.errors import NotAllowed
 from drivers.texts.message import reason_of, text
+from drivers.texts.motion_classes import fixed_text, refusal_text
 from profiles import load_profile
 from profiles.loader import ProfileError
-from profiles.motion.decisions import CannotClassify, classify, forget, why_fixed
+from profiles.motion.decisions import CannotClassify, classify, forget
 from profiles.schema import Parameter, Profile
 
 router = APIRouter()
@@ -43,14 +44,15 @@ def _known(profile: str, key: str) -> tuple[Profile, Parameter]:
 
 def _answer(profile: str, key: str) -> MotionClass:
     known, parameter = _known(profile, key)
-    why = why_fixed(known, parameter)
+    why = fixed_text(known, parameter)
     return MotionClass(
         motion=parameter.motion,
         safe_in_motion=parameter.safe_in_motion,
         origin=parameter.motion_origin,
         reason=parameter.motion_reason,
-        changeable=not why,
-        fixed_why=why,
+        changeable=why is None,
+        fixed_why=words_of(why),
+        fixed_why_message=message_or_none(why),
     )
 
 
@@ -105,7 +107,7 @@ def _note(profile: str, key: str) -> None:
 
 def _refused(key: str, error: CannotClassify) -> NotAllowed:
     return NotAllowed(
-        reason_of(error),
+        refusal_text(error),
         parameter=key,
         limit=text("limit.imported-objects"),
         remedy="api-drive.use-page-of-function",

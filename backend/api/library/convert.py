@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from backend.api.errors import message_or_none
+from backend.api.errors import message_of, message_or_none, words_of
 from backend.api.library.models import (
     AxisInfo,
     LibraryEntry,
@@ -14,8 +14,8 @@ from backend.api.library.models import (
 )
 from backend.library.entries import AxisIdentity, Entry, Version
 from backend.library.three_way import Triple
-from drivers.texts.answers import in_language, message_in
-from drivers.texts.message import language
+from drivers.texts.answers import message_in
+from drivers.texts.message import Text
 from profiles.schema import Parameter, Raw
 
 #: Kept for searching and for the index; nothing for people.
@@ -45,6 +45,10 @@ def _facts(known: Mapping[str, object]) -> dict[str, int | float | str | bool | 
 
 def version(known: Version) -> VersionInfo:
     """One version."""
+    problem = message_in(known.facts, "problem")
+    facts = _facts(known.facts)
+    if problem is not None:
+        facts["problem"] = words_of(problem)
     return VersionInfo(
         number=known.number,
         saved=known.saved,
@@ -53,8 +57,8 @@ def version(known: Version) -> VersionInfo:
         bytes=known.bytes,
         sha256=known.sha256,
         axis=axis(known.axis),
-        facts=_facts(in_language(known.facts, language())),
-        problem_message=message_or_none(message_in(known.facts, "problem")),
+        facts=facts,
+        problem_message=message_or_none(problem),
     )
 
 
@@ -95,11 +99,11 @@ def stored_set(known: Entry) -> StoredSet:
     )
 
 
-def unusable_set(file: str, problem: str) -> StoredSet:
+def unusable_set(file: str, problem: Text) -> StoredSet:
     """A file in the folder that is no parameter set."""
     return StoredSet(
         file=file, profile="", drive_name="", serial=None, firmware="", author="", saved=None,
-        notes="", count=0, problem=problem,
+        notes="", count=0, problem=words_of(problem), problem_message=message_of(problem),
     )  # fmt: skip
 
 
@@ -118,7 +122,8 @@ def triple(row: Triple) -> ThreeWayRow:
         drive_raw=row.ours,
         drive_value=_value(known, row.ours),
         status=row.status,
-        problem=row.problem,
+        problem=words_of(row.problem),
+        problem_message=message_or_none(row.problem),
         motor_individual=bool(known and known.motor_individual),
         selected=row.selected,
     )

@@ -67,6 +67,7 @@ class LibraryPage(Message):
     entries: list[LibraryEntry]
     total: int
     problems: list[str] = Field(description="files that could not be added to the library")
+    problem_messages: list[MessageInfo] = Field(default_factory=list, description="of problems")
     shared: bool = Field(description="other stations may have the same library")
 
 
@@ -119,6 +120,7 @@ class ThreeWayRow(Message):
         "energises",
     ] = Field(description="theirs, drive: changed only there; both: to the same; conflict: not")
     problem: str = ""
+    problem_message: MessageInfo | None = Field(default=None, description="of problem")
     motor_individual: bool = False
     selected: bool = Field(description="proposed for writing")
 
@@ -134,4 +136,5 @@ class ThreeWay(Message):
     same_profile: bool
     same_serial: bool | None
     warnings: list[str]
+    warning_messages: list[MessageInfo] = Field(default_factory=list, description="of warnings")
     rows: list[ThreeWayRow]

@@ -11,7 +11,7 @@ from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse
 
 from backend.api.context import TheBench
-from backend.api.errors import NotFound
+from backend.api.errors import NotFound, message_of, words_of
 from backend.api.library import convert as convert_library
 from backend.api.library.models import (
     LibraryChange,
@@ -54,13 +54,14 @@ def _entry(bench: Bench, entry_id: int) -> Entry:
 def _page(bench: Bench, recordings: Recordings, query: LibraryQuery) -> LibraryPage:
     """Blocks. Everything is brought up to date first: files come and go by other ways too."""
     records = bench.records
-    problems = list(records.sets.take_in().values())
+    problems = records.sets.take_in().values()
     records.index.refresh(recordings.running)
     entries, total = records.library.search(query)
     return LibraryPage(
         entries=[convert_library.entry(entry, records.station) for entry in entries],
         total=total,
-        problems=problems,
+        problems=[words_of(why) for why in problems],
+        problem_messages=[message_of(why) for why in problems],
         # A file has one station; a database server may have many.
         shared=records.store.sqlite_file is None,
     )

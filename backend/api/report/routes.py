@@ -60,7 +60,7 @@ async def make_report(bench: TheBench, connected: TheDrive, request: ReportReque
         whole = replace(whole, condition=condition)
     except DatabaseFailed as error:
         # All else of the report is in files: it is made without the database, and names that.
-        whole = replace(whole, trouble=(*whole.trouble, error.message))
+        whole = replace(whole, trouble=(*whole.trouble, error.text))
     data = await asyncio.to_thread(render, whole, request.language, request.format)
     file = await asyncio.to_thread(_store(bench).save, connected.drive.name, request.format, data)
     line = text("journal.report", drive=connected.drive.name, file=file)

@@ -8,6 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from backend.api.models import Message, Raw
+from backend.tools.wire_message import MessageInfo
 
 
 class LoadSetRequest(Message):
@@ -35,6 +36,7 @@ class SetFileInfo(Message):
     notes: str
     count: int
     problem: str = Field(default="", description="why the file cannot be used")
+    problem_message: MessageInfo | None = Field(default=None, description="of problem")
 
 
 class SaveSetRequest(Message):
@@ -64,6 +66,7 @@ class DiffRow(Message):
         "differs", "same", "not_in_drive", "not_in_file", "invalid", "read_only", "energises"
     ]
     problem: str = ""
+    problem_message: MessageInfo | None = Field(default=None, description="of problem")
     motor_individual: bool = False
     selected: bool = Field(description="proposed for writing")
 
@@ -77,4 +80,5 @@ class Diff(Message):
     same_profile: bool
     same_serial: bool | None
     warnings: list[str]
+    warning_messages: list[MessageInfo] = Field(default_factory=list, description="of warnings")
     rows: list[DiffRow]

@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from backend.api import convert
 from backend.api.context import Controlled, TheBench, TheDrive
-from backend.api.errors import NotFound
+from backend.api.errors import NotFound, message_of, words_of
 from backend.api.library import convert as convert_library
 from backend.api.library.models import StoredSet, ThreeWay
 from backend.api.sets.models import Diff, SaveSetRequest
@@ -24,7 +24,7 @@ from backend.people.identity import acting_person
 from backend.station.bench import Bench
 from backend.tools import parameters
 from drivers.errors import NotAllowed, OutOfRange
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 
 router = APIRouter()
 
@@ -142,7 +142,7 @@ async def diff(
         rows, label = await _of_drive(other), other.name
         same_profile, same_serial = other.profile.drive == drive.profile.drive, False
         if not same_profile:
-            warnings = [_OTHER_FAMILY]
+            warnings = [text("api-sets.other-family")]
     ours = await _read(drive, rows, full=file is not None)
     return Diff(
         file=label,
@@ -150,7 +150,8 @@ async def diff(
         drive=drive.id,
         same_profile=same_profile,
         same_serial=same_serial,
-        warnings=warnings,
+        warnings=[words_of(each) for each in warnings],
+        warning_messages=[message_of(each) for each in warnings],
         rows=[convert.difference(row) for row in parameter_set.compare(drive, rows, ours)],
     )
 
@@ -170,7 +171,7 @@ async def three_way(
     content = await _parsed(bench, theirs, theirs_version)
     same_profile, same_serial, warnings = _identity(content, drive)
     if before.profile != content.profile:
-        warnings.append("the base is of another drive family")
+        warnings.append(text("api-sets.base-other-family"))
     ours = await _read(drive, content.rows, full=True)
     return ThreeWay(
         base=base,
@@ -180,7 +181,8 @@ async def three_way(
         drive=drive.id,
         same_profile=same_profile,
         same_serial=same_serial,
-        warnings=warnings,
+        warnings=[words_of(each) for each in warnings],
+        warning_messages=[message_of(each) for each in warnings],
         rows=[
             convert_library.triple(row)
             for row in compare_three(drive, before.rows, content.rows, ours)
@@ -188,18 +190,15 @@ async def three_way(
     )
 
 
-_OTHER_FAMILY = "of another drive family: nothing of it can be written here"
-
-
-def _identity(content: ParameterSet, drive: Drive) -> tuple[bool, bool | None, list[str]]:
+def _identity(content: ParameterSet, drive: Drive) -> tuple[bool, bool | None, list[Text]]:
     """Same family; same drive, None where that cannot be known; and what to warn of."""
     same_profile = content.profile == drive.profile.drive
     differing = differences(content, drive)
     serial = drive.found.serial if drive.found else None
     known = content.serial is not None and serial is not None
     same_drive = False if any(d.other_drive for d in differing) else (True if known else None)
-    warnings = [] if same_profile else [_OTHER_FAMILY]
-    return same_profile, same_drive, warnings + [str(difference) for difference in differing]
+    warnings = [] if same_profile else [text("api-sets.other-family")]
+    return same_profile, same_drive, warnings + [difference.text for difference in differing]
 
 
 def _defaults(drive: Drive) -> list[Row]:

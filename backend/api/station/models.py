@@ -119,6 +119,7 @@ class ProfileMatch(Message):
     title: str
     confidence: Literal["certain", "likely", "possible"]
     why: str
+    why_message: MessageInfo | None = Field(default=None, description="of why")
 
 
 class FoundDrive(Message):

@@ -35,6 +35,7 @@ class MotionClass(Message):
     reason: str
     changeable: bool = Field(description="whether a person may give it another class")
     fixed_why: str = Field(description="why not; empty where it is changeable")
+    fixed_why_message: MessageInfo | None = Field(default=None, description="of fixed_why")
 
 
 class MotionClassRequest(Message):

@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from backend.api.context import Me, TheBench
 from backend.api.disposition import disposition
-from backend.api.errors import NotFound
+from backend.api.errors import NotFound, message_of, words_of
 from backend.api.tuning.models import MeasurementContent, MeasurementInfo, SignatureRequest
 from backend.library.measurements import SUFFIX, BadMeasurement, Head, Measurement
 from backend.report.changes import ChangeLog
@@ -85,7 +85,7 @@ def _listed(bench: Bench) -> list[MeasurementInfo]:
             rows.append(
                 MeasurementInfo(
                     file=name, kind="", drive="", profile="", serial=None, saved=None,
-                    problem=error.text.words(language()),
+                    problem=words_of(error.text), problem_message=message_of(error.text),
                 )
             )  # fmt: skip
     return rows

@@ -142,6 +142,7 @@ class MeasurementInfo(Message):
     serial: int | None
     saved: datetime | None
     problem: str = ""
+    problem_message: MessageInfo | None = Field(default=None, description="of problem")
 
 
 class MeasurementContent(Message):

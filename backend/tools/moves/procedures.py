@@ -14,7 +14,7 @@ from backend.tools.thresholds import moves_procedures as threshold
 from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, Rejected
-from drivers.texts.message import prose, text
+from drivers.texts.message import Text, text
 from profiles.schema import (
     ConfirmStep,
     PollStep,
@@ -27,25 +27,28 @@ from profiles.schema import (
 )
 
 
-def describe(procedure: Procedure) -> list[str]:
-    """Each step as text."""
-    words: list[str] = []
-    for step in procedure.steps:
-        match step:
-            case WriteStep():
-                shown = f"0x{step.raw:X}" if isinstance(step.raw, int) else step.raw
-                words.append(f"write {shown} to {step.key}")
-            case RewriteStep():
-                words.append("write again what was changed since the last save")
-            case WaitStep():
-                words.append(f"leave the drive alone for {step.seconds:g} s")
-            case PollStep():
-                words.append(f"wait until {step.key} is {step.equals} (≤ {step.timeout_s:g} s)")
-            case ConfirmStep():
-                words.append(f"you confirm: {step.text}")
-            case ReconnectStep():
-                words.append(f"wait until the drive answers again (≤ {step.timeout_s:g} s)")
-    return words
+def describe(procedure: Procedure) -> list[Text]:
+    """Each step as a message; ``text`` of a confirmation is a text of the profile."""
+    return [_described(step) for step in procedure.steps]
+
+
+def _described(step: Step) -> Text:
+    match step:
+        case WriteStep():
+            shown = f"0x{step.raw:X}" if isinstance(step.raw, int) else step.raw
+            return text("moves.step-write", key=step.key, value=shown)
+        case RewriteStep():
+            return text("moves.step-write-again")
+        case WaitStep():
+            return text("moves.step-leave-alone", time_s=step.seconds)
+        case PollStep():
+            return text(
+                "moves.step-wait-until", key=step.key, value=step.equals, time_s=step.timeout_s
+            )
+        case ConfirmStep():
+            return text("moves.step-confirm", text=step.text)
+        case ReconnectStep():
+            return text("moves.step-answers-again", time_s=step.timeout_s)
 
 
 async def run_procedure(
@@ -70,12 +73,16 @@ async def run_procedure(
         raise NotAllowed(
             "moves.possible-motor-not-enabled", drive=drive.name, procedure_title=procedure.title
         )
-    words = describe(procedure)
+    described = describe(procedure)
     moves = any(_energises(drive, step) for step in procedure.steps)
     with axis.granted(procedure.title) if moves else nullcontext():
-        await _carry_out(axis, procedure, words, progress)
+        await _carry_out(axis, procedure, described, progress)
     _remember(axis, procedure.name)
-    return {"procedure": procedure.name, "steps": words}
+    return {
+        "procedure": procedure.name,
+        "steps": [step.words() for step in described],
+        "step_messages": [step.to_wire() for step in described],
+    }
 
 
 def _energises(drive: Drive, step: Step) -> bool:
@@ -83,12 +90,12 @@ def _energises(drive: Drive, step: Step) -> bool:
 
 
 async def _carry_out(
-    axis: Axis, procedure: Procedure, words: Sequence[str], progress: Progress
+    axis: Axis, procedure: Procedure, described: Sequence[Text], progress: Progress
 ) -> None:
     drive = axis.drive
     async with AsyncExitStack() as left_alone:
         for number, step in enumerate(procedure.steps):
-            progress(number / len(procedure.steps), prose(words[number]))
+            progress(number / len(procedure.steps), described[number])
             try:
                 if rest_s := _rest_from(procedure.steps, number):
                     await left_alone.enter_async_context(drive.exclusive.alone(rest_s))
@@ -97,7 +104,7 @@ async def _carry_out(
                 left = len(procedure.steps) - number - 1
                 error.text = text(
                     "moves.procedure-step-before-others" if left else "moves.procedure-step",
-                    procedure=procedure.title, number=number + 1, step=words[number],
+                    procedure=procedure.title, number=number + 1, step=described[number],
                     cause=error.text, left=left,
                 )  # fmt: skip
                 raise

@@ -16,6 +16,8 @@ from backend.parameters.set_file import BadSet
 from backend.tools import parameters
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed, OutOfRange, Rejected
 from drivers.link import Address
+from drivers.texts.answers import in_language
+from drivers.texts.message import text
 from tests.support.memory_link import MemoryLink
 
 SAVED = datetime(2026, 11, 21, 10, 15, tzinfo=UTC)
@@ -83,9 +85,13 @@ async def test_a_set_names_what_it_lacks(drive: Drive, link: MemoryLink, tmp_pat
     assert stored.not_read == ("2005:03",)
     assert {row.key for row in stored.rows} == {"2005:10", "2100:00"}
     words = parameters.without(stored.not_read)
-    assert words == " without 1 setting that could not be read (2005:03)"
-    assert "…" in parameters.without([*"abcdef"])
-    assert parameters.without(()) == ""
+    assert words is not None
+    assert words.words() == " without 1 setting that could not be read (2005:03)"
+    more = parameters.without([*"abcdef"])
+    assert more is not None
+    assert "without 6 settings" in more.words()
+    assert "…" in more.words("zh")
+    assert parameters.without(()) is None
 
 
 async def test_a_set_of_nothing_is_not_made(drive: Drive, link: MemoryLink, tmp_path: Path) -> None:
@@ -133,9 +139,12 @@ async def test_comparison(drive: Drive) -> None:
     result = parameter_set.compare(drive, rows, await drive.read_many(keys))
     by_key = {(r.key, r.status): r for r in result}
     assert by_key["2005:03", "differs"].selected
-    assert by_key["2005:03", "invalid"].problem == "given twice"
+    assert by_key["2005:03", "invalid"].problem == text("sets.row-twice")
     assert ("2005:10", "same") in by_key
-    assert "has no parameter" in by_key["9999:00", "not_in_drive"].problem
+    unknown = by_key["9999:00", "not_in_drive"].problem
+    assert unknown is not None
+    assert unknown.code == "sets.row-no-parameter"
+    assert "没有参数" in unknown.words("zh")
     assert not by_key["6041:00", "read_only"].selected
     assert not by_key["2105:00", "differs"].selected, "motor-individual: off by default"
     assert ("200D:01", "not_in_file") in by_key
@@ -198,3 +207,14 @@ async def test_existing_file_is_not_replaced_unasked(drive: Drive, tmp_path) -> 
     library.store("a", await written(drive))
     with pytest.raises(NotAllowed, match="exists already"):
         library.store("a", await written(drive))
+
+
+async def test_what_could_not_be_read_is_reported_in_any_language(
+    drive: Drive, link: MemoryLink
+) -> None:
+    why = text("sets.row-twice")
+    link.read_errors[0x2005, 3] = Rejected(why, abort_code=0x08000000)
+    result = await parameters.read_all(drive, ["2005:03", "2005:10"], silent)
+    assert result["read"] == 1
+    assert result["failed"] == {"2005:03": why.words()}
+    assert in_language(result, "zh")["failed"] == {"2005:03": why.words("zh")}

@@ -32,6 +32,7 @@ from backend.report.store import ReportStore
 from backend.report.texts import TEXTS
 from backend.tools.sweep.result import SweepAnswer
 from drivers.errors import NotAllowed
+from drivers.texts.message import prose
 from tests.support import measurements as known
 
 T0 = datetime(2026, 3, 1, 12, 0, tzinfo=UTC)
@@ -228,8 +229,8 @@ def test_what_is_not_in_order_is_reported(facts: Facts) -> None:
     change = replace(facts.changes[0], now="77 Hz")
     changed = replace(
         facts, changes=(change,), unsaved=("2005:03 Speed bandwidth",),
-        pending=("2005:10 Gain mode",), trouble=("0x7500 EtherCAT communication",),
-        unusable=("5.sdmeas is damaged",),
+        pending=("2005:10 Gain mode",), trouble=(prose("0x7500 EtherCAT communication"),),
+        unusable=(prose("5.sdmeas is damaged"),),
     )  # fmt: skip
     text = "\n".join(texts_of(compose(changed, "en")))
     for part in ("is 77 Hz now, not 142.6 Hz", "not saved in its memory", "without effect until",
@@ -253,7 +254,15 @@ def test_a_damaged_measurement_does_not_cost_the_report(store: MeasurementStore)
     found, unusable = measured_from(store, [("3-loop.sdmeas", ""), ("4-step.sdmeas", "")])
     assert [m.file for m in found] == ["4-step.sdmeas"]
     assert len(unusable) == 1
-    assert "3-loop.sdmeas is damaged" in unusable[0]
+    assert "3-loop.sdmeas is damaged" in unusable[0].words()
+
+
+def test_troubles_are_in_the_language_of_the_report(facts: Facts) -> None:
+    lost = NotAllowed("library.no-parameter-set", value="a.sdset")
+    changed = replace(facts, trouble=(lost.text,), unusable=(lost.text,))
+    for language in ("en", "zh"):
+        shown = "\n".join(texts_of(compose(changed, language)))
+        assert shown.count(lost.text.words(language)) == 2
 
 
 # --- languages -------------------------------------------------------------------------
@@ -285,7 +294,8 @@ def test_every_text_of_the_report_is_used() -> None:
 @pytest.mark.parametrize("language", ["en", "zh"])
 def test_html_runs_nothing_and_asks_for_nothing(facts: Facts, language: Language) -> None:
     nasty = replace(
-        facts, person=NASTY, machine=NASTY, notes=NASTY, trouble=(NASTY,), unusable=(NASTY,),
+        facts, person=NASTY, machine=NASTY, notes=NASTY, trouble=(prose(NASTY),),
+        unusable=(prose(NASTY),),
         identity=replace(facts.identity, axis=NASTY, firmware=NASTY),
         changes=(ChangedSetting(NASTY, NASTY, NASTY, NASTY, at(1), NASTY),),
     )  # fmt: skip
@@ -357,7 +367,7 @@ def test_pdf_brings_its_fonts_along(facts: Facts) -> None:
 def test_pdf_takes_any_text(facts: Facts) -> None:
     long = "word " * 4000 + "a" * 3000 + "很长" * 2000
     changed = replace(
-        facts, notes=f"{long}\n{NASTY}\n</para><b>", machine=NASTY, unusable=(long,),
+        facts, notes=f"{long}\n{NASTY}\n</para><b>", machine=NASTY, unusable=(prose(long),),
         changes=tuple(replace(facts.changes[0], key=f"{i:04X}:00", name=NASTY) for i in range(200)),
     )  # fmt: skip
     text = pdf_text(render_pdf(compose(changed, "en")))

@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from backend.cli import app
+from drivers.texts.motion_classes import refusal_text
 from profiles import load_profile
 from profiles.importer import import_file, write_profile
 from profiles.motion.decisions import FILE_NAME, CannotClassify, classify, forget
@@ -69,25 +70,27 @@ def test_an_object_gets_a_class_and_loses_it(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("drive", "key", "words"),
+    ("drive", "key", "code"),
     [
-        ("my_drive", "6040:00", "standard"),
-        ("my_drive", "2007:00", "cannot be written"),
-        ("my_drive", "2999:00", "no parameter"),
-        ("m6l", "2003:02", "comes with servodeck"),
-        ("generic402", "6040:00", "comes with servodeck"),
+        ("my_drive", "6040:00", "motion.class-of-standard"),
+        ("my_drive", "2007:00", "motion.class-not-writable"),
+        ("my_drive", "2999:00", "motion.class-of-no-parameter"),
+        ("m6l", "2003:02", "motion.class-from-manual"),
+        ("generic402", "6040:00", "motion.class-from-manual"),
     ],
 )
-def test_what_no_person_may_classify(folder: Path, drive: str, key: str, words: str) -> None:
+def test_what_no_person_may_classify(folder: Path, drive: str, key: str, code: str) -> None:
     assert folder.exists()
     before = load_profile(drive).parameter(key)
-    with pytest.raises(CannotClassify, match=words):
+    with pytest.raises(CannotClassify) as refused:
         classify(drive, key, "none", reason="I say so")
+    assert refused.value.code == code
+    assert key in refusal_text(refused.value).words("zh")
     assert load_profile(drive).parameter(key) == before
 
 
 def test_a_class_needs_a_reason_and_only_at_enable_is_safe(folder: Path) -> None:
-    with pytest.raises(CannotClassify, match="say why"):
+    with pytest.raises(CannotClassify, match="class-needs-reason"):
         classify("my_drive", "2005:00", "none", reason="  ")
     with pytest.raises(ValueError, match="at_enable"):
         classify("my_drive", "2005:00", "none", reason="x", safe_in_motion=True)

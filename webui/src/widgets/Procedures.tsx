@@ -1,8 +1,8 @@
 import { Button, Checkbox, Modal } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask } from '../api/client'
-import type { JobInfo, ProcedureInfo } from '../api/schema'
-import { known, useT } from '../i18n'
+import type { JobInfo, MessageInfo, ProcedureInfo } from '../api/schema'
+import { known, useSay, useT } from '../i18n'
 import { setJob, useLink } from '../live/store'
 import { JobNote, useJobEnd } from './JobNote'
 import { Panel } from './Panel'
@@ -77,7 +77,16 @@ export function ProcedureDialog({
   const t = useT()
   const [agreed, setAgreed] = useState<boolean[]>(procedure.confirm.map(() => false))
   const run = useAction()
-  const title = useTexts(drive)?.get(procedure.title) ?? known(t, 'procedure', procedure.title)
+  const texts = useTexts(drive)
+  const say = useSay()
+  const title = texts?.get(procedure.title) ?? known(t, 'procedure', procedure.title)
+  // What is to be confirmed is a text of the profile, which has its own translations.
+  const inLanguage = (step: MessageInfo | undefined): MessageInfo | undefined => {
+    const text = step?.params?.text
+    return step && typeof text === 'string'
+      ? { ...step, params: { ...step.params, text: texts?.get(text) ?? text } }
+      : step
+  }
   const start = async () => {
     const ok = await run.run(async () => {
       const job = await ask(
@@ -108,7 +117,7 @@ export function ProcedureDialog({
         <summary>{t('procedures.steps', { count: procedure.steps.length })}</summary>
         <ol>
           {procedure.steps.map((step, i) => (
-            <li key={i}>{step}</li>
+            <li key={i}>{say.message(inLanguage(procedure.step_messages?.[i]), step)}</li>
           ))}
         </ol>
         {procedure.notes && (

@@ -1,6 +1,7 @@
 import { Checkbox } from '@mantine/core'
-import type { ParameterRow } from '../api/schema'
+import type { MessageInfo, ParameterRow } from '../api/schema'
 import { useT } from '../i18n'
+import { Said } from './Said'
 import { shown } from './format'
 import type { Raw } from './types'
 
@@ -9,6 +10,7 @@ interface Compared {
   key: string
   name: string
   problem?: string | null
+  problem_message?: MessageInfo | null
   unit: string
   motor_individual: boolean
 }
@@ -91,7 +93,12 @@ export function ValueTable<Row extends Compared>({
               <td className="mono">{row.key}</td>
               <td>
                 {name(row)}
-                {row.problem && <small className="warn-text"> {row.problem}</small>}
+                {row.problem && (
+                  <small className="warn-text">
+                    {' '}
+                    <Said message={row.problem_message} words={row.problem} />
+                  </small>
+                )}
               </td>
               {sides.map((side) => (
                 <td key={side.heading} className={`num right ${side.className ?? ''}`}>

@@ -36,3 +36,11 @@ library_too-many-tags-too = too many tags, or one is too long
     .remedy = use fewer or shorter tags
 library_written-newer-version = { $value } was written by a newer version
     .remedy = update servodeck to open it
+library_saved-from = it was saved from { $what ->
+        [vendor] vendor id
+        [product] product code
+        [serial] serial number
+        [revision] revision
+       *[firmware] firmware
+    } { $theirs }, this drive has { $ours }
+library_set-cannot-be-read = { $name } cannot be read: { $cause }

@@ -36,3 +36,11 @@ library_too-many-tags-too = 标签过多，或其中之一过长
     .remedy = 请使用较少或较短的标签
 library_written-newer-version = { $value } 由更新的版本写出
     .remedy = 请更新 servodeck 后再打开
+library_saved-from = 保存时驱动器的{ $what ->
+        [vendor] 厂商编号
+        [product] 产品代码
+        [serial] 序列号
+        [revision] 修订号
+       *[firmware] 固件
+    }为 { $theirs }，此驱动器为 { $ours }
+library_set-cannot-be-read = 无法读取 { $name }：{ $cause }

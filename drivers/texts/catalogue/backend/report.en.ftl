@@ -8,3 +8,4 @@ report_no-report-choose-list = there is no report { $value }
     .remedy = choose one of the list; another person may have deleted it
 report_report-cannot-show-measures = a report cannot show what { QUOTED($tool) } measures
 report_result-not-complete = the result of { $tool } is not complete: { $cause }
+report_drive-does-not-answer = the drive does not answer

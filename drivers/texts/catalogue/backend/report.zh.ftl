@@ -8,3 +8,4 @@ report_no-report-choose-list = 没有报告 { $value }
     .remedy = 请从列表中选择；它可能已被他人删除
 report_report-cannot-show-measures = 报告不能显示 { QUOTED($tool) } 的测量
 report_result-not-complete = { $tool } 的结果不完整：{ $cause }
+report_drive-does-not-answer = 驱动器无应答

@@ -36,3 +36,7 @@ sets_line-two-ways = { $key }: { $word } can be read in two ways
 sets_line-no-number = { $key }: { QUOTED($word) } is not a number
 sets_line-wrong-type = { $key }: { QUOTED($word) } is not a value of this type
 sets_other-product = { $name } is for product { NUM($product, format: "08X") }h, this family is { NUM($ours, format: "08X") }h: check every value
+sets_row-no-key = row { $row } has no key
+sets_row-no-parameter = { $profile_title } has no parameter { $key }
+sets_row-no-value = row { $row }: raw { $raw } is not a value
+sets_row-twice = given twice

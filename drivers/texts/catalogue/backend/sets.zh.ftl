@@ -36,3 +36,7 @@ sets_line-two-ways = { $key }：{ $word } 有两种读法
 sets_line-no-number = { $key }：{ QUOTED($word) } 不是数
 sets_line-wrong-type = { $key }：{ QUOTED($word) } 不是该类型的值
 sets_other-product = { $name } 用于产品 { NUM($product, format: "08X") }h，而本系列为 { NUM($ours, format: "08X") }h：请检查每个值
+sets_row-no-key = 第 { $row } 项没有参数号
+sets_row-no-parameter = { $profile_title } 没有参数 { $key }
+sets_row-no-value = 第 { $row } 项：raw { $raw } 不是有效值
+sets_row-twice = 重复给出

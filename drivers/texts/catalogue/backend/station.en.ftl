@@ -47,6 +47,13 @@ station_import-ended-after = the import was ended after { NUM($limit_s, format: 
 station_import-failed-exit-code = the import failed (exit code { $returncode }): { $last }
     .remedy = this is a defect of servodeck; report it with the file
 station_loses-power-unattended = { $drive } is disabled, because no page supervises it: { $why }
+station_match-bus = it answers over { $bus }; { $silent ->
+        [manual] the manual prints
+       *[drive] the drive reports
+    } no identity to compare
+station_match-name = its name { QUOTED($name) } matches
+station_match-product = vendor and product code agree
+station_match-vendor = the vendor agrees
 station_may-still-be-enabled = { $drive } may still be enabled: { $cause }
 station_measurement-kind-nothing-evaluate = a measurement of kind { $value } has nothing to evaluate
     .remedy = update servodeck to open it

@@ -47,6 +47,13 @@ station_import-ended-after = 导入在 { NUM($limit_s, format: "g") } s 后被�
 station_import-failed-exit-code = 导入失败（退出代码 { $returncode }）：{ $last }
     .remedy = 这是 servodeck 的缺陷；请附上文件报告
 station_loses-power-unattended = { $drive } 已断使能，无人看管：{ $why }
+station_match-bus = 它通过 { $bus } 应答；{ $silent ->
+        [manual] 手册未给出可供比较的标识
+       *[drive] 驱动器未报告可供比较的标识
+    }
+station_match-name = 名称 { QUOTED($name) } 相符
+station_match-product = 厂商和产品代码一致
+station_match-vendor = 厂商一致
 station_may-still-be-enabled = { $drive } 可能仍处于使能状态：{ $cause }
 station_measurement-kind-nothing-evaluate = { $value } 类测量没有可分析的内容
     .remedy = 请更新 servodeck 后再打开

@@ -11,3 +11,8 @@ set_no-parameter-read-nothing = { $drive }: no parameter could be read, so nothi
 set_storing-present-values = storing the present values
 set_writing = writing { $key }
 set_written-in-part = { $cause }; { $written } of { $rows } rows were written before { $key }; what was there before is in the set “{ $backup }”
+set_keeps-other-value = the drive keeps { $after } instead of { $raw }
+set_without = {" "}without { $count ->
+        [one] { $count } setting
+       *[other] { $count } settings
+    } that could not be read ({ $keys })

@@ -11,3 +11,5 @@ set_no-parameter-read-nothing = { $drive }：无法读取任何参数，因此�
 set_storing-present-values = 正在保存当前值
 set_writing = 正在写入 { $key }
 set_written-in-part = { $cause }；在 { $key } 之前已写入 { $rows } 行中的 { $written } 行；原有内容在参数集“{ $backup }”中
+set_keeps-other-value = 驱动器保留 { $after }，而不是 { $raw }
+set_without = ，不含 { $count } 项未能读取的设置（{ $keys }）

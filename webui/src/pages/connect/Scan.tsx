@@ -243,7 +243,7 @@ function Found({ found }: { found: FoundDrive }) {
       )}
       {!used && profile !== '' && (
         <p className={match?.confidence === 'certain' ? 'dim' : 'warn-text'}>
-          {match ? match.why : t('connect.noMatch')}
+          {match ? <Said message={match.why_message} words={match.why} /> : t('connect.noMatch')}
         </p>
       )}
       <ProblemNote problem={connect.problem} onClose={connect.clear} />

@@ -5,6 +5,7 @@ import { useRoute } from '../../app/router'
 import { useT } from '../../i18n'
 import { useDrive, useDrives } from '../../live/store'
 import { Panel } from '../../widgets/Panel'
+import { Said } from '../../widgets/Said'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import './files.css'
 import { type Filters, NO_FILTERS } from './filters'
@@ -19,7 +20,8 @@ import { useLibrary } from './useLibrary'
 export function FilesPage() {
   const t = useT()
   const [filters, setFilters] = useState<Filters>(NO_FILTERS)
-  const { entries, total, tags, problems, shared, problem, refresh, more } = useLibrary(filters)
+  const { entries, total, tags, problems, messages, shared, problem, refresh, more } =
+    useLibrary(filters)
   const drives = useDrives() ?? []
   const { drive: chosen } = useRoute()
   const drive = useDrive(chosen ?? drives[0]?.id ?? null)
@@ -61,8 +63,10 @@ export function FilesPage() {
           <div className="note warn">
             <p>{t('library.problems')}</p>
             <ul>
-              {problems.map((text) => (
-                <li key={text}>{text}</li>
+              {problems.map((text, n) => (
+                <li key={text}>
+                  <Said message={messages[n]} words={text} />
+                </li>
               ))}
             </ul>
           </div>

@@ -7,6 +7,7 @@ import { useT } from '../../i18n'
 import * as live from '../../live/live'
 import { contents, useDrives } from '../../live/store'
 import { Panel } from '../../widgets/Panel'
+import { Said } from '../../widgets/Said'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useRows } from '../../widgets/profile-text/rows'
 import { useAction } from '../../widgets/useAction'
@@ -215,9 +216,9 @@ function Result({
         )}
       </div>
       <ProblemNote problem={problem} onClose={clear} />
-      {found?.warnings.map((text) => (
+      {found?.warnings.map((text, n) => (
         <p key={text} className="note warn" role="alert">
-          {text}
+          <Said message={found.warning_messages?.[n]} words={text} />
         </p>
       ))}
       {three && <p className="dim">{t('three.help')}</p>}

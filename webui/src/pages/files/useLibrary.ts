@@ -1,6 +1,6 @@
 import { useCallback, useState } from 'react'
 import { api, ask, problemOf } from '../../api/client'
-import type { LibraryEntry, Problem, TagCount } from '../../api/schema'
+import type { LibraryEntry, MessageInfo, Problem, TagCount } from '../../api/schema'
 import { useLink } from '../../live/store'
 import { useSearch } from '../../widgets/useSearch'
 import { type Filters, queryOf } from './filters'
@@ -14,6 +14,7 @@ export function useLibrary(filters: Filters) {
   const [total, setTotal] = useState(0)
   const [tags, setTags] = useState<TagCount[]>([])
   const [problems, setProblems] = useState<string[]>([])
+  const [messages, setMessages] = useState<MessageInfo[]>([])
   const [shared, setShared] = useState(false)
   const [problem, setProblem] = useState<Problem | null>(null)
   const [limit, setLimit] = useState(PAGE)
@@ -26,6 +27,7 @@ export function useLibrary(filters: Filters) {
       setEntries(page.entries)
       setTotal(page.total)
       setProblems(page.problems)
+      setMessages(page.problem_messages ?? [])
       setShared(page.shared)
       setTags(await ask(api.GET('/api/v1/library/tags')))
       setProblem(null)
@@ -35,5 +37,5 @@ export function useLibrary(filters: Filters) {
   }, [key])
   useSearch(refresh, open)
   const more = () => setLimit((before) => Math.min(500, before + PAGE))
-  return { entries, total, tags, problems, shared, problem, refresh, more }
+  return { entries, total, tags, problems, messages, shared, problem, refresh, more }
 }

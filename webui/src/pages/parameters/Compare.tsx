@@ -4,6 +4,7 @@ import { api, ask } from '../../api/client'
 import type { Diff, DiffRow, DriveSummary, ParameterRow } from '../../api/schema'
 import { useT } from '../../i18n'
 import { useDrives } from '../../live/store'
+import { Said } from '../../widgets/Said'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { SaveSet, UploadSet } from '../files/SetActions'
@@ -99,9 +100,9 @@ export function Compare({ drive, rows }: { drive: DriveSummary; rows: ParameterR
       <ProblemNote problem={compare.problem ?? listProblem} onClose={compare.clear} />
       {diff && (
         <>
-          {diff.warnings.map((text) => (
+          {diff.warnings.map((text, n) => (
             <p key={text} className="note warn" role="alert">
-              {text}
+              <Said message={diff.warning_messages?.[n]} words={text} />
             </p>
           ))}
           <div className="row wrap middle">

@@ -1,11 +1,12 @@
 import { Button, Checkbox, Modal } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
-import type { Diff, DriveSummary } from '../../api/schema'
+import type { Diff, DriveSummary, MessageInfo } from '../../api/schema'
 import { plainResult } from '../../api/results'
 import { useT } from '../../i18n'
 import { setJob, useJob } from '../../live/store'
 import { JobNote, useJobEnd } from '../../widgets/JobNote'
+import { Said } from '../../widgets/Said'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import type { Raw } from '../../widgets/types'
 import { useAction } from '../../widgets/useAction'
@@ -17,6 +18,7 @@ interface Row {
   after: Raw | null
   ok: boolean
   problem: string
+  problem_message?: MessageInfo | null
 }
 
 /** Load the ticked rows of a file: verified writes, then what became of each. */
@@ -142,7 +144,11 @@ export function LoadReport({
                           <td className="num right">{String(row.wanted)}</td>
                           <td className="num right">{String(row.after ?? '—')}</td>
                           <td className={row.ok ? '' : 'warn-text'}>
-                            {row.ok ? t('load.ok') : row.problem}
+                            {row.ok ? (
+                              t('load.ok')
+                            ) : (
+                              <Said message={row.problem_message} words={row.problem} />
+                            )}
                           </td>
                         </tr>
                       ))}

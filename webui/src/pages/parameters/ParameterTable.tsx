@@ -1,7 +1,8 @@
 import { Button, Checkbox, NativeSelect, TextInput } from '@mantine/core'
 import { useCallback, useDeferredValue, useMemo, useRef, useState } from 'react'
 import { api, ask } from '../../api/client'
-import type { DriveSummary, JobInfo } from '../../api/schema'
+import type { DriveSummary, JobInfo, MessageInfo } from '../../api/schema'
+import { Said } from '../../widgets/Said'
 import { plainResult } from '../../api/results'
 import { useT } from '../../i18n'
 import { setJob, useJobs, useReadings } from '../../live/store'
@@ -220,7 +221,9 @@ function Actions({ drive, shown }: { drive: DriveSummary; shown: ShownRow[] }) {
 
 function ReadFailures({ job }: { job: JobInfo }) {
   const t = useT()
-  const failed = Object.entries((plainResult(job.result).failed ?? {}) as Record<string, string>)
+  const result = plainResult(job.result)
+  const failed = Object.entries((result.failed ?? {}) as Record<string, string>)
+  const messages = (result.failed_messages ?? {}) as Record<string, MessageInfo>
   if (failed.length === 0) return null
   return (
     <details className="note warn">
@@ -228,7 +231,7 @@ function ReadFailures({ job }: { job: JobInfo }) {
       <ul className="scroll-list">
         {failed.map(([key, why]) => (
           <li key={key}>
-            <span className="mono">{key}</span> {why}
+            <span className="mono">{key}</span> <Said message={messages[key]} words={why} />
           </li>
         ))}
       </ul>

@@ -2,7 +2,7 @@ import { Button, FileButton } from '@mantine/core'
 import { useState } from 'react'
 import { API_ROOT, api, ask } from '../../api/client'
 import type { MeasurementInfo, Problem } from '../../api/schema'
-import { known, useT } from '../../i18n'
+import { known, useSay, useT } from '../../i18n'
 import { ConfirmDelete } from '../../widgets/ConfirmDelete'
 import { dateTime } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
@@ -30,6 +30,7 @@ export function MeasurementList({
   onChange: () => Promise<void>
 }) {
   const t = useT()
+  const say = useSay()
   const act = useAction()
   const kind = list.find((each) => each.file === shown)?.kind
   const [doomed, setDoomed] = useState<string | null>(null)
@@ -72,7 +73,9 @@ export function MeasurementList({
               <strong>
                 {each.problem === ''
                   ? known(t, 'measured', each.kind)
-                  : t('measured.unusable', { problem: each.problem })}
+                  : t('measured.unusable', {
+                      problem: say.message(each.problem_message, each.problem),
+                    })}
               </strong>
               <small className="dim num">
                 {' '}
