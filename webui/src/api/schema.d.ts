@@ -5207,6 +5207,11 @@ export interface components {
              * @description of the file; null for the latest
              */
             version?: number | null;
+            /**
+             * Warning Messages
+             * @description of warnings
+             */
+            warning_messages?: components["schemas"]["MessageInfo"][];
             /** Warnings */
             warnings: string[];
         };
@@ -5243,6 +5248,8 @@ export interface components {
              * @default
              */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /**
              * Selected
              * @description proposed for writing
@@ -8742,6 +8749,11 @@ export interface components {
             /** Entries */
             entries: components["schemas"]["LibraryEntry"][];
             /**
+             * Problem Messages
+             * @description of problems
+             */
+            problem_messages?: components["schemas"]["MessageInfo"][];
+            /**
              * Problems
              * @description files that could not be added to the library
              */
@@ -9069,6 +9081,8 @@ export interface components {
              * @default
              */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /** Profile */
             profile: string;
             /** Saved */
@@ -9200,6 +9214,8 @@ export interface components {
              * @description why not; empty where it is changeable
              */
             fixed_why: string;
+            /** @description of fixed_why */
+            fixed_why_message?: components["schemas"]["MessageInfo"] | null;
             /**
              * Motion
              * @description null: it cannot be written
@@ -10223,6 +10239,11 @@ export interface components {
             requires_stop: boolean;
             /** Source */
             source: string;
+            /**
+             * Step Messages
+             * @description of steps
+             */
+            step_messages?: components["schemas"]["MessageInfo"][];
             /** Steps */
             steps: string[];
             /** Title */
@@ -10287,6 +10308,8 @@ export interface components {
             title: string;
             /** Why */
             why: string;
+            /** @description of why */
+            why_message?: components["schemas"]["MessageInfo"] | null;
         };
         /**
          * ProfileTexts
@@ -12705,6 +12728,8 @@ export interface components {
              * @default
              */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /** Profile */
             profile: string;
             /** Saved */
@@ -13059,6 +13084,11 @@ export interface components {
             theirs: string;
             /** Theirs Version */
             theirs_version: number | null;
+            /**
+             * Warning Messages
+             * @description of warnings
+             */
+            warning_messages?: components["schemas"]["MessageInfo"][];
             /** Warnings */
             warnings: string[];
         };
@@ -13091,6 +13121,8 @@ export interface components {
              * @default
              */
             problem: string;
+            /** @description of problem */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /**
              * Selected
              * @description proposed for writing
