@@ -42,6 +42,8 @@ _WITH_WORD = {"t": "type", "p": "position", "a": "alias", "m": "master", "d": "d
 _HEADINGS = {"codesys": "line", "csv": "key"}
 _ENTRY = struct.Struct("<HBI")
 _MOST_YAML_LEVELS = 20
+#: The command-line tool of the IgH master, by which a script writes.
+_PROGRAM = "ethercat"
 #: Of a slave file with 20 000 writes, each a map of four fields.
 _MOST_YAML_NODES = 200_000
 #: No line that writes one value is longer; `shlex` takes the square of a word's length.
@@ -52,7 +54,7 @@ _MOST_CANDIDATES = 40_000
 
 def is_script(content: str) -> bool:
     """Whether a line of it writes by ``ethercat download``."""
-    if "ethercat" not in content:
+    if _PROGRAM not in content:
         return False
     try:
         return any(_commands(line, place) for place, line in _candidates(content))
@@ -175,7 +177,7 @@ def _candidates(script: str) -> Iterator[tuple[Text, str]]:
     found = 0
     for at, line in enumerate(_lines(script), 1):
         before = line[: max(line.rfind("download"), 0)]
-        if not ("$" in before or "ethercat" in before.lower()) or _in_remark(before):
+        if not ("$" in before or _PROGRAM in before.lower()) or _in_remark(before):
             continue
         found += 1
         if len(line) > _LONGEST_LINE or found > _MOST_CANDIDATES:
@@ -220,7 +222,7 @@ def _download(command: list[str], place: Text) -> list[str]:
     if command and command[0] in _SHOWS:
         return []
     for at, word in enumerate(command):
-        if "$(" in word and "ethercat" in word and "download" in word:
+        if "$(" in word and _PROGRAM in word and "download" in word:
             raise BadRow(text("handover.row-download-form", place=place))
         if _COMMAND.fullmatch(word) and "download" in command[at + 1 :]:
             if not all(_BEFORE.fullmatch(before) for before in command[:at]):
