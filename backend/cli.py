@@ -260,15 +260,19 @@ def _whole(
     *,
     language: Annotated[
         Language | None,
-        typer.Option(help="of errors, progress and reports; by default that of the system",
-                     callback=_speak, is_eager=True),
+        typer.Option(
+            help="of errors, progress and reports; by default that of the system",
+            callback=_speak,
+            is_eager=True,
+        ),
     ] = None,
     version: Annotated[
         bool,
-        typer.Option("--version", help="print the version and end", callback=_print_version,
-                     is_eager=True),
+        typer.Option(
+            "--version", help="print the version and end", callback=_print_version, is_eager=True
+        ),
     ] = False,
-) -> None:  # fmt: skip
+) -> None:
     """Options of every command."""
 
 
@@ -287,6 +291,8 @@ def main() -> None:
         if os.environ.get("SERVODECK_TRACEBACK"):
             raise
         print(f"error: this is a defect of servodeck: {error!r}", file=sys.stderr)
-        print("try:   run it again with SERVODECK_TRACEBACK=1 and report what it prints",
-              file=sys.stderr)  # fmt: skip
+        print(
+            "try:   run it again with SERVODECK_TRACEBACK=1 and report what it prints",
+            file=sys.stderr,
+        )
         raise SystemExit(70) from error

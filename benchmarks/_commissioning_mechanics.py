@@ -24,8 +24,13 @@ TURN = 2 * math.pi
 
 # --- 5 slow vibration ------------------------------------------------------------------------
 
-_ARMS = (("m6l", 8.0, 6e3), ("mms7", 6.0, 6e3), ("mms7", 15.0, 12e3), ("ep3e", 8.0, 6e3),
-         ("r6l", 8.0, 6e3))  # fmt: skip
+_ARMS = (
+    ("m6l", 8.0, 6e3),
+    ("mms7", 6.0, 6e3),
+    ("mms7", 15.0, 12e3),
+    ("ep3e", 8.0, 6e3),
+    ("r6l", 8.0, 6e3),
+)
 
 
 async def vibration(small: bool) -> Figures:
@@ -75,22 +80,30 @@ async def load_side(small: bool) -> Figures:
             stiff.append(abs(value.value / case.axis.stiffness - 1.0) <= 0.1)
     async with direct(sides.axis(), sides.CYCLE_S, drive=sides.DRIVE) as bench:
         found = await sides.measured(bench)
-    drawn = [] if small else [
-        share("drawn axes: backlash within 5 % or two counts", gaps, 0.9),
-        share("drawn axes: stiffness within 10 %", stiff, 0.9),
-    ]  # fmt: skip
+    drawn = (
+        []
+        if small
+        else [
+            share("drawn axes: backlash within 5 % or two counts", gaps, 0.9),
+            share("drawn axes: stiffness within 10 %", stiff, 0.9),
+        ]
+    )
     gap, spring = found.backlash_deg, found.stiffness_nm_per_rad
     return [
         *drawn,
         at_most(
             "virtual drive: backlash, off by",
-            off_percent(gap.value, math.degrees(sides.GAP)) if gap else math.inf, 5.0, "%",
+            off_percent(gap.value, math.degrees(sides.GAP)) if gap else math.inf,
+            5.0,
+            "%",
         ),
         at_most(
             "virtual drive: stiffness, off by",
-            off_percent(spring.value, sides.STIFFNESS) if spring else math.inf, 10.0, "%",
+            off_percent(spring.value, sides.STIFFNESS) if spring else math.inf,
+            10.0,
+            "%",
         ),
-    ]  # fmt: skip
+    ]
 
 
 async def gantry(_small: bool) -> Figures:

@@ -48,7 +48,7 @@ CLASSES: dict[str, dict[str, dict[str, Draw]]] = {
     "brake opens late": {"mechanics": {"brake": True}, "feedback": {"brake_opens_s": (0.1, 0.4)}},
     "load out of balance": {"mechanics": {"place_nm": (0.01, 0.1)}},
     "608Fh alone": {"feedback": {"lacks": frozenset({"6092"})}},
-}  # fmt: skip
+}
 #: Only a drive whose resolution the standard's objects give can lack one of them.
 _ONLY = {"608Fh alone": "generic402"}
 

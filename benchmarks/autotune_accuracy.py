@@ -78,9 +78,14 @@ async def _without_notches(
     facts = completed(await read_facts(axis), found.mechanics)
     plant = measured_plant(found.mechanics.frf, found.mechanics.model)
     table = candidates_for(
-        axis.drive, facts, plant, found.inertia.result.inertia_kgm2.value, found.load,
-        1.0 / cycle_s(session), notches=False,
-    )  # fmt: skip
+        axis.drive,
+        facts,
+        plant,
+        found.inertia.result.inertia_kgm2.value,
+        found.load,
+        1.0 / cycle_s(session),
+        notches=False,
+    )
     return next((c for c in table if set(c.marks) & set(found.applied.marks)), None)
 
 
@@ -91,9 +96,13 @@ def _corners(applied: Candidate) -> str:
 
 
 def _kept(
-    guaranteed: float, predicted: float | None, found: float | bool | None, slack: float,
-    off: float, here: float | None = None,
-) -> str:  # fmt: skip
+    guaranteed: float,
+    predicted: float | None,
+    found: float | bool | None,
+    slack: float,
+    off: float,
+    here: float | None = None,
+) -> str:
     """Guarantee, prediction and measurement; the smaller a number is the worse.
 
     The prediction is that of the whole loop, and in brackets where it is another one the prediction

@@ -127,9 +127,10 @@ async def brake(small: bool) -> Figures:
     for drive, asked, settings in _BRAKES[1:2] if small else _BRAKES:
         for worn_share in (0.6,) if small else (0.4, 0.6, 0.85):
             spec = brakes.braked(
-                worn_share * brakes.RATED_NM, windup_rev=brakes.WINDUP_REV,
+                worn_share * brakes.RATED_NM,
+                windup_rev=brakes.WINDUP_REV,
                 supplied=asked is brakes.ASKED,
-            )  # fmt: skip
+            )
             truth = 100.0 * (worn_share + brakes.COULOMB_NM / brakes.RATED_NM)
             async with direct(spec, drive=drive, settings=settings) as bench:
                 shaft = Shaft(bench)

@@ -84,8 +84,11 @@ def bare(namespace: Namespace, rate: int, seconds: float, *, busy: bool) -> Row:
     with busy_server() if busy else nullcontext():
         result = subprocess.run(
             namespace.command([sys.executable, "-c", _BARE, str(rate), str(seconds)]),
-            capture_output=True, text=True, check=True, env=child_environment(),
-        )  # fmt: skip
+            capture_output=True,
+            text=True,
+            check=True,
+            env=child_environment(),
+        )
     row: Row = tuple(json.loads(result.stdout))
     return row
 
@@ -97,8 +100,11 @@ def cpu_s(pid: int) -> float:
 
 def signals(station: int) -> tuple[list[CyclicSignal], list[CyclicSignal]]:
     wanted: tuple[tuple[int, DataType], ...] = (
-        (0x6041, "UINT16"), (0x6064, "INT32"), (0x606C, "INT32"), (0x6077, "INT16"),
-    )  # fmt: skip
+        (0x6041, "UINT16"),
+        (0x6064, "INT32"),
+        (0x606C, "INT32"),
+        (0x6077, "INT16"),
+    )
     inputs = [CyclicSignal(station, Address(i, 0, t), f"{station}.{i:04X}") for i, t in wanted]
     return inputs, [CyclicSignal(station, Address(0x607A, 0, "INT32"), f"{station}.target")]
 

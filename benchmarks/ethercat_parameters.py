@@ -59,8 +59,12 @@ def plain(namespace: Namespace, addresses: list[Address]) -> tuple[float, int]:
     places = json.dumps([[a.index, a.subindex] for a in addresses])
     result = subprocess.run(
         namespace.command([sys.executable, "-c", _PLAIN]),
-        input=places + "\n", capture_output=True, text=True, check=True, env=child_environment(),
-    )  # fmt: skip
+        input=places + "\n",
+        capture_output=True,
+        text=True,
+        check=True,
+        env=child_environment(),
+    )
     seconds, failed = json.loads(result.stdout)
     return seconds, failed
 

@@ -29,9 +29,13 @@ AXES, RUNS, AIM_S = 50, 2000, 1.0
 #: Rounds of a baseline.
 _BASELINE = 3
 _TYPICAL: tuple[tuple[Quantity, int, float], ...] = (
-    ("resonance", 1, 62.0), ("resonance", 2, 210.0), ("antiresonance", 1, 41.0),
-    ("friction", 1, 8.0), ("inertia", 1, 1.5e-4), ("step_rise", 1, 0.004),
-)  # fmt: skip
+    ("resonance", 1, 62.0),
+    ("resonance", 2, 210.0),
+    ("antiresonance", 1, 41.0),
+    ("friction", 1, 8.0),
+    ("inertia", 1, 1.5e-4),
+    ("step_rise", 1, 0.004),
+)
 _SETTINGS = HealthSettings(travel_limit=3, speed_limit=1200, torque_limit=80)
 _START = datetime(2024, 1, 1, tzinfo=UTC)
 
@@ -45,9 +49,13 @@ def fill(store: Store, axes: int = AXES, runs: int = RUNS) -> None:
         axis = AxisOf(f"2e1-30-{index + 1}", f"A{index:02d}", "mms7", 0x2E1, 0x30, 1, index + 1)
         wear = [0.002 * n for n in range(each)]
         first = records.add(
-            axis, _SETTINGS, [_round(chance, share) for share in wear[:_BASELINE]],
-            {"20240101-000000-health-x.sdmeas": "0" * 64}, "bench", _START,
-        )  # fmt: skip
+            axis,
+            _SETTINGS,
+            [_round(chance, share) for share in wear[:_BASELINE]],
+            {"20240101-000000-health-x.sdmeas": "0" * 64},
+            "bench",
+            _START,
+        )
         records.sign(axis.key, first, "bench")
         for day, share in enumerate(wear[_BASELINE:], 1):
             files = {f"2024-{day}-health-x.sdmeas": "1" * 64}

@@ -105,8 +105,12 @@ def campaign(count: int) -> None:
         u, y = bench.record(multisine(RATE, LINES, 1.0, 10, 1000 + number), RATE, number)
         found = foreign.evaluate(u, y, RATE)
         estimates = {name: method(u, y) for name, method in METHODS.items()}
-        for case, size in (("other phases", 1.0), ("level × 0.7", 0.7), ("level × 0.5", 0.5),
-                           ("level × 2", 2.0)):  # fmt: skip
+        for case, size in (
+            ("other phases", 1.0),
+            ("level × 0.7", 0.7),
+            ("level × 0.5", 0.5),
+            ("level × 2", 2.0),
+        ):
             other = truth_of(bench, multisine(RATE, LINES, size, 10, 5000 + number), 99)
             left = np.log(other / found.response)
             size_held = np.abs(left.real) <= 1.96 * found.band.real

@@ -56,10 +56,13 @@ class Walk:
         away = ["unshare", "--net"] if self.offline else []
         began, worked = time.monotonic(), _processor_s()
         done = subprocess.run(
-            [*away, *(str(part) for part in command)], cwd=self.scratch,
+            [*away, *(str(part) for part in command)],
+            cwd=self.scratch,
             env=plain_environment(self.scratch / "home") | environment,
-            capture_output=True, text=True, check=False,
-        )  # fmt: skip
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         if done.returncode:
             raise NotHere(f"{typed}: {done.stderr.strip().splitlines()[-1]}")
         self.steps.append(Step(typed, time.monotonic() - began, _processor_s() - worked))
@@ -113,9 +116,12 @@ def debian(walk: Walk, dist: Path) -> None:
     """dpkg in a root of its own; service, user and udev are not started there."""
     walk.page(
         "systemctl start servodeck (here: its program)",
-        _installed(walk, dist), "serve", "--port", "0",
+        _installed(walk, dist),
+        "serve",
+        "--port",
+        "0",
         path=Path(sys.base_prefix) / "bin",
-    )  # fmt: skip
+    )
 
 
 def _installed(walk: Walk, dist: Path) -> Path:

@@ -185,9 +185,14 @@ def _arrow(start: tuple[int, int], end: tuple[int, int], *, up: bool) -> str:
     (x1, y1), (x2, y2) = start, end
     y1, y2 = y1 + half, y2 - half
     bend = round((y2 - y1) / 2)
-    name, look = ("up", 'stroke="#c02020" stroke-dasharray="5 4"') if up else (
-        "down", 'stroke="#607080"',
-    )  # fmt: skip
+    name, look = (
+        ("up", 'stroke="#c02020" stroke-dasharray="5 4"')
+        if up
+        else (
+            "down",
+            'stroke="#607080"',
+        )
+    )
     return (
         f'<path d="M{x1} {y1}C{x1} {y1 + bend} {x2} {y2 - bend} {x2} {y2}" fill="none" {look} '
         f'marker-end="url(#{name})"/>'

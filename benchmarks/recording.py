@@ -50,14 +50,19 @@ def header() -> dict[str, object]:
             {
                 "synchronous": True,
                 "channels": [
-                    {"drive": f"x{a}", "drive_name": f"X{a}", "key": f"60{c:02X}:00",
-                     "name": f"X{a} {c}", "unit": "inc"}
+                    {
+                        "drive": f"x{a}",
+                        "drive_name": f"X{a}",
+                        "key": f"60{c:02X}:00",
+                        "name": f"X{a} {c}",
+                        "unit": "inc",
+                    }
                     for c in range(CHANNELS)
                 ],
             }
             for a in range(AXES)
         ],
-    }  # fmt: skip
+    }
 
 
 def blocks() -> list[tuple[int, ScopeBlock]]:
@@ -191,12 +196,16 @@ def main() -> None:
     share = statistics.median(ours) / statistics.median(plain)
     times = statistics.median(ours) / NEEDED_MB_S
     print()
-    print_verdict([
-        Aim(f"the recorder takes {share:.0%} of the disk's rate, half or more", share >= 0.5),
-        Aim(f"{times:.0f} times what is needed, 50 or more", times >= 50),
-        Aim(f"{statistics.median(ours):.0f} MB/s beside rerun's {rates[0]:.0f} MB/s",
-            statistics.median(ours) > rates[0]),
-    ])  # fmt: skip
+    print_verdict(
+        [
+            Aim(f"the recorder takes {share:.0%} of the disk's rate, half or more", share >= 0.5),
+            Aim(f"{times:.0f} times what is needed, 50 or more", times >= 50),
+            Aim(
+                f"{statistics.median(ours):.0f} MB/s beside rerun's {rates[0]:.0f} MB/s",
+                statistics.median(ours) > rates[0],
+            ),
+        ]
+    )
 
 
 if __name__ == "__main__":

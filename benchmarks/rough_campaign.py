@@ -233,10 +233,15 @@ def row_of(case: Case, tune: float) -> dict[str, Any]:
     if word != "ok":
         tally.refused.append(f"{case.number} {case.drive}: {word}")
     return {
-        "number": case.number, "kind": case.kind, "drive": case.drive, "work": work.__name__,
-        "cpu_s": time.process_time() - begun, "version": _version(), "word": word,
+        "number": case.number,
+        "kind": case.kind,
+        "drive": case.drive,
+        "work": work.__name__,
+        "cpu_s": time.process_time() - begun,
+        "version": _version(),
+        "word": word,
         "tally": asdict(tally),
-    }  # fmt: skip
+    }
 
 
 def run(cases: list[Case], tune: float, until_s: float, store: Path | None) -> list[dict[str, Any]]:

@@ -96,8 +96,11 @@ def station_process(folder: Path) -> Iterator[tuple[httpx.Client, int, str]]:
     """A client, the server's process id, and its address."""
     child = subprocess.Popen(
         [sys.executable, "-m", "benchmarks.scope_soak", "--station", str(folder)],
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True,
-    )  # fmt: skip
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
     assert child.stdin is not None
     assert child.stdout is not None
     try:

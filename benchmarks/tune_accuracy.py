@@ -120,9 +120,13 @@ class Rig:
                 yield d.axis, d.session
             return
         async with bench(
-            self.namespace, spec, 1e-3 / self.khz, lockstep=self.wire == "lockstep",
-            settings=brake, drive=self.drive,
-        ) as b:  # fmt: skip
+            self.namespace,
+            spec,
+            1e-3 / self.khz,
+            lockstep=self.wire == "lockstep",
+            settings=brake,
+            drive=self.drive,
+        ) as b:
             yield b.axis, b.session
 
 

@@ -246,9 +246,13 @@ def motion_halted(
     """
     kind = EnvelopeExceeded if halt.cause in ENVELOPE_CAUSES else MotionHalted
     return kind(
-        "motion.halted", where=where, cause=words or halt.text, halt=halt, drive=drive,
+        "motion.halted",
+        where=where,
+        cause=words or halt.text,
+        halt=halt,
+        drive=drive,
         remedy=remedy,
-    )  # fmt: skip
+    )
 
 
 def exceeded(error: DriveError) -> HaltCause | None:

@@ -148,10 +148,13 @@ class Halted:
         """
         note, left_by = wire["note"], wire["left_by"]
         return cls(
-            HaltCause(wire["cause"]), wire["quantity"], wire["value"], wire["limit"],
+            HaltCause(wire["cause"]),
+            wire["quantity"],
+            wire["value"],
+            wire["limit"],
             Text.from_wire(note) if isinstance(note, Mapping) else note,
             None if left_by is None else LeftBy(left_by),
-        )  # fmt: skip
+        )
 
 
 _TEXTS: Mapping[HaltCause, str] = {

@@ -140,10 +140,12 @@ def _check_parameter(profile: Profile, p: Parameter) -> list[Finding]:
         if below or (high is not None and p.default_raw > high):
             findings.append(
                 found(
-                    p.key, "profile-check.default-outside", default=p.default_raw,
+                    p.key,
+                    "profile-check.default-outside",
+                    default=p.default_raw,
                     limits=f"{low}…{high}",
                 )
-            )  # fmt: skip
+            )
     bounds = INTEGER_RANGE.get(p.type)
     if bounds is not None:
         for name, value in (("min_raw", p.min_raw), ("max_raw", p.max_raw)):
@@ -159,10 +161,12 @@ def _check_parameter(profile: Profile, p: Parameter) -> list[Finding]:
     if outside and not explained:
         findings.append(
             found(
-                p.key, "profile-check.enum-outside", values=", ".join(map(str, outside)),
+                p.key,
+                "profile-check.enum-outside",
+                values=", ".join(map(str, outside)),
                 limits=f"{low}…{high}",
             )
-        )  # fmt: skip
+        )
     if not p.source.startswith(f"{profile.manual}:"):
         findings.append(
             found(p.key, "profile-check.other-manual", source=p.source, manual=profile.manual)

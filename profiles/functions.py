@@ -295,8 +295,11 @@ def referenced_keys(functions: Functions) -> list[str]:
         for probe in functions.probe.probes:
             found += [key for key in (probe.rising_key, probe.falling_key) if key is not None]
     for record in (
-        functions.brake, functions.regeneration, functions.gear, functions.identification,
-    ):  # fmt: skip
+        functions.brake,
+        functions.regeneration,
+        functions.gear,
+        functions.identification,
+    ):
         found += _named_keys(record)
     for guide in functions.guides:
         for step in guide.steps:

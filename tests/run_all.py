@@ -34,21 +34,30 @@ PYTEST = [sys.executable, "-m", "pytest", "-q", "-rs", "--durations=12"]
 REAL_TIME = [
     # First: what earlier tests leave in memory makes the server of this one slower.
     "tests/api/test_stop_floods.py",
-    "tests/api/test_ethercat.py", "tests/api/test_ethercat_faults.py",
-    "tests/api/test_ethercat_segment.py", "tests/api/test_every_family.py",
+    "tests/api/test_ethercat.py",
+    "tests/api/test_ethercat_faults.py",
+    "tests/api/test_ethercat_segment.py",
+    "tests/api/test_every_family.py",
     "tests/api/test_gantry.py",
     "tests/wire/ethercat_host",
-    "tests/api/test_scope_streams.py", "tests/api/test_scope_soak.py",
-    "tests/api/test_scales_taught.py", "tests/docs",
-]  # fmt: skip
+    "tests/api/test_scope_streams.py",
+    "tests/api/test_scope_soak.py",
+    "tests/api/test_scales_taught.py",
+    "tests/docs",
+]
 #: Suites that compute and keep no time.
 PATIENT = [
-    "tests/profiles", "tests/unit", "tests/virtual/conformance", "tests/virtual/firmware",
+    "tests/profiles",
+    "tests/unit",
+    "tests/virtual/conformance",
+    "tests/virtual/firmware",
     # Measurements and tunings whose buses follow the frames, however late they come.
     "tests/virtual/tools/test_excitations.py",
-    "tests/virtual/tools/test_families.py", "tests/virtual/tools/test_notches.py",
-    "tests/virtual/tools/test_play.py", "tests/virtual/tools/test_wrong_situations.py",
-]  # fmt: skip
+    "tests/virtual/tools/test_families.py",
+    "tests/virtual/tools/test_notches.py",
+    "tests/virtual/tools/test_play.py",
+    "tests/virtual/tools/test_wrong_situations.py",
+]
 #: No check takes as long, in s: one that does hangs, and ends with all that it has started.
 LIMIT_S = 2400.0
 #: Of every suite what ran, as JUnit XML.

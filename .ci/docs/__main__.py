@@ -21,11 +21,16 @@ def check() -> int:
     """Print what breaks a rule; the exit code."""
     known = terms.load()
     found = [
-        *prose.words_in_pages(known), *prose.words_in_messages(known), *prose.words_on_page(known),
-        *prose.words_elsewhere(known), *prose.words_in_code(),
-        *prose.long_sentences(), *prose.long_texts(), *prose.missing_pictures(),
+        *prose.words_in_pages(known),
+        *prose.words_in_messages(known),
+        *prose.words_on_page(known),
+        *prose.words_elsewhere(known),
+        *prose.words_in_code(),
+        *prose.long_sentences(),
+        *prose.long_texts(),
+        *prose.missing_pictures(),
         *pictures.findings(),
-    ]  # fmt: skip
+    ]
     for finding in found:
         print(finding)
     print(f"{len(known)} terms, {len(found)} findings")

@@ -75,9 +75,12 @@ def _faults(profile: Profile) -> Iterator[str]:
     yield "| --- | --- | --- | --- | --- |"
     for fault in profile.faults:
         cells = [
-            f"`{fault.code}`", fault.name, "; ".join(fault.causes), "; ".join(fault.remedies),
+            f"`{fault.code}`",
+            fault.name,
+            "; ".join(fault.causes),
+            "; ".join(fault.remedies),
             fault.reset,
-        ]  # fmt: skip
+        ]
         yield "| " + " | ".join(_cell(cell) for cell in cells) + " |"
     yield ""
 

@@ -78,9 +78,13 @@ def publish(folder: Path, story: Story, began: datetime) -> pictures.Run:
     """Put the pictures of the run in place of those of an earlier one."""
     made = sorted(each for each in folder.iterdir() if each.suffix in SUFFIXES)
     run = {
-        "id": uuid.uuid4().hex[:12], "began": began.isoformat(timespec="seconds"),
-        "servodeck": version("servodeck"), "axis": AXIS, "bus": URL, "cycle_us": CYCLE_US,
-    }  # fmt: skip
+        "id": uuid.uuid4().hex[:12],
+        "began": began.isoformat(timespec="seconds"),
+        "servodeck": version("servodeck"),
+        "axis": AXIS,
+        "bus": URL,
+        "cycle_us": CYCLE_US,
+    }
     whole = {
         "run": run,
         "figures": dict(sorted(story.readings.figures.items())),

@@ -90,11 +90,14 @@ def drawn(page: Page, marks: Sequence[Mark]) -> Iterator[None]:
         frame = 0 if mark.arrow else MARGIN_PX
         boxes.append(
             {
-                "x": box["x"] - frame, "y": box["y"] - frame,
-                "width": box["width"] + 2 * frame, "height": box["height"] + 2 * frame,
-                "label": str(number), "arrow": mark.arrow,
+                "x": box["x"] - frame,
+                "y": box["y"] - frame,
+                "width": box["width"] + 2 * frame,
+                "height": box["height"] + 2 * frame,
+                "label": str(number),
+                "arrow": mark.arrow,
             }
-        )  # fmt: skip
+        )
     page.evaluate(_DRAW, boxes)
     try:
         yield

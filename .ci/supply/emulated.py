@@ -48,12 +48,20 @@ def start(packed: Path, work: Path) -> str:
     environment = {"PATH": os.defpath, "HOME": str(work / "home"), "PYTHONNOUSERSITE": "1"}
     said = subprocess.run(
         [*run, "-c", f"import platform, {_LATER}; print(platform.machine())"],
-        check=True, capture_output=True, text=True, env=environment, cwd=work,
-    )  # fmt: skip
+        check=True,
+        capture_output=True,
+        text=True,
+        env=environment,
+        cwd=work,
+    )
     process = subprocess.Popen(
-        [*run, "-m", "backend", "serve", "--port", "0"], env=environment, cwd=work,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-    )  # fmt: skip
+        [*run, "-m", "backend", "serve", "--port", "0"],
+        env=environment,
+        cwd=work,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
     guard = threading.Timer(_HANG_S, process.kill)
     guard.start()
     try:

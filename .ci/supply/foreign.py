@@ -118,10 +118,15 @@ def contents(site: Path) -> list[str]:
 def locked(system: System, python: str, lock: str) -> dict[str, str]:
     """Versions that the lock has for a system and Python, by normalised name."""
     environment = {
-        **system.markers, "implementation_name": "cpython", "python_version": python,
-        "platform_python_implementation": "CPython", "python_full_version": f"{python}.0",
-        "implementation_version": f"{python}.0", "platform_release": "", "platform_version": "",
-    }  # fmt: skip
+        **system.markers,
+        "implementation_name": "cpython",
+        "python_version": python,
+        "platform_python_implementation": "CPython",
+        "python_full_version": f"{python}.0",
+        "implementation_version": f"{python}.0",
+        "platform_release": "",
+        "platform_version": "",
+    }
     found = {}
     for line in _LOCKED.findall(lock):
         wanted = Requirement(line)

@@ -212,8 +212,12 @@ def _expression(text: str) -> bool:
 
 def sbom() -> str:
     """The bill of materials (CycloneDX 1.6, ECMA-424), the same for the same packages."""
-    project = {"type": "application", "bom-ref": "servodeck", "name": "servodeck",
-               "licenses": [{"license": {"id": "Apache-2.0"}}]}  # fmt: skip
+    project = {
+        "type": "application",
+        "bom-ref": "servodeck",
+        "name": "servodeck",
+        "licenses": [{"license": {"id": "Apache-2.0"}}],
+    }
     content: dict[str, Any] = {
         "$schema": "http://cyclonedx.org/schema/bom-1.6.schema.json",
         "bomFormat": "CycloneDX",

@@ -78,9 +78,12 @@ def build(wheels: Path, output: Path, version: str, cpython: Path) -> Path:
         put_texts(folder, version, [cpython.name, *foreign.contents(site)])
         if python == f"{sys.version_info.major}.{sys.version_info.minor}":
             compileall.compile_dir(
-                str(site), quiet=2, workers=0, stripdir=str(folder),
+                str(site),
+                quiet=2,
+                workers=0,
+                stripdir=str(folder),
                 invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH,
-            )  # fmt: skip
+            )
         return pack(folder, output / f"{name}.zip")
 
 

@@ -216,9 +216,12 @@ class AuditLog:
         if not queue.lost:
             return []
         fact = Fact(
-            "audit", "lost", outcome=text("audit.events-lost", count=queue.lost), new=queue.lost,
+            "audit",
+            "lost",
+            outcome=text("audit.events-lost", count=queue.lost),
+            new=queue.lost,
             detail={"since": queue.lost_since},
-        )  # fmt: skip
+        )
         return [body_of(fact, moment=datetime.now(UTC), station=self.station, person=PROGRAM)]
 
     def _succeeded(self, batch: list[str], lost_reported: bool) -> None:

@@ -61,9 +61,12 @@ async def play(session: CyclicSession, drive: Drive, trajectory: Trajectory, gra
 
 
 async def play_pair(
-    session: CyclicSession, drives: tuple[Drive, Drive], pair: tuple[Trajectory, Trajectory],
-    coupled: Coupled, grants: tuple[Grant, Grant],
-) -> int:  # fmt: skip
+    session: CyclicSession,
+    drives: tuple[Drive, Drive],
+    pair: tuple[Trajectory, Trajectory],
+    coupled: Coupled,
+    grants: tuple[Grant, Grant],
+) -> int:
     """Give the loop setpoints for two axes of one machine; see `drivers.link.PlaysPairs`.
 
     Raises:

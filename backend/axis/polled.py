@@ -44,9 +44,12 @@ class PolledGuard:
         if halt is not None:
             name = self._axis.drive.name
             raise motion_halted(
-                name, halt, words=halt_words(halt, self._units), drive=name,
+                name,
+                halt,
+                words=halt_words(halt, self._units),
+                drive=name,
                 remedy=halt_remedy(halt, text("axis.check-load-and-limits")),
-            )  # fmt: skip
+            )
 
     def interrupt(self) -> None:
         """The position was set again, as homing does."""

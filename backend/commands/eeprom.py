@@ -199,8 +199,11 @@ async def _by_server(
     from backend.commands.remote import remote
 
     query = {
-        "url": url, "station": str(station), "what": what, "unknown_accepted": str(unknown).lower(),
-    }  # fmt: skip
+        "url": url,
+        "station": str(station),
+        "what": what,
+        "unknown_accepted": str(unknown).lower(),
+    }
     async with remote(at) as asked:
         answer = await asked.raw("POST", "/ethercat/eeprom/plan", content=data, query=query)
         reported = answer.json()

@@ -57,6 +57,9 @@ def of_plan(plan: GearPlan) -> Gear:
     """A plan that was made here."""
     return Gear(
         [(v.parameter.key, v.parameter.name, v.raw) for v in plan.values],
-        plan.travel_per_motor_turn, plan.unit, plan.reached, plan.error_ppm,
+        plan.travel_per_motor_turn,
+        plan.unit,
+        plan.reached,
+        plan.error_ppm,
         [each.words(language()) for each in plan.warnings],
-    )  # fmt: skip
+    )

@@ -41,9 +41,12 @@ def _by(where: Place) -> _Functions:
 
 
 def io(
-    url: Url, station: Station = 1, profile: Profile = None, as_json: Json = False,
+    url: Url,
+    station: Station = 1,
+    profile: Profile = None,
+    as_json: Json = False,
     server: Server = None,
-) -> None:  # fmt: skip
+) -> None:
     """Show the terminals: state, function, and functions that two of them have."""
 
     async def work() -> None:
@@ -64,9 +67,12 @@ def io(
 
 
 def faults(
-    url: Url, station: Station = 1, profile: Profile = None, as_json: Json = False,
+    url: Url,
+    station: Station = 1,
+    profile: Profile = None,
+    as_json: Json = False,
     server: Server = None,
-) -> None:  # fmt: skip
+) -> None:
     """Show active faults, and the drive's own record where it can be read."""
 
     async def work() -> None:

@@ -84,13 +84,16 @@ def export(
         axes = [
             fitting(
                 hand_over(
-                    content, load_profile(content.profile), choice=choice, only=keys,
+                    content,
+                    load_profile(content.profile),
+                    choice=choice,
+                    only=keys,
                     motor_individual=motor_individual,
                 ),
                 chosen,
             )
             for content in contents
-        ]  # fmt: skip
+        ]
         sources = [(bytes_of(file), file.name) for file in esi or []]
         if sources:
             axes = with_controllers(axes, controllers_of(sources, wanted_of(axes)))
@@ -204,10 +207,15 @@ def _show(verdict: Verdict, form: str, *, as_json: bool) -> None:
     if verdict.not_read:
         print_text("printed.not-read-compare-again", keys=", ".join(verdict.not_read))
     print_text(
-        "printed.handover-verdict", form=form, conflicts=len(verdict.conflicts), same=verdict.same,
-        restored=len(verdict.restored), defects=len(verdict.findings),
-        not_written=len(verdict.not_written), not_read=len(verdict.not_read),
-    )  # fmt: skip
+        "printed.handover-verdict",
+        form=form,
+        conflicts=len(verdict.conflicts),
+        same=verdict.same,
+        restored=len(verdict.restored),
+        defects=len(verdict.findings),
+        not_written=len(verdict.not_written),
+        not_read=len(verdict.not_read),
+    )
 
 
 @app.command("watch")

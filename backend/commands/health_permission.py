@@ -65,10 +65,14 @@ def permit(
 ) -> None:
     """Permit the baseline's measurements without a person. The axis moves later."""
     body = {
-        "until": (datetime.now(UTC) + timedelta(days=for_days)).isoformat(), "days": _days(days),
-        "at": _time(at).isoformat(), "trigger": trigger, "pause_min": pause_min, "person": person,
+        "until": (datetime.now(UTC) + timedelta(days=for_days)).isoformat(),
+        "days": _days(days),
+        "at": _time(at).isoformat(),
+        "trigger": trigger,
+        "pause_min": pause_min,
+        "person": person,
         "secured": secured,
-    }  # fmt: skip
+    }
 
     async def work() -> None:
         async with remote(server or DEFAULT_SERVER) as at_server:

@@ -166,9 +166,12 @@ def export(
     """Write entries as a table, or as JSON lines with their hashes."""
     records = _existing(config, database)
     wanted = Filter(
-        kinds=tuple(kind or ()), person=person, axis=axis,
-        since=since.astimezone() if since else None, until=until.astimezone() if until else None,
-    )  # fmt: skip
+        kinds=tuple(kind or ()),
+        person=person,
+        axis=axis,
+        since=since.astimezone() if since else None,
+        until=until.astimezone() if until else None,
+    )
     lines = records.trail.export(wanted, form)
     if out is None:
         sys.stdout.writelines(lines)

@@ -63,10 +63,14 @@ def jog(
         async with remote(at) as bench:
             drive = await bench.drive(url, station, profile)
             request: dict[str, object] = {
-                "type": "jog_start", "drive": drive.id, "direction": -1 if backwards else 1,
-                "speed": speed, "acceleration": acceleration, "travel_limit": travel,
+                "type": "jog_start",
+                "drive": drive.id,
+                "direction": -1 if backwards else 1,
+                "speed": speed,
+                "acceleration": acceleration,
+                "travel_limit": travel,
                 "torque_limit": torque,
-            }  # fmt: skip
+            }
             async with bench.exchange(url, cycle_us), _page(at) as page:
                 print_text("printed.axis-moves", drive=drive.name)
                 ended = await _hold(page, request, seconds)

@@ -21,11 +21,16 @@ async def terminals(place: Place) -> list[Terminal]:
         states = await read_terminals(drive)
     return [
         Terminal(
-            state.terminal.name, state.terminal.direction, state.on, state.function,
-            state.function_name, state.inverted, list(state.same_function),
+            state.terminal.name,
+            state.terminal.direction,
+            state.on,
+            state.function,
+            state.function_name,
+            state.inverted,
+            list(state.same_function),
         )
         for state in states
-    ]  # fmt: skip
+    ]
 
 
 async def faults(place: Place) -> Faults:

@@ -51,9 +51,13 @@ def _by(where: Place) -> _Params:
 
 @app.command("get")
 def get(
-    url: Url, keys: list[str], station: Station = 1, profile: Profile = None,
-    server: Server = None, as_json: Json = False,
-) -> None:  # fmt: skip
+    url: Url,
+    keys: list[str],
+    station: Station = 1,
+    profile: Profile = None,
+    server: Server = None,
+    as_json: Json = False,
+) -> None:
     """Read parameters and print them; exit code 1 when one could not be read."""
 
     async def work() -> bool:
@@ -138,9 +142,13 @@ def restore(
 
 @app.command("diff")
 def diff(
-    url: Url, file: Path, station: Station = 1, profile: Profile = None,
-    server: Server = None, as_json: Json = False,
-) -> None:  # fmt: skip
+    url: Url,
+    file: Path,
+    station: Station = 1,
+    profile: Profile = None,
+    server: Server = None,
+    as_json: Json = False,
+) -> None:
     """Compare a parameter set with the drive; exit code 1 when they differ, 2 on an error."""
 
     async def work() -> bool:

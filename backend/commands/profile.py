@@ -284,9 +284,12 @@ def check(drive: Annotated[str | None, typer.Argument()] = None) -> None:
         for overlay in overlays.values():
             findings += check_overlay(profile, overlay)
         print_text(
-            "printed.profile-checked", name=name, parameters=len(profile.parameters),
-            faults=len(profile.faults), findings=len(findings),
-        )  # fmt: skip
+            "printed.profile-checked",
+            name=name,
+            parameters=len(profile.parameters),
+            faults=len(profile.faults),
+            findings=len(findings),
+        )
         counts = ", ".join(f"{count} {motion}" for motion, count in motion_counts(profile).items())
         print_text("printed.motion-classes", counts=counts, unclassified=len(unclassified(profile)))
         for translated, overlay in overlays.items():

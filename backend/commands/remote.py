@@ -54,9 +54,14 @@ class Remote:
             ) from error
 
     async def raw(
-        self, method: str, path: str, *, body: object = None, content: bytes | None = None,
+        self,
+        method: str,
+        path: str,
+        *,
+        body: object = None,
+        content: bytes | None = None,
         query: dict[str, str] | None = None,
-    ) -> httpx.Response:  # fmt: skip
+    ) -> httpx.Response:
         """One request, with ``body`` as JSON or ``content`` as it is; the answer as it came."""
         try:
             answer = await self._http.request(

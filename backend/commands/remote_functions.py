@@ -16,11 +16,16 @@ async def terminals(place: Place) -> list[Terminal]:
         reported = await at.ask("GET", f"/drives/{drive.id}/io", IoInfo)
     return [
         Terminal(
-            state.name, state.direction, state.on, state.function, state.function_name,
-            state.inverted, state.same_function,
+            state.name,
+            state.direction,
+            state.on,
+            state.function,
+            state.function_name,
+            state.inverted,
+            state.same_function,
         )
         for state in reported.terminals
-    ]  # fmt: skip
+    ]
 
 
 async def faults(place: Place) -> Faults:
@@ -36,13 +41,16 @@ async def faults(place: Place) -> Faults:
         active,
         [
             Past(
-                entry.name, entry.code, entry.title if entry.known else None,
-                {reading.key: reading.value for reading in entry.values}, entry.error,
+                entry.name,
+                entry.code,
+                entry.title if entry.known else None,
+                {reading.key: reading.value for reading in entry.values},
+                entry.error,
             )
             for entry in history.entries
         ],
         history.size if history.kind == "unreadable" else 0,
-    )  # fmt: skip
+    )
 
 
 async def gear(place: Place, mechanics: Mechanics, *, write: bool) -> Gear:
@@ -53,8 +61,12 @@ async def gear(place: Place, mechanics: Mechanics, *, write: bool) -> Gear:
         plan = await at.ask("POST", f"{here}/plan", GearPlanInfo, body=body)
         reported = Gear(
             [(value.key, value.name, value.raw) for value in plan.values],
-            plan.travel_per_motor_turn, plan.unit, plan.reached, plan.error_ppm, plan.warnings,
-        )  # fmt: skip
+            plan.travel_per_motor_turn,
+            plan.unit,
+            plan.reached,
+            plan.error_ppm,
+            plan.warnings,
+        )
         if not write:
             return reported
         done = await at.ask("POST", f"{here}/write", GearWritten, body=body)

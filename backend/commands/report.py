@@ -100,8 +100,13 @@ async def _from_server(where: Where, form: Format, language: str, about: About) 
     server = where.asked
     if server is None:
         raise NotAllowed("command.report-drive-bus-made", value=where.url)
-    body = {"format": form, "language": language, "person": about.person,
-            "machine": about.machine, "notes": about.notes}  # fmt: skip
+    body = {
+        "format": form,
+        "language": language,
+        "person": about.person,
+        "machine": about.machine,
+        "notes": about.notes,
+    }
     async with remote(server) as at:
         drive = await where.drive(at)
         made = await at.ask("POST", f"/drives/{drive.id}/reports", ReportInfo, body=body)

@@ -32,9 +32,13 @@ def recall(drive: Drive, url: str, station: int) -> Pending:
         since = datetime.fromtimestamp(pending.since).astimezone()
         note(
             "printed.cut-off" if pending.by else "printed.server-cut-off",
-            drive=drive.name, by=pending.by, since=f"{since:%Y-%m-%d %H:%M:%S}",
-            values=_values(drive), url=url, station=station,
-        )  # fmt: skip
+            drive=drive.name,
+            by=pending.by,
+            since=f"{since:%Y-%m-%d %H:%M:%S}",
+            values=_values(drive),
+            url=url,
+            station=station,
+        )
     for file in known.pending.unreadable:
         note("restore.list-damaged", drive=drive.name, file=str(file))
     if known.pending.held_by:

@@ -77,9 +77,13 @@ async def _axis_at(where: Place, state: Path | None) -> AsyncIterator[Axis]:
 
 @app.command()
 def show(
-    url: Url, station: Station = 1, profile: Profile = None, as_json: Json = False,
-    server: Server = None, state: State = None,
-) -> None:  # fmt: skip
+    url: Url,
+    station: Station = 1,
+    profile: Profile = None,
+    as_json: Json = False,
+    server: Server = None,
+    state: State = None,
+) -> None:
     """Show the scales with their origins. Nothing moves."""
 
     async def work() -> None:
@@ -98,12 +102,15 @@ def show(
 
 @app.command("set")
 def state_scales(
-    url: Url, station: Station = 1, profile: Profile = None,
+    url: Url,
+    station: Station = 1,
+    profile: Profile = None,
     counts_per_rev: Annotated[float | None, typer.Option(help="increments of a turn")] = None,
     raw_per_rpm: Annotated[float | None, typer.Option(help="raw speed of one rpm")] = None,
     raw_per_rpm_s: Annotated[float | None, typer.Option(help="raw ramp of one rpm/s")] = None,
-    server: Server = None, state: State = None,
-) -> None:  # fmt: skip
+    server: Server = None,
+    state: State = None,
+) -> None:
     """State scales from a data sheet. Nothing is written to the drive, and nothing moves."""
 
     async def work() -> None:
@@ -128,9 +135,12 @@ def state_scales(
 
 @app.command()
 def forget(
-    url: Url, station: Station = 1, profile: Profile = None, server: Server = None,
+    url: Url,
+    station: Station = 1,
+    profile: Profile = None,
+    server: Server = None,
     state: State = None,
-) -> None:  # fmt: skip
+) -> None:
     """Forget what was said; the drive, its file and its manual count again."""
 
     async def work() -> None:
@@ -148,12 +158,15 @@ def forget(
 
 @app.command()
 def teach(
-    url: Url, station: Station = 1, profile: Profile = None,
+    url: Url,
+    station: Station = 1,
+    profile: Profile = None,
     increments: Annotated[int, typer.Option(help="of the first small move")] = 500,
     torque_percent: Annotated[float, typer.Option(help="% of rated, at most")] = 20.0,
     cycle_ms: Annotated[float, typer.Option(help="cycle time in ms")] = 1.0,
-    server: Server = None, state: State = None,
-) -> None:  # fmt: skip
+    server: Server = None,
+    state: State = None,
+) -> None:
     """Teach the scales by small moves: look how far the shaft turns. The axis moves."""
 
     async def work() -> None:

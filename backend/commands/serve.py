@@ -49,9 +49,13 @@ DESCRIPTORS = 8192
 
 #: What the start leaves out, so that the page is there sooner, and loads behind it.
 LATE = (
-    "scipy.fft", "scipy.ndimage", "scipy.optimize", "scipy.signal",
-    "scipy.special", "backend.report.pdf",
-)  # fmt: skip
+    "scipy.fft",
+    "scipy.ndimage",
+    "scipy.optimize",
+    "scipy.signal",
+    "scipy.special",
+    "backend.report.pdf",
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,9 +27,12 @@ from backend.tools.tool import AnyTool, Option, Row, Run, ToolResult
 from drivers.texts.message import language, text
 
 _WHERE: dict[str, tuple[Any, object]] = {
-    "url": (measure.Url, None), "station": (measure.Station, 1), "profile": (measure.Profile, None),
-    "server": (Server, None), "axis": (measure.AxisName, None),
-}  # fmt: skip
+    "url": (measure.Url, None),
+    "station": (measure.Station, 1),
+    "profile": (measure.Profile, None),
+    "server": (Server, None),
+    "axis": (measure.AxisName, None),
+}
 _OUTPUT: dict[str, tuple[Any, object]] = {"out": (measure.Out, None), "as_json": (Json, False)}
 
 
@@ -70,9 +73,14 @@ def command_of(tool: AnyTool, extras: CommandExtras | None = None) -> Callable[.
                     found = await tool.run(pair, settings)
                 return dict(found.model_dump(mode="json"))
             async with measure.exchanging(
-                where.url, where.station, where.profile, settings.cycle_ms, settings.envelope,
-                settings.consent, closes_loops=tool.closes_loops,
-            ) as (axis, session):  # fmt: skip
+                where.url,
+                where.station,
+                where.profile,
+                settings.cycle_ms,
+                settings.envelope,
+                settings.consent,
+                closes_loops=tool.closes_loops,
+            ) as (axis, session):
                 found = await tool.run(Run(axis, session, progress()), settings)
                 if extras is not None:
                     await extras.here(axis, found, given)

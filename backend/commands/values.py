@@ -94,11 +94,14 @@ D = TypeVar("D", bound=Described)
 _WIDEST = 0xFFFF_FFFF
 #: What a row of a comparison is, where its values do not differ.
 _STATUS = {
-    "differs": "printed.row-differs", "same": "printed.row-same",
-    "not_in_drive": "printed.row-not-in-drive", "not_in_file": "printed.row-not-in-file",
-    "invalid": "printed.row-invalid", "read_only": "printed.row-read-only",
+    "differs": "printed.row-differs",
+    "same": "printed.row-same",
+    "not_in_drive": "printed.row-not-in-drive",
+    "not_in_file": "printed.row-not-in-file",
+    "invalid": "printed.row-invalid",
+    "read_only": "printed.row-read-only",
     "energises": "printed.row-energises",
-}  # fmt: skip
+}
 
 
 def finite(key: str, name: str, text: str) -> float:
@@ -160,10 +163,14 @@ def show_readings(read: Iterable[tuple[Described, Reported]], *, as_json: bool) 
 
 def _row(parameter: Described, reported: Reported) -> dict[str, object]:
     return {
-        "key": parameter.key, "name": parameter.name, "value": reported.value,
-        "unit": parameter.unit, "raw": reported.raw, "label": _label(parameter, reported),
+        "key": parameter.key,
+        "name": parameter.name,
+        "value": reported.value,
+        "unit": parameter.unit,
+        "raw": reported.raw,
+        "label": _label(parameter, reported),
         "error": reported.error,
-    }  # fmt: skip
+    }
 
 
 def _label(parameter: Described, reported: Reported) -> str:

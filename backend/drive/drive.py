@@ -30,9 +30,13 @@ from drivers.texts.message import Text, text
 from profiles.schema import Parameter, Raw
 
 #: States in which the motor has power (CiA 402-2 table 28).
-_POWERED = frozenset({
-    cia402.State.OPERATION_ENABLED, cia402.State.QUICK_STOP_ACTIVE, cia402.State.FAULT_REACTION,
-})  # fmt: skip
+_POWERED = frozenset(
+    {
+        cia402.State.OPERATION_ENABLED,
+        cia402.State.QUICK_STOP_ACTIVE,
+        cia402.State.FAULT_REACTION,
+    }
+)
 
 
 class Drive(ReadableDrive):

@@ -87,10 +87,14 @@ def _with_twins(states: list[TerminalState], facts: TerminalFacts) -> list[Termi
         used = state.terminal.name in names
         marked.append(
             TerminalState(
-                state.terminal, state.on, state.function, state.function_name, state.inverted,
+                state.terminal,
+                state.on,
+                state.function,
+                state.function_name,
+                state.inverted,
                 others if used else (),
             )
-        )  # fmt: skip
+        )
     return marked
 
 

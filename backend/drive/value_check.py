@@ -68,9 +68,12 @@ def named(
         error.value = value
     if anonymous:
         error.text = text(
-            "drive.of-parameter", drive=drive, parameter=parameter.key, name=parameter.name,
+            "drive.of-parameter",
+            drive=drive,
+            parameter=parameter.key,
+            name=parameter.name,
             cause=error.text,
-        )  # fmt: skip
+        )
     return error
 
 

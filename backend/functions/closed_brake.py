@@ -15,9 +15,14 @@ from profiles.schema import IoTerminal
 
 #: Why the outputs of a drive cannot keep its brake closed.
 Obstacle = Literal[
-    "means_unknown", "built_in", "fixed_output", "bus_bit", "no_output", "output_inverted",
+    "means_unknown",
+    "built_in",
+    "fixed_output",
+    "bus_bit",
+    "no_output",
+    "output_inverted",
     "output_forced",
-]  # fmt: skip
+]
 
 
 async def obstacle_of(drive: Drive) -> Obstacle | None:

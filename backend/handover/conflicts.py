@@ -155,9 +155,14 @@ def compare(
         and profile.by_key[key].access != "wo"
     )
     return Verdict(
-        tuple(conflicts), diagnose(profile, listed), missing, tuple(restored), tuple(alone),
-        unread, same,
-    )  # fmt: skip
+        tuple(conflicts),
+        diagnose(profile, listed),
+        missing,
+        tuple(restored),
+        tuple(alone),
+        unread,
+        same,
+    )
 
 
 def changed_since(
@@ -201,8 +206,11 @@ def _conflict(
     name = " ".join(parameter.name.split())
     sentence = text(
         _OVERWRITES[kind],
-        name=name, key=parameter.key, before=shown(parameter, before), after=shown(parameter, raw),
-    )  # fmt: skip
+        name=name,
+        key=parameter.key,
+        before=shown(parameter, before),
+        after=shown(parameter, raw),
+    )
     return Conflict(parameter.key, name, raw, ours, drive, kind, sentence)
 
 

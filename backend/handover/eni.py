@@ -198,9 +198,14 @@ def _assignment(commands: Element, axis: AxisHandover, controller: SlaveControll
     def write(comment: str, index: int, subindex: int, data: bytes) -> None:
         command = child(commands, "InitCmd", Fixed="1")
         for tag, text in (
-            ("Transition", "PS"), ("Comment", comment), ("Timeout", 0), ("Ccs", 1),
-            ("Index", index), ("SubIndex", subindex), ("Data", data.hex()),
-        ):  # fmt: skip
+            ("Transition", "PS"),
+            ("Comment", comment),
+            ("Timeout", 0),
+            ("Ccs", 1),
+            ("Index", index),
+            ("SubIndex", subindex),
+            ("Data", data.hex()),
+        ):
             child(command, tag, text)
 
     if not controller.assigns:

@@ -144,11 +144,16 @@ def gain_keys(profile: Profile) -> frozenset[str]:
         found |= {
             key
             for key in (
-                gains.position, gains.speed, gains.integral, gains.torque_filter,
-                gains.current_bandwidth, gains.speed_filter, gains.inertia,
+                gains.position,
+                gains.speed,
+                gains.integral,
+                gains.torque_filter,
+                gains.current_bandwidth,
+                gains.speed_filter,
+                gains.inertia,
             )
             if key
-        }  # fmt: skip
+        }
     if (notch := profile.notch) is not None:
         for slot in notch.slots:
             found |= {
@@ -251,9 +256,14 @@ def write_of(parameter: Parameter, raw: Raw, transition: Transition = "PS") -> S
     assert parameter.index is not None
     assert parameter.subindex is not None
     return StartupWrite(
-        parameter.index, parameter.subindex, parameter.type, raw, parameter.key,
-        " ".join(parameter.name.split()), transition,
-    )  # fmt: skip
+        parameter.index,
+        parameter.subindex,
+        parameter.type,
+        raw,
+        parameter.key,
+        " ".join(parameter.name.split()),
+        transition,
+    )
 
 
 def _why_not(

@@ -56,8 +56,13 @@ _UPWARD = ("IP", "PS", "SO")
 _COMMANDS = ".//CoE/InitCmds/InitCmd"
 #: What the parsers raise; LookupError is an encoding that is unknown.
 _DAMAGED = (
-    ParseError, ValueError, LookupError, yaml.YAMLError, csv.Error, RecursionError,
-)  # fmt: skip
+    ParseError,
+    ValueError,
+    LookupError,
+    yaml.YAMLError,
+    csv.Error,
+    RecursionError,
+)
 #: Parameters of lcec's drivers that choose pins, PDOs and names; the others are values that the
 #: driver writes to the slave at its start, in a way of its own.
 _SETS_PINS = re.compile(r"(?:cia|pdo|enable|fsoe)\w*|\w*(?:channels|name)", re.I)

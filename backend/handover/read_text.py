@@ -90,9 +90,12 @@ def csv_table(content: str, separator: str) -> Iterator[Listed]:
     for line, row in enumerate(csv.DictReader(io.StringIO(content), delimiter=separator), 2):
         place = line_of(line)
         yield listed(
-            number(row.get("index"), place), number(row.get("subindex"), place),
-            row_of_bytes(row.get("data"), place), row.get("transition") or "", place,
-        )  # fmt: skip
+            number(row.get("index"), place),
+            number(row.get("subindex"), place),
+            row_of_bytes(row.get("data"), place),
+            row.get("transition") or "",
+            place,
+        )
 
 
 @dataclass(frozen=True, slots=True)

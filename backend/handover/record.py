@@ -67,9 +67,13 @@ def _parsed(line: str) -> HandedOver | None:
     try:
         row = json.loads(line)
         return HandedOver(
-            datetime.fromisoformat(row["time"]), str(row["person"]), str(row["format"]),
-            str(row["file"]), str(row["sha256"]), str(row["set_file"]),
+            datetime.fromisoformat(row["time"]),
+            str(row["person"]),
+            str(row["format"]),
+            str(row["file"]),
+            str(row["sha256"]),
+            str(row["set_file"]),
             {str(k): v for k, v in row["values"].items() if isinstance(v, (int, float, str))},
-        )  # fmt: skip
+        )
     except (ValueError, KeyError, TypeError, AttributeError):
         return None

@@ -112,9 +112,13 @@ def dcf(
         }
     )
     return export_dcf(
-        axis.profile.model_copy(update={"identity": identity}), values, created,
-        file_name=file_name, node_name=line_of(axis.name), reals_as_bits=reals_as_bits,
-    ).encode()  # fmt: skip
+        axis.profile.model_copy(update={"identity": identity}),
+        values,
+        created,
+        file_name=file_name,
+        node_name=line_of(axis.name),
+        reals_as_bits=reals_as_bits,
+    ).encode()
 
 
 def concise_dcf(axis: AxisHandover) -> bytes:

@@ -90,9 +90,12 @@ def _lcec_slave(master: Element, axis: AxisHandover, number: int, name: str) -> 
     )  # fmt: skip
     if axis.assign_activate:
         child(
-            slave, "dcConf", assignActivate=f"{axis.assign_activate:x}", sync0Cycle="*1",
+            slave,
+            "dcConf",
+            assignActivate=f"{axis.assign_activate:x}",
+            sync0Cycle="*1",
             sync0Shift=str(axis.controller.shift_ns if axis.controller else 0),
-        )  # fmt: skip
+        )
     for write in axis.writes:
         slave.append(note(f"{write.key} {write.name}"))
         config = child(slave, "sdoConfig", idx=f"{write.index:04X}", subIdx=f"{write.subindex:02X}")

@@ -141,9 +141,13 @@ def _sample(value: HealthValue) -> _Sample:
 
 
 def _finding(
-    quantity: Quantity, number: int, before: list[_Sample], now: list[_Sample], checks: int,
+    quantity: Quantity,
+    number: int,
+    before: list[_Sample],
+    now: list[_Sample],
+    checks: int,
     level: float,
-) -> Finding:  # fmt: skip
+) -> Finding:
     looked_for = LOOKED_FOR[quantity] if _is_judged(quantity, number) else None
     if not before:
         return Finding(quantity, number, "few_runs", looked_for=looked_for)

@@ -123,9 +123,10 @@ def require_term(given: datetime, until: datetime) -> None:
     """
     if not given < until <= given + LONGEST:
         raise NotAllowed(
-            "health.permission-term", value=until.isoformat(timespec="minutes"),
+            "health.permission-term",
+            value=until.isoformat(timespec="minutes"),
             limit=text("health.permission-longest", days=LONGEST.days),
-        )  # fmt: skip
+        )
 
 
 def why_of(error: DriveError) -> dict[str, object]:

@@ -168,18 +168,25 @@ class HealthRecords:
                 )
             if len(rows) < LEAST_REPEATS:
                 raise NotAllowed(
-                    "health.baseline-few-runs", value=len(rows), limit=str(LEAST_REPEATS),
-                    rounds=len(rows), least=LEAST_REPEATS,
-                )  # fmt: skip
+                    "health.baseline-few-runs",
+                    value=len(rows),
+                    limit=str(LEAST_REPEATS),
+                    rounds=len(rows),
+                    least=LEAST_REPEATS,
+                )
             if len({row.settings_sha256 for row in rows}) > 1:
                 raise NotAllowed("health.baseline-different-settings")
             signed = datetime.now(UTC)
             settings = session.get_one(HealthRun, rows[0].id).settings
             content = _content(rows, settings, signed, person.strip(), notes)
             made = HealthBaseline(
-                axis_key=key, signed=signed, person=person.strip(), notes=notes, content=content,
+                axis_key=key,
+                signed=signed,
+                person=person.strip(),
+                notes=notes,
+                content=content,
                 sha256=_digest(content),
-            )  # fmt: skip
+            )
             session.add(made)
             session.flush()
             return _baseline(made)
@@ -266,17 +273,22 @@ def _content(
 ) -> dict[str, object]:
     """What is signed: who, when, which axis, which stored measurements, and their values."""
     return {
-        "signed": signed.isoformat(), "person": person, "notes": notes,
-        "axis": asdict(rows[-1].axis), "settings": dict(settings),
+        "signed": signed.isoformat(),
+        "person": person,
+        "notes": notes,
+        "axis": asdict(rows[-1].axis),
+        "settings": dict(settings),
         "settings_sha256": rows[0].settings_sha256,
         "runs": [
             {
-                "id": row.id, "taken": row.taken.isoformat(),
-                "measurements": dict(row.measurements), "round": row.round.model_dump(mode="json"),
+                "id": row.id,
+                "taken": row.taken.isoformat(),
+                "measurements": dict(row.measurements),
+                "round": row.round.model_dump(mode="json"),
             }
             for row in rows
         ],
-    }  # fmt: skip
+    }
 
 
 def _digest(content: Mapping[str, object]) -> str:

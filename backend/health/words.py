@@ -50,9 +50,12 @@ def message_of(finding: Finding) -> Text:
         code = _SHOWN
     change = finding.change or 0.0
     return text(
-        code, name=name_of(finding), change_percent=100.0 * change,
-        low_percent=100.0 * (finding.low or 0.0), high_percent=100.0 * (finding.high or 0.0),
+        code,
+        name=name_of(finding),
+        change_percent=100.0 * change,
+        low_percent=100.0 * (finding.low or 0.0),
+        high_percent=100.0 * (finding.high or 0.0),
         # A resonance of one spring goes with the root of its stiffness.
         stiffness_percent=100.0 * ((1.0 + change) ** 2 - 1.0),
         looked_for_percent=100.0 * (finding.looked_for or 0.0),
-    )  # fmt: skip
+    )

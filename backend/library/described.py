@@ -23,12 +23,15 @@ def folders(state: Path) -> list[Folder]:
     recordings = RecordingLibrary(state / "recordings")
     return [
         Folder(
-            "recording", recordings.folder, (RECORDING,),
-            lambda path: _recording(recordings, path), sidecar=".json",
+            "recording",
+            recordings.folder,
+            (RECORDING,),
+            lambda path: _recording(recordings, path),
+            sidecar=".json",
         ),
         Folder("measurement", state / "measurements", (measurements.SUFFIX,), _measurement),
         Folder("report", state / "reports", (".html", ".pdf"), _report),
-    ]  # fmt: skip
+    ]
 
 
 def require_usable(kind: Kind, path: Path) -> None:

@@ -116,9 +116,13 @@ class Index:
                 item = items.get(name)
                 if item is None:
                     item = Item(
-                        kind=folder.kind, station=self._station, name=name, notes="", words="",
+                        kind=folder.kind,
+                        station=self._station,
+                        name=name,
+                        notes="",
+                        words="",
                         changed=datetime.now(UTC),
-                    )  # fmt: skip
+                    )
                     session.add(item)
                 _put(item, found, folder.path / name)
 

@@ -98,11 +98,16 @@ def pack(
         "profile_version": profile_version(drive.profile),
         "manual": drive.profile.manual,
         "identity": {
-            "vendor_id": found.vendor_id, "product_code": found.product_code,
-            "revision": found.revision, "serial": found.serial, "firmware": found.firmware,
-        } if found else None,
+            "vendor_id": found.vendor_id,
+            "product_code": found.product_code,
+            "revision": found.revision,
+            "serial": found.serial,
+            "firmware": found.firmware,
+        }
+        if found
+        else None,
         "result": result,
-    }  # fmt: skip
+    }
     return _zipped(head, arrays)
 
 

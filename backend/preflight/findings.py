@@ -134,9 +134,12 @@ def _processor(facts: HostFacts) -> Iterator[Finding]:
     deepest = max(facts.idle_states, key=lambda one: one.latency_us, default=None)
     if deepest is not None and deepest.latency_us > _QUICK_IDLE_US:
         yield _delay(
-            Code.DEEP_IDLE, deepest.latency_us, Fix.IDLE,
-            state=deepest.name, latency_us=deepest.latency_us,
-        )  # fmt: skip
+            Code.DEEP_IDLE,
+            deepest.latency_us,
+            Fix.IDLE,
+            state=deepest.name,
+            latency_us=deepest.latency_us,
+        )
     slow = sorted({one for one in facts.governors.values() if one and one != "performance"})
     if slow:
         yield _delay(Code.GOVERNOR, _CLOCK_CHANGE_US, Fix.GOVERNOR, governor=", ".join(slow))
@@ -151,16 +154,23 @@ def _card(facts: HostFacts, port: Port) -> Iterator[Finding]:
     grouped = [name for name in ("gro", "lro") if port.card.get(name)]
     if grouped:
         yield _delay(
-            Code.GROUPED_FRAMES, _GROUPING_US, Fix.GROUPED_FRAMES,
-            interface=port.name, which=", ".join(grouped),
-        )  # fmt: skip
+            Code.GROUPED_FRAMES,
+            _GROUPING_US,
+            Fix.GROUPED_FRAMES,
+            interface=port.name,
+            which=", ".join(grouped),
+        )
     for number, cores in port.interrupts.items():
         loads = [facts.busy[core] for core in cores if core < len(facts.busy)]
         if len(loads) == 1 and loads[0] > _BUSY_SHARE and min(facts.busy) < _BUSY_SHARE:
             yield _delay(
-                Code.IRQ_ON_BUSY_CORE, _SECTION_US, Fix.INTERRUPTS,
-                interface=port.name, irq=number, core=cores[0],
-            )  # fmt: skip
+                Code.IRQ_ON_BUSY_CORE,
+                _SECTION_US,
+                Fix.INTERRUPTS,
+                interface=port.name,
+                irq=number,
+                core=cores[0],
+            )
             return
     if facts.interrupts_balanced and any(len(cores) > 1 for cores in port.interrupts.values()):
         yield _delay(Code.IRQ_BALANCED, _MOVED_INTERRUPT_US, Fix.INTERRUPTS, interface=port.name)

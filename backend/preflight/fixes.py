@@ -124,10 +124,15 @@ class Fixes:
     def _keep(self, changes: list[Change]) -> None:
         """On the disk, or an error before anything is changed."""
         listed = [
-            {"fix": one.fix, "place": one.setting.place, "card": one.setting.card,
-             "before": one.before, "after": one.after}
+            {
+                "fix": one.fix,
+                "place": one.setting.place,
+                "card": one.setting.card,
+                "before": one.before,
+                "after": one.after,
+            }
             for one in changes
-        ]  # fmt: skip
+        ]
         self.folder.mkdir(parents=True, exist_ok=True)
         fresh = self.folder / f".{RESTORE_LIST}.new"
         with fresh.open("w", encoding="utf-8") as file:

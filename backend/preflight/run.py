@@ -85,10 +85,15 @@ async def _measured(period_us: int, seconds: float, interface: str) -> Measured:
     process = None
     try:
         process = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", "drivers.computer.lateness", str(period_us), f"{seconds:g}",
+            sys.executable,
+            "-m",
+            "drivers.computer.lateness",
+            str(period_us),
+            f"{seconds:g}",
             *([interface] if interface else []),
-            stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
-        )  # fmt: skip
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+        )
         answer, complaint = await process.communicate()
     finally:
         if process is not None and process.returncode is None:

@@ -98,7 +98,10 @@ def _verdict(purpose: Purpose, blocked: Code | None, measured: Mapping[int, Meas
         return Verdict(purpose, Grade.NOT_MEASURED, allowed=suitable)
     bound = missed_bound(run.missed, run.cycles)
     grade = (
-        Grade.SUITABLE if bound <= suitable else Grade.LIMITED if bound <= limited
+        Grade.SUITABLE
+        if bound <= suitable
+        else Grade.LIMITED
+        if bound <= limited
         else Grade.UNSUITABLE
-    )  # fmt: skip
+    )
     return Verdict(purpose, grade, None, bound, suitable, run.round_trip is not None)

@@ -35,9 +35,13 @@ async def build_apart(evidence: Evidence, target: Path) -> None:
         await asyncio.to_thread(build, evidence, target)
         return
     process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "backend.recording.bundle", str(target),
-        stdin=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
-    )  # fmt: skip
+        sys.executable,
+        "-m",
+        "backend.recording.bundle",
+        str(target),
+        stdin=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+    )
     try:
         _, words = await process.communicate(await asyncio.to_thread(pickle.dumps, evidence))
     finally:

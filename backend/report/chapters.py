@@ -41,8 +41,9 @@ def chapter(measured: Measured, words: Words) -> list[Block]:
 
 
 def _origin(measured: Measured, words: Words) -> list[Block]:
-    text = words("measured", time=moment(measured.saved), file=measured.file,
-                 program=measured.program or "?")  # fmt: skip
+    text = words(
+        "measured", time=moment(measured.saved), file=measured.file, program=measured.program or "?"
+    )
     if measured.earlier is not None:
         earlier = measured.earlier
         text += " " + words("compared", time=moment(earlier.saved), file=earlier.file)
@@ -115,8 +116,9 @@ def _bode(view: SweepAnswer, other: SweepAnswer | None, words: Words) -> Figure:
         Curve(of.label, of.color, of.view.frequency_hz, of.view.coherence, dashed=of.dashed)
         for of in looks
     ]
-    caption = words("bode.caption", low=fixed(low, 0), high=fixed(high, 0),
-                    rate=fixed(view.sample_rate_hz, 0))  # fmt: skip
+    caption = words(
+        "bode.caption", low=fixed(low, 0), high=fixed(high, 0), rate=fixed(view.sample_rate_hz, 0)
+    )
     return Figure(
         (
             plot(words("magnitude"), unit, magnitude, 190.0),
@@ -182,11 +184,12 @@ def _step(measured: Measured, view: StepAnswer, words: Words) -> list[Block]:
     figure = Figure(
         (
             Plot(name, words("time"), view.unit, tuple(motion), ends),
-            Plot(words("torque"), words("time"), words("of_rated"), tuple(torque), ends,
-                 height=110.0),
+            Plot(
+                words("torque"), words("time"), words("of_rated"), tuple(torque), ends, height=110.0
+            ),
         ),
         words("step.caption"),
-    )  # fmt: skip
+    )
     present = _numbers(view, words)
     past = _numbers(other, words) if other else {}
     # Either step may have a row that the other one has not, such as a widened window.

@@ -35,12 +35,16 @@ def compose(facts: Facts, language: Language) -> Document:
     """The whole report."""
     words = Words(language)
     blocks: list[Block] = [
-        Heading(words("identity")), _identity(facts, words),
-        Heading(words("verdict")), *_verdicts(facts, words),
-        Heading(words("warnings")), *_warnings(facts, words),
-        Heading(words("settings")), *_settings(facts, words),
+        Heading(words("identity")),
+        _identity(facts, words),
+        Heading(words("verdict")),
+        *_verdicts(facts, words),
+        Heading(words("warnings")),
+        *_warnings(facts, words),
+        Heading(words("settings")),
+        *_settings(facts, words),
         Heading(words("measurements")),
-    ]  # fmt: skip
+    ]
     if not facts.measured:
         blocks.append(Note(words("measurements.none")))
     for measured in facts.measured:

@@ -117,11 +117,15 @@ def _measured(store: MeasurementStore, file: str) -> Measured:
     made = evaluate(loaded)
     settings = loaded.meta.get("settings")
     return Measured(
-        file, kind_of(loaded.head), loaded.head.saved, str(loaded.meta.get("program", "")),
-        made.differences, settings if isinstance(settings, dict) else {},
+        file,
+        kind_of(loaded.head),
+        loaded.head.saved,
+        str(loaded.meta.get("program", "")),
+        made.differences,
+        settings if isinstance(settings, dict) else {},
         result_of(loaded.meta.get("tool"), made.result),
         verdict=verdict_of(loaded.meta.get("verdict")),
-    )  # fmt: skip
+    )
 
 
 # --- the drive -------------------------------------------------------------------------
@@ -191,10 +195,14 @@ async def _changes(
                 trouble.append(error.text)
         rows.append(
             ChangedSetting(
-                each.key, parameter.name, shown(parameter, each.before),
-                shown(parameter, each.after), each.time, now,
+                each.key,
+                parameter.name,
+                shown(parameter, each.before),
+                shown(parameter, each.after),
+                each.time,
+                now,
             )
-        )  # fmt: skip
+        )
     return tuple(rows), trouble
 
 

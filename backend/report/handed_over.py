@@ -15,10 +15,13 @@ def handed_over(made: Sequence[HandedOverFile], words: Words) -> list[Block]:
     blocks: list[Block] = [Note(words("handover.lead"))]
     for each in made:
         rows = (
-            ("handover.format", each.format), ("handover.file", each.file),
-            ("handover.hash", each.sha256), ("handover.set", each.set_file),
-            ("person", each.person), ("handover.when", f"{moment(each.time)} ({words('utc')})"),
-        )  # fmt: skip
+            ("handover.format", each.format),
+            ("handover.file", each.file),
+            ("handover.hash", each.sha256),
+            ("handover.set", each.set_file),
+            ("person", each.person),
+            ("handover.when", f"{moment(each.time)} ({words('utc')})"),
+        )
         blocks += [
             Heading(each.file, 3),
             Table((), tuple((words(name), text or words("unknown")) for name, text in rows)),

@@ -16,12 +16,16 @@ def bands(verdict: VerdictInfo, words: Words) -> list[Block]:
         if band is not None
     )
     head = (
-        words("verdict.band"), words("phase_margin"), words("gain_margin"), words("verdict.peak"),
-    )  # fmt: skip
+        words("verdict.band"),
+        words("phase_margin"),
+        words("gain_margin"),
+        words("verdict.peak"),
+    )
     covered = words(
-        f"verdict.coverage.{verdict.coverage}", last=hertz(verdict.last_crossover_hz),
+        f"verdict.coverage.{verdict.coverage}",
+        last=hertz(verdict.last_crossover_hz),
         gain=fixed(verdict.shown_gain_db, 1, "dB"),
-    )  # fmt: skip
+    )
     tone: Tone = "warn" if verdict.coverage == "predicted" else "plain"
     return [Table(head, rows, (False, True, True, True)), Note(covered, tone)]
 
@@ -29,9 +33,10 @@ def bands(verdict: VerdictInfo, words: Words) -> list[Block]:
 def _row(name: str, band: BandInfo) -> tuple[str, ...]:
     return (
         f"{name}, {hertz(band.low_hz)} – {hertz(band.high_hz)}",
-        _interval(band.phase_margin_deg, 0, "°"), _interval(band.gain_margin_db, 1, "dB"),
+        _interval(band.phase_margin_deg, 0, "°"),
+        _interval(band.gain_margin_db, 1, "dB"),
         _interval(band.peak_sensitivity, 2),
-    )  # fmt: skip
+    )
 
 
 def _interval(of: IntervalInfo | None, decimals: int, unit: str = "") -> str:

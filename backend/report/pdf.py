@@ -51,8 +51,11 @@ _PLAIN, _BOLD, _WIDE = "DejaVuSans", "DejaVuSans-Bold", "DroidSansFallbackFull"
 _FONTS = FilePath(__file__).parent / "fonts"
 _MARGIN, _FOOT = 18 * mm, 16 * mm
 _INNER = A4[0] - 2 * _MARGIN
-_TONES = {"good": ("#1d7a45", "#e9f6ee"), "warn": ("#b36b00", "#fdf3e1"),
-          "fault": ("#c1121f", "#fdeaec")}  # fmt: skip
+_TONES = {
+    "good": ("#1d7a45", "#e9f6ee"),
+    "warn": ("#b36b00", "#fdf3e1"),
+    "fault": ("#c1121f", "#fdeaec"),
+}
 
 
 @cache
@@ -81,11 +84,15 @@ def _markup(text: str) -> str:
 
 def _style(size: float = 9.0, *, right: bool = False, **more: Any) -> ParagraphStyle:
     settings: dict[str, Any] = {
-        "fontName": _PLAIN, "fontSize": size, "leading": size * 1.4,
-        "textColor": HexColor("#1b242d"), "alignment": TA_RIGHT if right else TA_LEFT,
+        "fontName": _PLAIN,
+        "fontSize": size,
+        "leading": size * 1.4,
+        "textColor": HexColor("#1b242d"),
+        "alignment": TA_RIGHT if right else TA_LEFT,
         # Breaks long words and Chinese, which has no spaces, wherever the line ends.
-        "wordWrap": "CJK", "splitLongWords": 1,
-    }  # fmt: skip
+        "wordWrap": "CJK",
+        "splitLongWords": 1,
+    }
     return ParagraphStyle("text", **(settings | more))
 
 
@@ -103,9 +110,13 @@ def render_pdf(document: Document) -> bytes:
         _write(canvas, A4[0] - _MARGIN, _FOOT, page, "end", 7.0)
 
     template = BaseDocTemplate(
-        out, pagesize=A4, title=document.title, subject=document.subtitle, creator="servodeck",
+        out,
+        pagesize=A4,
+        title=document.title,
+        subject=document.subtitle,
+        creator="servodeck",
         lang="zh-CN" if document.language == "zh" else "en",
-    )  # fmt: skip
+    )
     template.addPageTemplates([PageTemplate("page", [frame], onPage=foot)])
     words = Words(document.language)
     story: list[Flowable] = [
@@ -138,9 +149,14 @@ def _note(note: Note, words: Words) -> Paragraph:
         return Paragraph(_markup(note.text), _style(spaceAfter=2))
     edge, ground = _TONES[note.tone]
     style = _style(
-        spaceBefore=3, spaceAfter=5, leftIndent=6, backColor=HexColor(ground), borderPadding=3,
-        borderColor=HexColor(edge), borderWidth=0.8,
-    )  # fmt: skip
+        spaceBefore=3,
+        spaceAfter=5,
+        leftIndent=6,
+        backColor=HexColor(ground),
+        borderPadding=3,
+        borderColor=HexColor(edge),
+        borderWidth=0.8,
+    )
     tone = f'<font name="{_BOLD}">{_markup(words(f"tone.{note.tone}") + ":")}</font>'
     return Paragraph(f"{tone} {_markup(note.text)}", style)
 

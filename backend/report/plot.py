@@ -183,8 +183,11 @@ class _Frame:
         yield Label((self.right, self.bottom + 31), self.plot.x_label, "end")
         at = self.left + 110
         for curve in self.plot.curves:
-            yield Path(((at, self.bottom + 27), (at + 18, self.bottom + 27)), curve.color,
-                       dashed=curve.dashed)  # fmt: skip
+            yield Path(
+                ((at, self.bottom + 27), (at + 18, self.bottom + 27)),
+                curve.color,
+                dashed=curve.dashed,
+            )
             yield Label((at + 23, self.bottom + 31), curve.label, "start", _INK)
             at += 40 + 6.2 * sum(2 if ord(c) > 0x2E80 else 1 for c in curve.label)
 

@@ -67,10 +67,13 @@ def tool_blocks(result: ToolResult, words: Words) -> list[Block]:
     if section.rows:
         head = (words("quantity"), words("value"), words("interval"))
         rows = tuple(
-            (tool.text(row.name, words.language, row.values), significant(row.value, row.unit, 3),
-             _interval(row.ci95))
+            (
+                tool.text(row.name, words.language, row.values),
+                significant(row.value, row.unit, 3),
+                _interval(row.ci95),
+            )
             for row in section.rows
-        )  # fmt: skip
+        )
         blocks.append(Table(head, rows, (False, True, True)))
     blocks += [grid_table(tool, each, words) for each in section.grids]
     for chart in section.charts:

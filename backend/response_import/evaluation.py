@@ -77,10 +77,14 @@ def evaluate_file(data: bytes, name: str, settings: ImportSettings) -> dict[str,
 def prepared(table: Table, name: str, settings: ImportSettings) -> Signals:
     """Input and output of a table, checked, in the units of the file."""
     return signals_of(
-        table, name, time=settings.time, signal_in=settings.signal_in,
-        signal_out=settings.signal_out, time_unit=settings.time_unit,
+        table,
+        name,
+        time=settings.time,
+        signal_in=settings.signal_in,
+        signal_out=settings.signal_out,
+        time_unit=settings.time_unit,
         sample_rate_hz=settings.sample_rate_hz,
-    )  # fmt: skip
+    )
 
 
 def evaluate_signals(signals: Signals, name: str, settings: ImportSettings) -> dict[str, object]:
@@ -90,15 +94,20 @@ def evaluate_signals(signals: Signals, name: str, settings: ImportSettings) -> d
         BadRecording: the recording supports no answer.
     """
     scale = scale_of(
-        settings.input_unit, settings.output_unit, settings.rated_torque_nm,
-        settings.torque_constant_nm_a, settings.unit,
-    )  # fmt: skip
+        settings.input_unit,
+        settings.output_unit,
+        settings.rated_torque_nm,
+        settings.torque_constant_nm_a,
+        settings.unit,
+    )
     _check(settings, scale)
     try:
         found = evaluate(
-            scale.factor_in * signals.signal_in, scale.factor_out * signals.signal_out,
-            signals.sample_rate_hz, settings.band_hz,
-        )  # fmt: skip
+            scale.factor_in * signals.signal_in,
+            scale.factor_out * signals.signal_out,
+            signals.sample_rate_hz,
+            settings.band_hz,
+        )
     except NoResponse as error:
         raise _reported(error, name, signals) from error
     return _as_json(found, signals, settings, scale)
@@ -239,11 +248,13 @@ def _axis(
     unit = _input_kind(scale)
     answer: dict[str, object] = {
         "verdict": "sound",
-        "inertia": rigid.inertia, "inertia_ci95": list(rigid.inertia_ci95),
+        "inertia": rigid.inertia,
+        "inertia_ci95": list(rigid.inertia_ci95),
         "inertia_unit": "kg·m²" if scale.torque else f"{unit}·s²/rad",
-        "viscous": rigid.viscous, "viscous_unit": f"{unit}·s/rad",
+        "viscous": rigid.viscous,
+        "viscous_unit": f"{unit}·s/rad",
         "candidates": [],
-    }  # fmt: skip
+    }
     answer["candidates"] = _candidates(found, signals, settings, rigid)
     return answer
 
@@ -264,9 +275,10 @@ def _candidates(
     delay = path_delay_s(found.fit.model, settings.output_filter_hz)
     frf = as_frf(found, settings.output_filter_hz, delay, signals.sample_rate_hz)
     loops = DriveLoops(
-        settings.current_bandwidth_hz, settings.loop_delay_s,
+        settings.current_bandwidth_hz,
+        settings.loop_delay_s,
         highest_speed_bandwidth_hz=0.25 * found.valid_band_hz[1],
-    )  # fmt: skip
+    )
     table = design(measured_plant(frf, model), rigid.inertia, loops, _load(found), slots=2)
     return [asdict(row) for row in table if row.marks]
 

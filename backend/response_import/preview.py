@@ -21,17 +21,23 @@ def preview(data: bytes, name: str) -> dict[str, object]:
     for i, values in enumerate(table.columns[:_SHOWN_COLUMNS]):
         good = values[np.isfinite(values)]
         step = max(good.size // _CURVE, 1)
-        columns.append({
-            "number": i + 1, "name": table.names[i],
-            "first": [float(v) if np.isfinite(v) else None for v in values[:_FIRST_VALUES]],
-            "low": float(np.min(good)) if good.size else 0.0,
-            "high": float(np.max(good)) if good.size else 0.0,
-            "missing": int(values.size - good.size),
-            "rises": bool(good.size > 1 and np.all(np.diff(good) > 0)),
-            "unit": unit_in(table.names[i]),
-            "curve": good[::step][:_CURVE].tolist(),
-        })  # fmt: skip
+        columns.append(
+            {
+                "number": i + 1,
+                "name": table.names[i],
+                "first": [float(v) if np.isfinite(v) else None for v in values[:_FIRST_VALUES]],
+                "low": float(np.min(good)) if good.size else 0.0,
+                "high": float(np.max(good)) if good.size else 0.0,
+                "missing": int(values.size - good.size),
+                "rises": bool(good.size > 1 and np.all(np.diff(good) > 0)),
+                "unit": unit_in(table.names[i]),
+                "curve": good[::step][:_CURVE].tolist(),
+            }
+        )
     return {
-        "form": table.form, "rows": table.rows, "first_line": table.first_line,
-        "columns": columns, "facts": [list(pair) for pair in table.facts],
-    }  # fmt: skip
+        "form": table.form,
+        "rows": table.rows,
+        "first_line": table.first_line,
+        "columns": columns,
+        "facts": [list(pair) for pair in table.facts],
+    }

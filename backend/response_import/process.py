@@ -56,10 +56,13 @@ async def import_in_process(task: ImportTask, limit_s: float = LIMIT_S) -> dict[
         BadRecording: what is wrong with the file, or it takes too long.
     """
     process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "backend.response_import.process",
-        stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
+        sys.executable,
+        "-m",
+        "backend.response_import.process",
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,
-    )  # fmt: skip
+    )
     try:
         async with asyncio.timeout(limit_s):
             out, said = await process.communicate(pickle.dumps(task))
@@ -107,17 +110,25 @@ def main() -> None:
     try:
         answer = {"ok": task.run()}
     except BadRecording as error:
-        answer = {"error": {
-            "text": error.text.to_wire(), "parameter": error.parameter, "value": error.value,
-            "limit": None if error.limit_text is None else error.limit_text.to_wire(),
-            "remedy": None if error.own_remedy is None else error.own_remedy.to_wire(),
-        }}  # fmt: skip
+        answer = {
+            "error": {
+                "text": error.text.to_wire(),
+                "parameter": error.parameter,
+                "value": error.value,
+                "limit": None if error.limit_text is None else error.limit_text.to_wire(),
+                "remedy": None if error.own_remedy is None else error.own_remedy.to_wire(),
+            }
+        }
     except MemoryError:
         most_gib = _MEMORY_BYTES >> 30
-        answer = {"error": {
-            "text": text("import.too-much-memory", name=task.name, most_gib=most_gib).to_wire(),
-            "value": task.name, "limit": prose(f"{most_gib} GiB").to_wire(), "remedy": None,
-        }}  # fmt: skip
+        answer = {
+            "error": {
+                "text": text("import.too-much-memory", name=task.name, most_gib=most_gib).to_wire(),
+                "value": task.name,
+                "limit": prose(f"{most_gib} GiB").to_wire(),
+                "remedy": None,
+            }
+        }
     json.dump(answer, sys.stdout, default=float)
 
 

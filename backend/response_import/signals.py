@@ -98,8 +98,9 @@ def signals_of(
         BadRecording: what is wrong, with column, row and value.
     """
     first, second = (
-        column_of(table, signal_in, "input", name), column_of(table, signal_out, "output", name),
-    )  # fmt: skip
+        column_of(table, signal_in, "input", name),
+        column_of(table, signal_out, "output", name),
+    )
     if first == second:
         raise BadRecording(
             "import.input-output-same-column",

@@ -18,16 +18,23 @@ TOOL = "response-import"
 
 
 def pack_import(
-    name: str, signals: Signals, settings: ImportSettings, result: Mapping[str, object],
+    name: str,
+    signals: Signals,
+    settings: ImportSettings,
+    result: Mapping[str, object],
     saved: datetime,
-) -> bytes:  # fmt: skip
+) -> bytes:
     """A measurement file with both signals as they stood in the file."""
     meta = {
-        "tool": TOOL, "file": name, "settings": asdict(settings),
-        "sample_rate_hz": signals.sample_rate_hz, "input_name": signals.input_name,
-        "output_name": signals.output_name, "time_unit": signals.time_unit,
+        "tool": TOOL,
+        "file": name,
+        "settings": asdict(settings),
+        "sample_rate_hz": signals.sample_rate_hz,
+        "input_name": signals.input_name,
+        "output_name": signals.output_name,
+        "time_unit": signals.time_unit,
         "repeated_rows": signals.repeated_rows,
-    }  # fmt: skip
+    }
     arrays = {"input": signals.signal_in, "output": signals.signal_out}
     return pack_other(KIND, name, arrays, meta, saved, result)
 
@@ -49,10 +56,14 @@ def reevaluate(
     band = plain.get("band_hz")
     plain["band_hz"] = (float(band[0]), float(band[1])) if isinstance(band, list) else None
     signals = Signals(
-        np.asarray(arrays["input"], np.float64), np.asarray(arrays["output"], np.float64),
-        float(str(meta["sample_rate_hz"])), str(meta["input_name"]), str(meta["output_name"]),
-        str(meta["time_unit"]), int(str(meta.get("repeated_rows", 0))),
-    )  # fmt: skip
+        np.asarray(arrays["input"], np.float64),
+        np.asarray(arrays["output"], np.float64),
+        float(str(meta["sample_rate_hz"])),
+        str(meta["input_name"]),
+        str(meta["output_name"]),
+        str(meta["time_unit"]),
+        int(str(meta.get("repeated_rows", 0))),
+    )
     if signals.signal_in.shape != signals.signal_out.shape or signals.signal_in.ndim != 1:
         raise ValueError("input and output differ in length")
     return evaluate_signals(signals, str(meta.get("file", "")), ImportSettings(**plain))

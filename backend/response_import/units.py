@@ -37,9 +37,12 @@ class Scale:
 
 
 def scale_of(
-    input_unit: str, output_unit: str, rated_torque_nm: float | None,
-    torque_constant_nm_a: float | None, unit: str | None,
-) -> Scale:  # fmt: skip
+    input_unit: str,
+    output_unit: str,
+    rated_torque_nm: float | None,
+    torque_constant_nm_a: float | None,
+    unit: str | None,
+) -> Scale:
     """What both signals are multiplied by.
 
     A current becomes a torque by its constant, a share of the rated torque by that; ``unit``

@@ -41,9 +41,11 @@ def keep_list(
         except StorageFailed as error:
             if durable:
                 raise StorageFailed(
-                    "restore.not-kept", drive=drive.name, cause=error.text,
+                    "restore.not-kept",
+                    drive=drive.name,
+                    cause=error.text,
                     remedy=text("restore.free-the-disk"),
-                ) from error  # fmt: skip
+                ) from error
             if well:
                 failed(error)
             well = False

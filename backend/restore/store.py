@@ -99,9 +99,13 @@ class RestoreList:
     _taken_over: list[Path] = field(default_factory=list)
 
     def write(
-        self, values: Sequence[PendingRestore], *, in_motion: bool,
-        identity: DriveIdentity | None = None, durable: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        values: Sequence[PendingRestore],
+        *,
+        in_motion: bool,
+        identity: DriveIdentity | None = None,
+        durable: bool = False,
+    ) -> None:
         """Note what is changed temporarily or pending now instead of what was; nothing takes the
         file away.
 
@@ -117,10 +121,15 @@ class RestoreList:
                 for v in values
             )
             note = _List(
-                vendor_id=drive.vendor_id, product_code=drive.product_code, serial=drive.serial,
-                places=drive.places, process=this_process(), by=self.by, in_motion=in_motion,
+                vendor_id=drive.vendor_id,
+                product_code=drive.product_code,
+                serial=drive.serial,
+                places=drive.places,
+                process=this_process(),
+                by=self.by,
+                in_motion=in_motion,
                 values=kept,
-            )  # fmt: skip
+            )
             write_atomically(self._file, note.model_dump_json(indent=1).encode(), durable=False)
             if durable:
                 _flush(self._file)
@@ -166,10 +175,13 @@ class RestoreStore:
             # The older list knows what it was before both.
             values = {v.key: _entry(v, known=bool(here)) for v in note.values} | values
             known = Pending(
-                tuple(values.values()), noted, note.by,
+                tuple(values.values()),
+                noted,
+                note.by,
                 known.moved or (note.in_motion and abs(time.time() - noted) < A_MOMENT_S),
-                known.held_by, known.serial or note.serial,
-            )  # fmt: skip
+                known.held_by,
+                known.serial or note.serial,
+            )
         known = self._of_earlier_version(drive, drive_id, known, taken)
         known = replace(known, unreadable=self._set_aside(drive))
         return RestoreList(
@@ -221,9 +233,13 @@ class RestoreStore:
         values = {v.key: v for v in known.values} | {v.key: _entry(v) for v in note.debts}
         moved = note.in_motion and abs(time.time() - noted) < A_MOMENT_S
         return Pending(
-            tuple(values.values()), known.since or noted, known.by, known.moved or moved,
-            known.held_by, known.serial or note.serial,
-        )  # fmt: skip
+            tuple(values.values()),
+            known.since or noted,
+            known.by,
+            known.moved or moved,
+            known.held_by,
+            known.serial or note.serial,
+        )
 
 
 def _sound(file: Path) -> bool:

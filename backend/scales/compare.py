@@ -25,9 +25,12 @@ _MOST_STEPS = 3.0
 
 
 def disagreement_of(
-    position: FloatArray, velocity: FloatArray, cycle_s: float, scale: FeedbackScale,
+    position: FloatArray,
+    velocity: FloatArray,
+    cycle_s: float,
+    scale: FeedbackScale,
     valid: npt.NDArray[np.bool_] | None = None,
-) -> Halted | None:  # fmt: skip
+) -> Halted | None:
     """What a recording of raw 6064h and 606Ch [n] contradicts itself by; None where it agrees.
 
     Only means over samples that are all ``valid`` [n] count: across a gap both are guessed.

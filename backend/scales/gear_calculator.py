@@ -270,8 +270,11 @@ def _check_bounds(profile: Profile, ratio: Fraction) -> Text | None:
     if not gear.strict:
         return text(
             "scales.gear-ratio-unusual",
-            value=float(ratio), limit=limit, fault=gear.fault, notes=gear.notes,
-        )  # fmt: skip
+            value=float(ratio),
+            limit=limit,
+            fault=gear.fault,
+            notes=gear.notes,
+        )
     raise OutOfRange(
         "scales.gear-ratio-outside",
         value=float(ratio),

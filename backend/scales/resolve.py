@@ -271,9 +271,13 @@ def by_text(
         # A time to a speed: `AxisUnits` converts it, as it is no factor.
         known = spec.ramp_reference_rpm is not None
         return Scale(
-            quantity, 1.0 if known else None, text, origin, spec.source,
+            quantity,
+            1.0 if known else None,
+            text,
+            origin,
+            spec.source,
             None if known else Uncertainty.NOT_STATED,
-        )  # fmt: skip
+        )
     found = _MULTIPLE.fullmatch(text)
     if found is None:
         return _uncertain(quantity, Uncertainty.UNREADABLE, text, spec.source)

@@ -48,9 +48,13 @@ class AxisUnits:
         per_rev, spec = self.counts_per_rev, self.spec
         origin = origin_of(spec, Quantity.POSITION)
         position = Scale(
-            Quantity.POSITION, per_rev, spec.position, origin, spec.source,
+            Quantity.POSITION,
+            per_rev,
+            spec.position,
+            origin,
+            spec.source,
             Uncertainty.NO_RESOLUTION if per_rev is None else None,
-        )  # fmt: skip
+        )
         velocity, acceleration = (
             by_text(quantity, text, per_rev, Origin.MANUAL, spec)
             for quantity, text in (
@@ -88,9 +92,12 @@ class AxisUnits:
             scale = self.scales.position
             if scale.certain:
                 scale = Scale(
-                    Quantity.POSITION, None, scale.raw_unit, Origin.UNKNOWN,
+                    Quantity.POSITION,
+                    None,
+                    scale.raw_unit,
+                    Origin.UNKNOWN,
                     uncertainty=Uncertainty.NO_RESOLUTION,
-                )  # fmt: skip
+                )
             raise ScaleUnknown(self.drive, scale)
         return self.counts_per_rev
 

@@ -36,9 +36,12 @@ def halt_words(halt: Halted, units: AxisUnits | None) -> Text:
     }.get(halt.cause, (units.position, units.names["position"]))
     value, limit = apart(convert(halt.value), convert(halt.limit))
     return text(
-        "motion.beyond-limit-in", quantity=quantity_key(halt.quantity), value=value, limit=limit,
+        "motion.beyond-limit-in",
+        quantity=quantity_key(halt.quantity),
+        value=value,
+        limit=limit,
         unit=unit,
-    )  # fmt: skip
+    )
 
 
 def halt_remedy(halt: Halted, otherwise: Text) -> Text:

@@ -57,10 +57,15 @@ class Subscription:
         """A block of the cyclic exchange."""
         self.put(block.samples, block.t0_s, block.dt_s, None, block.dropped, block.valid)
 
-    def put(self, samples: np.ndarray[tuple[int, int], np.dtype[np.float64]], t0_s: float,
-            dt_s: float, times_s: np.ndarray[tuple[int], np.dtype[np.float64]] | None,
-            lost: int = 0,
-            valid: np.ndarray[tuple[int], np.dtype[np.bool_]] | None = None) -> None:  # fmt: skip
+    def put(
+        self,
+        samples: np.ndarray[tuple[int, int], np.dtype[np.float64]],
+        t0_s: float,
+        dt_s: float,
+        times_s: np.ndarray[tuple[int], np.dtype[np.float64]] | None,
+        lost: int = 0,
+        valid: np.ndarray[tuple[int], np.dtype[np.bool_]] | None = None,
+    ) -> None:
         """Queue a block, or count it as dropped."""
         self.dropped += lost
         if self.sink is None and len(self.queue) >= QUEUE_BLOCKS:

@@ -8,11 +8,16 @@ from profiles.schema import Parameter
 
 #: Roles whose numbers are of the kind although their parameter may print another unit.
 _ROLES = {
-    "position": ("position_actual", "position_demand", "position_target", "position_offset",
-                 "following_error"),
+    "position": (
+        "position_actual",
+        "position_demand",
+        "position_target",
+        "position_offset",
+        "following_error",
+    ),
     "velocity": ("velocity_actual", "velocity_demand", "velocity_target", "velocity_offset"),
     "torque": ("torque_actual", "torque_demand", "torque_target", "torque_offset"),
-}  # fmt: skip
+}
 
 
 def axis_scale(units: AxisUnits, drive: Drive, parameter: Parameter) -> tuple[str, float | None]:

@@ -112,9 +112,12 @@ class Written:
     def answer(self) -> dict[str, object]:
         """As a row of the job's result."""
         row: dict[str, object] = {
-            "key": self.key, "before": self.before, "wanted": self.wanted, "after": self.after,
+            "key": self.key,
+            "before": self.before,
+            "wanted": self.wanted,
+            "after": self.after,
             "ok": self.ok,
-        }  # fmt: skip
+        }
         return row | sentence("problem", self.problem)
 
 
@@ -157,9 +160,13 @@ async def load_set(
         except LinkLost as error:
             # Half a set is in force now: which half, and how to undo it.
             error.text = text(
-                "set.written-in-part", cause=error.text, written=number, rows=len(chosen), key=key,
+                "set.written-in-part",
+                cause=error.text,
+                written=number,
+                rows=len(chosen),
+                key=key,
                 backup=backup,
-            )  # fmt: skip
+            )
             raise
     return {
         "written": sum(row.ok for row in report),

@@ -71,9 +71,11 @@ class ToolSettings(BaseModel):
         default=None, gt=0, description="overrides what the drive says"
     )
     cycle_ms: float = Field(
-        default=1.0, gt=0, le=10,
+        default=1.0,
+        gt=0,
+        le=10,
         description="cycle of the exchange that is started where none runs, and ended afterwards",
-    )  # fmt: skip
+    )
     consent: bool = Field(
         default=False,
         description="the user agreed that nothing in the drive ends a speed when this computer "
@@ -245,9 +247,11 @@ class Tool(Generic[S, R]):
     pair: bool = False
 
     def text(
-        self, name: str, language: Literal["en", "zh"] = "en",
+        self,
+        name: str,
+        language: Literal["en", "zh"] = "en",
         values: Mapping[str, str] | None = None,
-    ) -> str:  # fmt: skip
+    ) -> str:
         """A text of this tool with its places filled in."""
         if name == "title":
             return self.title.words(language)

@@ -134,8 +134,11 @@ class JobRunner:
         running = [job for job in self._jobs.values() if _runs(job) and not job.motion]
         same = sum(job.kind == kind and job.drive == drive for job in running)
         if same >= self.MOST_OF_A_KIND or len(running) >= self.MOST:
-            what, limit = ("such jobs", self.MOST_OF_A_KIND) if same >= self.MOST_OF_A_KIND else (
-                "jobs", self.MOST)  # fmt: skip
+            what, limit = (
+                ("such jobs", self.MOST_OF_A_KIND)
+                if same >= self.MOST_OF_A_KIND
+                else ("jobs", self.MOST)
+            )
             raise Busy("work.run-already", drive=drive, limit=str(limit), bound=limit, what=what)
 
     def start(

@@ -181,10 +181,14 @@ class Judge:
         if any(c.ends is None or now < c.ends + c.brake_s + late for c in claims):
             return
         last = max((c for c in claims), key=lambda c: c.ends or 0.0, default=None)
-        why = "nobody ever asked for it" if last is None or last.ends is None else (
-            f"the last reason ({last.what} of {last.person}) ended {now - last.ends:.2f} s ago, "
-            f"and it had {last.brake_s:.2f} s to stand"
-        )  # fmt: skip
+        why = (
+            "nobody ever asked for it"
+            if last is None or last.ends is None
+            else (
+                f"the last reason ({last.what} of {last.person}) ended "
+                f"{now - last.ends:.2f} s ago, and it had {last.brake_s:.2f} s to stand"
+            )
+        )
         key = f"moves {axis}"
         if self.violated(f"axis {self.station.specs[axis].name} moves: {why}", key):
             for each in list(self._history[axis])[-150::6]:

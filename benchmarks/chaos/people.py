@@ -80,15 +80,19 @@ class Person:
         self.http.headers["X-Servodeck-CSRF"] = session["csrf"] or "-"
         cookie = "; ".join(f"{k}={v}" for k, v in self.http.cookies.items())
         self.socket = await connect(
-            f"{self.station.root.replace('http', 'ws')}/api/v1/live", max_size=None,
-            additional_headers={"Cookie": cookie}, close_timeout=0.2, ping_interval=None,
-        )  # fmt: skip
+            f"{self.station.root.replace('http', 'ws')}/api/v1/live",
+            max_size=None,
+            additional_headers={"Cookie": cookie},
+            close_timeout=0.2,
+            ping_interval=None,
+        )
         hello = json.loads(await self.socket.recv())
         self.connection = hello["connection"]
         self.http.headers["X-Servodeck-Connection"] = self.connection
         self._tasks = [
-            asyncio.create_task(self._hear(self.socket)), asyncio.create_task(self._live()),
-        ]  # fmt: skip
+            asyncio.create_task(self._hear(self.socket)),
+            asyncio.create_task(self._live()),
+        ]
         listed = await self.http.get("/drives")
         known = {row["name"]: row["id"] for row in listed.json()}
         specs = self.station.specs
@@ -149,8 +153,9 @@ class Person:
     def _heard(self, message: dict[str, Any]) -> None:
         problem = message.get("problem") or (message.get("job") or {}).get("problem")
         if problem and problem["status"] == 500 and problem["type"] == "urn:servodeck:internal":
-            self.judge.violated(f"{message['type']}: internal error: {problem['detail']}",
-                                problem["detail"][:60])  # fmt: skip
+            self.judge.violated(
+                f"{message['type']}: internal error: {problem['detail']}", problem["detail"][:60]
+            )
         if message["type"] == "stop_result":
             self._stop_answered(message["result"], self._stop_sent)
         if message["type"] == "job" and message["job"]["state"] != "running":
@@ -210,8 +215,13 @@ class Person:
             return  # a guest who was not let in
         drive, travel = self.drives[axis], self.random.choice([0.5, 3.0, 8.0])
         claim = self.judge.claim(axis, "jog", self.name, JOG_BRAKE_S, travel)
-        await self.send(type="jog_start", drive=drive, direction=self.random.choice([-1, 1]),
-                        travel_limit=travel, **JOG)  # fmt: skip
+        await self.send(
+            type="jog_start",
+            drive=drive,
+            direction=self.random.choice([-1, 1]),
+            travel_limit=travel,
+            **JOG,
+        )
         end = time.monotonic() + self.random.uniform(0.2, 2.0)
         how = self.random.choice(["release", "release", "forget", "late", "stop", "cut"])
         while time.monotonic() < end and self.socket is not None:
@@ -250,11 +260,16 @@ class Person:
         await self._job(axis, "move", body, 3.0)
 
     async def enable(self, axis: int) -> None:
-        goal = self.random.choice(["Operation enabled", "Operation enabled", "Switched on",
-                                   "Switch on disabled"])  # fmt: skip
+        goal = self.random.choice(
+            ["Operation enabled", "Operation enabled", "Switched on", "Switch on disabled"]
+        )
         claim = self.judge.claim(axis, "transition", self.name, JOB_BRAKE_S)
-        await self.ask("POST", f"/drives/{self.drives[axis]}/transition", "transition",
-                       json={"goal": goal, "mode": self.random.choice([1, 1, 3, 8])})  # fmt: skip
+        await self.ask(
+            "POST",
+            f"/drives/{self.drives[axis]}/transition",
+            "transition",
+            json={"goal": goal, "mode": self.random.choice([1, 1, 3, 8])},
+        )
         claim.end(time.monotonic())
 
     async def home(self, axis: int) -> None:
@@ -279,8 +294,9 @@ class Person:
         raw = self.random.randint(spec.low, spec.high)
         if self.random.random() < 0.3:
             raw = self.random.choice([-(2**40), 10**9, 2**70])
-        answer = await self.ask("PUT", f"/drives/{drive}/parameters/{spec.setting}", "write",
-                                json={"raw": raw})  # fmt: skip
+        answer = await self.ask(
+            "PUT", f"/drives/{drive}/parameters/{spec.setting}", "write", json={"raw": raw}
+        )
         if answer is not None and answer.is_success:
             # What was read back: somebody else's write may have come between.
             self.tally.wrote(spec.name, spec.setting, answer.json()["raw"])
@@ -335,8 +351,12 @@ class Person:
 
     async def save(self, axis: int) -> None:
         name = f"set {self.random.randint(1, 3)}"
-        await self.ask("POST", f"/drives/{self.drives[axis]}/sets", "save set",
-                       json={"file": name, "overwrite": True})  # fmt: skip
+        await self.ask(
+            "POST",
+            f"/drives/{self.drives[axis]}/sets",
+            "save set",
+            json={"file": name, "overwrite": True},
+        )
         if self.random.random() < 0.3:
             await self.ask("POST", f"/drives/{self.drives[axis]}/procedures/save", "procedure save",
                            json={"confirmed": True})  # fmt: skip

@@ -358,13 +358,15 @@ class Trial:
             (f["files"], len(f["tasks"]), len(f["threads"]), round(f["mib"])) for f in self.figures
         ]
         note = "" if p99 < P99_S else "  (aim 50 ms: see whether the machine had time)"
-        return "\n".join([
-            f"{self.bus} seed {self.seed}: {len(found)} violations; answers p99 "
-            f"{p99 * 1e3:.0f} ms, worst {times.max() * 1e3:.0f} ms{note}",
-            f"  files, tasks, threads, MiB: {ends[:2]} … {ends[-1:]}",
-            f"  {what}",
-            *(f"  - {text}" for text in found),
-        ])  # fmt: skip
+        return "\n".join(
+            [
+                f"{self.bus} seed {self.seed}: {len(found)} violations; answers p99 "
+                f"{p99 * 1e3:.0f} ms, worst {times.max() * 1e3:.0f} ms{note}",
+                f"  files, tasks, threads, MiB: {ends[:2]} … {ends[-1:]}",
+                f"  {what}",
+                *(f"  - {text}" for text in found),
+            ]
+        )
 
 
 def main() -> int:

@@ -144,8 +144,12 @@ class TrialStation:
     def connecting(self, axis: int) -> dict[str, object]:
         """The request that makes it a drive of the bench."""
         spec = self.specs[axis]
-        return {"url": self.url_of(axis), "station": self.place_of(axis),
-                "profile": spec.family, "name": spec.name}  # fmt: skip
+        return {
+            "url": self.url_of(axis),
+            "station": self.place_of(axis),
+            "profile": spec.family,
+            "name": spec.name,
+        }
 
     @property
     def root(self) -> str:

@@ -22,9 +22,14 @@ class Troubles:
     """Makes trouble for some seconds and undoes it."""
 
     def __init__(
-        self, station: TrialStation, judge: Judge, source: random.Random, say: Any, tally: Tally,
+        self,
+        station: TrialStation,
+        judge: Judge,
+        source: random.Random,
+        say: Any,
+        tally: Tally,
         aimed: AimedTroubles,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._tally, self._aimed = tally, aimed
         self.station, self.judge, self.random, self._say = station, judge, source, say
         self.server_was_killed = False
@@ -113,9 +118,12 @@ class Troubles:
         """Process data of all drives are exchanged, and the supply of one of them fails."""
         for person in self._aimed.people:
             if person.socket is not None and person.drives:
-                await person.ask("POST", "/buses/cyclic", "cyclic",
-                                 json={"url": self.station.urls[0],
-                                       "cycle_us": 2000})  # fmt: skip
+                await person.ask(
+                    "POST",
+                    "/buses/cyclic",
+                    "cyclic",
+                    json={"url": self.station.urls[0], "cycle_us": 2000},
+                )
                 break
         await self.power_cycle(seconds)
 
@@ -127,9 +135,12 @@ class Troubles:
         await self._send("inject", what="overload", **where)
 
     async def lose(self, seconds: float) -> None:
-        await self._send("lose", chance=self.random.choice([0.01, 0.1, 0.6, 1.0]),
-                         cyclic=self.random.random() < 0.5,
-                         direction=self.random.choice(["in", "out"]))  # fmt: skip
+        await self._send(
+            "lose",
+            chance=self.random.choice([0.01, 0.1, 0.6, 1.0]),
+            cyclic=self.random.random() < 0.5,
+            direction=self.random.choice(["in", "out"]),
+        )
         await asyncio.sleep(seconds)
         await self._send("peace")
 

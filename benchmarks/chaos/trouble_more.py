@@ -25,9 +25,13 @@ class AimedTroubles:
     def kinds(self) -> list[Callable[[float], Awaitable[None]]]:
         """All of them."""
         every: list[Callable[[float], Awaitable[None]]] = [
-            self.control_lost_and_regained, self.control_ends_in_a_job, self.cancel_by_a_cut,
-            self.load_while_faulted, self.disk_full_in_a_job, self.mute_one,
-        ]  # fmt: skip
+            self.control_lost_and_regained,
+            self.control_ends_in_a_job,
+            self.cancel_by_a_cut,
+            self.load_while_faulted,
+            self.disk_full_in_a_job,
+            self.mute_one,
+        ]
         return every
 
     def _someone(self) -> Person | None:

@@ -107,10 +107,14 @@ class Examiner:
             facts["same_product"] = self._same_product(others, facts)
             return
         numbers_read = {
-            "device_type": (0x1000, 0), "vendor": (0x1018, 1), "product": (0x1018, 2),
-            "revision": (0x1018, 3), "sync_cob": (0x1005, 0), "status_word": (0x6041, 0),
+            "device_type": (0x1000, 0),
+            "vendor": (0x1018, 1),
+            "product": (0x1018, 2),
+            "revision": (0x1018, 3),
+            "sync_cob": (0x1005, 0),
+            "status_word": (0x6041, 0),
             "drive_error": (0x603F, 0),
-        }  # fmt: skip
+        }
         for name, address in numbers_read.items():
             facts[name] = self._number(node, *address)
         facts["error_register"] = register = self._number(node, 0x1001, 0)
@@ -217,9 +221,12 @@ class Examiner:
     def _counts(self) -> _Counts:
         port = self._port
         return _Counts(
-            port.received, port.acknowledge_errors, port.protocol_errors, port.error_passive,
+            port.received,
+            port.acknowledge_errors,
+            port.protocol_errors,
+            port.error_passive,
             port.lost_frames,
-        )  # fmt: skip
+        )
 
     def _bus(self, before: _Counts) -> BusFacts:
         now, now_s = self._counts(), time.monotonic()

@@ -17,8 +17,12 @@ TPDO = (0x180, 0x280, 0x380, 0x480)
 RPDO = (0x200, 0x300, 0x400, 0x500)
 
 NMT_START, NMT_STOP, NMT_PREOPERATIONAL, NMT_RESET_NODE, NMT_RESET_COMMUNICATION = (
-    0x01, 0x02, 0x80, 0x81, 0x82,
-)  # fmt: skip
+    0x01,
+    0x02,
+    0x80,
+    0x81,
+    0x82,
+)
 
 NMT_STATES = {0: "boot-up", 4: "stopped", 5: "operational", 127: "pre-operational"}
 

@@ -121,9 +121,14 @@ def measure(period_us: int, seconds: float, interface: str = "") -> Measured:
     granted = realtime.claim()
     wire = Wire(interface) if interface else None
     measured = Measured(
-        period_us, 0, 0, granted.fifo_priority > 0, granted.memory_locked,
-        Histogram.empty(), Histogram.empty() if wire else None,
-    )  # fmt: skip
+        period_us,
+        0,
+        0,
+        granted.fifo_priority > 0,
+        granted.memory_locked,
+        Histogram.empty(),
+        Histogram.empty() if wire else None,
+    )
     period, in_a_row = period_us / 1e6, 0
     due = time.monotonic() + 0.05
     for _ in range(round(seconds / period)):

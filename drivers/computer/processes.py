@@ -46,8 +46,11 @@ def _mark_from_ps(pid: int) -> str:
     fixed = {**os.environ, "LC_ALL": "C", "TZ": "UTC"}
     listed = subprocess.run(
         ["/bin/ps", "-o", "lstart=", "-p", str(pid)],
-        capture_output=True, text=True, env=fixed, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        env=fixed,
+        check=False,
+    )
     started = " ".join(listed.stdout.split())
     return f"{pid} {started}" if started else ""
 

@@ -19,8 +19,11 @@ from drivers.doctor.diagnosis import Fact
 from drivers.errors import Busy, LinkTimeout, NotAllowed, NotAsked, ProtocolError, Rejected
 
 RULES: tuple[Rule, ...] = (
-    *state_rules.RULES, *sdo_rules.RULES, *object_rules.RULES, *drive_rules.RULES,
-)  # fmt: skip
+    *state_rules.RULES,
+    *sdo_rules.RULES,
+    *object_rules.RULES,
+    *drive_rules.RULES,
+)
 _POWERED = frozenset({0x27, 0x07, 0x0F})
 """Bits 6Fh of a status word with power: enabled, quick stop, fault reaction (CiA 402-2 8.4.2)."""
 

@@ -28,9 +28,13 @@ _STATES: tuple[tuple[int, int], ...] = (
 )  # fmt: skip
 """Mask and value of the eight states (CiA 402-2 clause 8.4.2)."""
 _OF_A_MODE: dict[int, tuple[int, ...]] = {
-    1: (0x607A,), 3: (0x60FF, 0x606C), 6: (0x6098,), 8: (0x607A, 0x6064), 9: (0x60FF, 0x606C),
+    1: (0x607A,),
+    3: (0x60FF, 0x606C),
+    6: (0x6098,),
+    8: (0x607A, 0x6064),
+    9: (0x60FF, 0x606C),
     10: (0x6071, 0x6077),
-}  # fmt: skip
+}
 """Setpoint and actual value that the tables of the modes call mandatory."""
 
 

@@ -184,5 +184,10 @@ def _identity(e: CanEvidence) -> Iterator[Sign]:
 
 
 _RULES: tuple[Callable[[CanEvidence], Iterator[Sign]], ...] = (
-    _numbers, _refusals, _error_control, _emergencies, _process_data, _identity,
-)  # fmt: skip
+    _numbers,
+    _refusals,
+    _error_control,
+    _emergencies,
+    _process_data,
+    _identity,
+)

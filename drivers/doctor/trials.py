@@ -69,9 +69,11 @@ def _own_assignment(_cause: Cause, profile: Profile) -> Iterator[Trial]:
     if coe.pdo_assign is not False:
         kept = coe.model_copy(update={"pdo_assign": False})
         yield Trial(
-            "bring_up.coe.pdo_assign", _said(coe.pdo_assign), "false",
+            "bring_up.coe.pdo_assign",
+            _said(coe.pdo_assign),
+            "false",
             _with_rules(profile, coe=kept),
-        )  # fmt: skip
+        )
 
 
 def _own_contents(_cause: Cause, profile: Profile) -> Iterator[Trial]:
@@ -81,9 +83,7 @@ def _own_contents(_cause: Cause, profile: Profile) -> Iterator[Trial]:
         return
     sets = tuple(_fixed(each) for each in pdo.sets)
     kept = pdo.model_copy(update={"remappable": False, "sets": sets})
-    yield Trial(
-        "pdo.remappable", "true", "false", profile.model_copy(update={"pdo": kept})
-    )  # fmt: skip
+    yield Trial("pdo.remappable", "true", "false", profile.model_copy(update={"pdo": kept}))
 
 
 def _fixed(each: PdoSet) -> PdoSet:
@@ -100,9 +100,11 @@ def _without_command(cause: Cause, profile: Profile) -> Iterator[Trial]:
     )
     if len(left) < len(rules.init_commands):
         yield Trial(
-            "bring_up.init_commands", ", ".join(sorted(refused)), "-",
+            "bring_up.init_commands",
+            ", ".join(sorted(refused)),
+            "-",
             _with_rules(profile, init_commands=left),
-        )  # fmt: skip
+        )
 
 
 def _other_clock(_cause: Cause, profile: Profile) -> Iterator[Trial]:
@@ -120,9 +122,11 @@ def _other_clock(_cause: Cause, profile: Profile) -> Iterator[Trial]:
     ]
     for mode in others:
         yield Trial(
-            "bring_up.clock_modes", f"{before:04X}h", f"{mode.assign_activate:04X}h",
+            "bring_up.clock_modes",
+            f"{before:04X}h",
+            f"{mode.assign_activate:04X}h",
             _with_rules(profile, clock_modes=(mode,)),
-        )  # fmt: skip
+        )
 
 
 def _usual_watchdog(_cause: Cause, profile: Profile) -> Iterator[Trial]:
@@ -131,9 +135,11 @@ def _usual_watchdog(_cause: Cause, profile: Profile) -> Iterator[Trial]:
         return
     usual = watchdog.model_copy(update={"process_data": None, "divider": None})
     yield Trial(
-        "bring_up.watchdog", f"{watchdog.process_data_ns or 0} ns", "-",
+        "bring_up.watchdog",
+        f"{watchdog.process_data_ns or 0} ns",
+        "-",
         _with_rules(profile, watchdog=usual),
-    )  # fmt: skip
+    )
 
 
 def _longer_cycle(_cause: Cause, profile: Profile) -> Iterator[Trial]:
@@ -147,9 +153,11 @@ def _clock_then_cycle(cause: Cause, profile: Profile) -> Iterator[Trial]:
     if mode is not None and mode.sync0.cycle_ns:
         free = mode.model_copy(update={"sync0": mode.sync0.model_copy(update={"cycle_ns": 0})})
         yield Trial(
-            "bring_up.clock_modes.sync0.cycle_ns", f"{mode.sync0.cycle_ns}", "0",
+            "bring_up.clock_modes.sync0.cycle_ns",
+            f"{mode.sync0.cycle_ns}",
+            "0",
             _with_rules(profile, clock_modes=(free,)),
-        )  # fmt: skip
+        )
     yield from _longer_cycle(cause, profile)
 
 

@@ -194,9 +194,12 @@ def _with_defects(bench: BenchSpec, path: Path) -> BenchSpec:
 
 def _no_place(path: Path, name: str, defect: Defect, lacks: str) -> NotAllowed:
     return NotAllowed(
-        "virtual.bench-file-defect-needs", value=defect, path=str(path), drive_name=name,
+        "virtual.bench-file-defect-needs",
+        value=defect,
+        path=str(path),
+        drive_name=name,
         lacks=lacks,
-    )  # fmt: skip
+    )
 
 
 def _wrong(path: Path, why: str) -> NotAllowed:

@@ -40,9 +40,7 @@ from profiles.importer.xml_tree import (
 )
 
 MAX_BYTES = 32 * 2**20
-_ROOTS = {
-    name.lower(): name for name in ("EtherCATInfo", "EtherCATInfoList", "EtherCATConfig")
-}  # fmt: skip
+_ROOTS = {name.lower(): name for name in ("EtherCATInfo", "EtherCATInfoList", "EtherCATConfig")}
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,9 +24,13 @@ from profiles.importer.xml_tree import attribute_of, child, children, flag_of, n
 
 _PROTOCOLS: tuple[Protocol, ...] = ("aoe", "eoe", "coe", "foe", "soe", "voe")
 _KINDS: dict[str, SyncManagerKind] = {
-    "mboxout": "mailbox_out", "mbxout": "mailbox_out", "mboxin": "mailbox_in",
-    "mbxin": "mailbox_in", "outputs": "outputs", "inputs": "inputs",
-}  # fmt: skip
+    "mboxout": "mailbox_out",
+    "mbxout": "mailbox_out",
+    "mboxin": "mailbox_in",
+    "mbxin": "mailbox_in",
+    "outputs": "outputs",
+    "inputs": "inputs",
+}
 _BY_NUMBER: tuple[SyncManagerKind, ...] = ("mailbox_out", "mailbox_in", "outputs", "inputs")
 _TRANSITION = re.compile(r"[IPSOB]{2}")
 _MOST_COMMANDS, _MOST_MODES, _MOST_MANAGERS, _MOST_BYTES = 1000, 64, 16, 4096

@@ -17,8 +17,11 @@ from profiles.importer.xml_tree import attribute_of, child, children, flag_of, t
 
 SyncKind = Literal["mailbox_out", "mailbox_in", "outputs", "inputs"]
 _KINDS: dict[str, SyncKind] = {
-    "mboxout": "mailbox_out", "mboxin": "mailbox_in", "outputs": "outputs", "inputs": "inputs",
-}  # fmt: skip
+    "mboxout": "mailbox_out",
+    "mboxin": "mailbox_in",
+    "outputs": "outputs",
+    "inputs": "inputs",
+}
 _MEMORY, _MEMORY_END = 0x1000, 0x10000
 #: What the smallest mailbox of CoE holds (ETG.1000.6), and the largest length of a sync manager.
 _SHORTEST_MAILBOX, _LONGEST = 16, 0x7FFF

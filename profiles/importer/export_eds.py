@@ -139,10 +139,15 @@ def _mandatory(index: int, profile: Profile) -> list[str]:
 
     def entry(section: str, name: str, code: int, default: int | None) -> list[str]:
         return [
-            f"[{section}]", f"ParameterName={name}", f"ObjectType=0x{_VARIABLE:X}",
-            f"DataType=0x{code:04X}", "AccessType=ro",
-            f"DefaultValue={'' if default is None else f'0x{default:X}'}", "PDOMapping=0", "",
-        ]  # fmt: skip
+            f"[{section}]",
+            f"ParameterName={name}",
+            f"ObjectType=0x{_VARIABLE:X}",
+            f"DataType=0x{code:04X}",
+            "AccessType=ro",
+            f"DefaultValue={'' if default is None else f'0x{default:X}'}",
+            "PDOMapping=0",
+            "",
+        ]
 
     if index == 0x1000:
         return entry("1000", "Device type", _CODE["UINT32"], None)
@@ -156,9 +161,13 @@ def _mandatory(index: int, profile: Profile) -> list[str]:
         ("Serial number", None),
     )
     lines = [
-        "[1018]", "ParameterName=Identity object", f"ObjectType=0x{_RECORD:X}", "SubNumber=5", "",
+        "[1018]",
+        "ParameterName=Identity object",
+        f"ObjectType=0x{_RECORD:X}",
+        "SubNumber=5",
+        "",
         *entry("1018sub0", "Highest subindex", _CODE["UINT8"], 4),
-    ]  # fmt: skip
+    ]
     for number, (name, value) in enumerate(parts, 1):
         lines += entry(f"1018sub{number}", name, _CODE["UINT32"], value)
     return lines

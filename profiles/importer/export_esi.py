@@ -24,8 +24,11 @@ _BITS: dict[DataType, int] = {
 _TEXT_BYTES = 32
 """Where nobody says how long a text is."""
 _MANAGER_NAMES = {
-    "mailbox_out": "MBoxOut", "mailbox_in": "MBoxIn", "outputs": "Outputs", "inputs": "Inputs",
-}  # fmt: skip
+    "mailbox_out": "MBoxOut",
+    "mailbox_in": "MBoxIn",
+    "outputs": "Outputs",
+    "inputs": "Inputs",
+}
 _PROTOCOLS = {"aoe": "AoE", "eoe": "EoE", "foe": "FoE", "soe": "SoE", "voe": "VoE"}
 
 
@@ -96,10 +99,11 @@ def _optional(parent: Element, rows: Iterable[tuple[str, int | None]]) -> None:
 def _timeouts(device: Element, rules: BringUp) -> None:
     limits = rules.timeouts
     states = (
-        ("PreopTimeout", limits.preop_ms), ("SafeopOpTimeout", limits.safeop_op_ms),
+        ("PreopTimeout", limits.preop_ms),
+        ("SafeopOpTimeout", limits.safeop_op_ms),
         ("BackToInitTimeout", limits.back_to_init_ms),
         ("BackToSafeopTimeout", limits.back_to_safeop_ms),
-    )  # fmt: skip
+    )
     mailbox = (
         ("RequestTimeout", limits.mailbox_request_ms),
         ("ResponseTimeout", limits.mailbox_response_ms),
@@ -183,9 +187,12 @@ def _named(name: str) -> Element:
 def _member(record: Element, subindex: int, name: str, kind: str, bits: int, at: int) -> Element:
     item = SubElement(record, "SubItem")
     for tag, text in (
-        ("SubIdx", str(subindex)), ("Name", name), ("Type", kind), ("BitSize", str(bits)),
+        ("SubIdx", str(subindex)),
+        ("Name", name),
+        ("Type", kind),
+        ("BitSize", str(bits)),
         ("BitOffs", str(at)),
-    ):  # fmt: skip
+    ):
         _text(item, tag, text)
     return item
 
@@ -203,9 +210,10 @@ def _info(info: Element, parameter: Parameter) -> None:
     if isinstance(default, str):
         _text(info, "DefaultString", default)
     for tag, value in (
-        ("MinData", parameter.min_raw), ("MaxData", parameter.max_raw),
+        ("MinData", parameter.min_raw),
+        ("MaxData", parameter.max_raw),
         ("DefaultData", None if isinstance(default, str) else default),
-    ):  # fmt: skip
+    ):
         data = _data(value, parameter.type)
         if data is not None:
             _text(info, tag, data)
@@ -242,12 +250,13 @@ def _managers(device: Element, rules: BringUp) -> None:
         element = _text(device, "Sm", _MANAGER_NAMES[each.kind])
         _set(
             element,
-            MinSize=_number(each.min_size), MaxSize=_number(each.max_size),
+            MinSize=_number(each.min_size),
+            MaxSize=_number(each.max_size),
             DefaultSize=_number(each.default_size),
             StartAddress=None if each.start is None else _hex(each.start),
             ControlByte=None if each.control is None else _hex(each.control, 2),
             Enable=_number(each.enable),
-        )  # fmt: skip
+        )
 
 
 def _number(value: int | None) -> str | None:
@@ -279,9 +288,12 @@ def _pdo(device: Element, each: PdoSet, profile: Profile) -> None:
             _text(item, "BitLen", str(part.bits))
             continue
         for tag, text in (
-            ("Index", _hex(parameter.index)), ("SubIndex", str(parameter.subindex or 0)),
-            ("BitLen", str(part.bits)), ("Name", parameter.name), ("DataType", _type(parameter)),
-        ):  # fmt: skip
+            ("Index", _hex(parameter.index)),
+            ("SubIndex", str(parameter.subindex or 0)),
+            ("BitLen", str(part.bits)),
+            ("Name", parameter.name),
+            ("DataType", _type(parameter)),
+        ):
             _text(item, tag, text)
 
 
@@ -299,10 +311,12 @@ def _mailbox(device: Element, rules: BringUp, profile: Profile) -> None:
         complete = True
     _set(
         coe,
-        SdoInfo=_flag(rules.coe.sdo_info), PdoAssign=_flag(rules.coe.pdo_assign),
-        PdoConfig=_flag(rules.coe.pdo_config), PdoUpload=_flag(rules.coe.pdo_upload),
+        SdoInfo=_flag(rules.coe.sdo_info),
+        PdoAssign=_flag(rules.coe.pdo_assign),
+        PdoConfig=_flag(rules.coe.pdo_config),
+        PdoUpload=_flag(rules.coe.pdo_upload),
         CompleteAccess=_flag(complete),
-    )  # fmt: skip
+    )
     for command in rules.init_commands:
         _command(coe, command)
 
@@ -315,9 +329,11 @@ def _command(coe: Element, command: InitCommand) -> None:
         CompleteAccess="1" if command.complete_access else None,
     )
     for tag, text in (
-        ("Transition", command.transition), ("Index", _hex(command.index)),
-        ("SubIndex", str(command.subindex)), ("Data", command.data),
-    ):  # fmt: skip
+        ("Transition", command.transition),
+        ("Index", _hex(command.index)),
+        ("SubIndex", str(command.subindex)),
+        ("Data", command.data),
+    ):
         _text(element, tag, text)
     if command.comment:
         _text(element, "Comment", command.comment)
@@ -346,9 +362,10 @@ def _signal(element: Element, number: str, signal: SyncSignal) -> None:
 
 def _registers(device: Element, rules: BringUp) -> None:
     held = (
-        ("Reg0400", rules.watchdog.divider), ("Reg0410", rules.watchdog.pdi),
+        ("Reg0400", rules.watchdog.divider),
+        ("Reg0410", rules.watchdog.pdi),
         ("Reg0420", rules.watchdog.process_data),
-    )  # fmt: skip
+    )
     if any(value is not None for _, value in held):
         _optional(SubElement(device, "ESC"), held)
     if rules.eeprom_bytes is not None or rules.eeprom_config:

@@ -47,8 +47,12 @@ _NAMED: dict[str, DataType] = {
 }  # fmt: skip
 
 _SMALLEST: tuple[tuple[int, DataType], ...] = (
-    (1, "BOOL"), (8, "UINT8"), (16, "UINT16"), (32, "UINT32"), (64, "UINT64"),
-)  # fmt: skip
+    (1, "BOOL"),
+    (8, "UINT8"),
+    (16, "UINT16"),
+    (32, "UINT32"),
+    (64, "UINT64"),
+)
 
 _ACCESS: dict[str, Access] = {
     "ro": "ro", "r": "ro", "read": "ro", "readonly": "ro", "const": "ro", "c": "ro",

@@ -345,8 +345,11 @@ def test_command_line_jogs_and_records(
     head, *rows = file.read_text().splitlines()
     assert head.startswith("time [s],")
     assert [title.split()[:2] for title in head.replace('"', "").split(",")[1:]] == [
-        ["A", "6064:00"], ["A", "606C:00"], ["B", "6064:00"], ["B", "606C:00"],
-    ]  # fmt: skip
+        ["A", "6064:00"],
+        ["A", "606C:00"],
+        ["B", "6064:00"],
+        ["B", "606C:00"],
+    ]
     times = np.array([float(row.split(",")[0]) for row in rows])
     assert len(times) > 100
     assert np.median(np.diff(times)) == pytest.approx(0.001)

@@ -362,13 +362,21 @@ def test_damaged_frames_name_their_cable_until_cleared(running: Segment) -> None
     assert "cable between station 1 and station 2: damaged frames arrived" in sentence
     with running.station.live() as other:
         other.send(type="lease", drive=running.b, take=True)
-        until(lambda: running.station.ok(
-            running.station.http.get(f"/drives/{running.b}"))["lease"]["holder"])  # fmt: skip
+        until(
+            lambda: running.station.ok(running.station.http.get(f"/drives/{running.b}"))["lease"][
+                "holder"
+            ]
+        )
         refused = running.station.http.post("/ethercat/counters/clear", json={"url": URL})
         assert refused.status_code == 409
         assert "has control" in refused.json()["detail"]
-    until(lambda: running.station.http.post(
-        "/ethercat/counters/clear", json={"url": URL}).status_code == 204, HANG_S)  # fmt: skip
+    until(
+        lambda: (
+            running.station.http.post("/ethercat/counters/clear", json={"url": URL}).status_code
+            == 204
+        ),
+        HANG_S,
+    )
     ports = [port for station in running.view()["stations"] for port in station["ports"]]
     counters = ("rx_errors", "lost_links", "invalid_frames", "forwarded_errors")
     assert [port[name] for port in ports for name in counters] == [0] * 32

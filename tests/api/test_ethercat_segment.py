@@ -64,8 +64,9 @@ def test_stations_in_the_order_of_the_cable(station: Station) -> None:
     assert seen["permissions"] is None, "a private network needs none"
     first, second = seen["stations"]
     assert [(s["station"], s["drive"], s["state"]) for s in (first, second)] == [
-        (1, "a", "PREOP"), (2, "b", "PREOP"),
-    ]  # fmt: skip
+        (1, "a", "PREOP"),
+        (2, "b", "PREOP"),
+    ]
     assert (first["behind_station"], second["behind_station"], second["behind_port"]) == (0, 1, 1)
     assert [port["communicating"] for port in first["ports"]] == [True, True, False, False]
     assert [port["communicating"] for port in second["ports"]] == [True, False, False, False]
@@ -222,9 +223,10 @@ def test_firmware_is_loaded_to_the_end_even_if_cancelled(station: Station) -> No
     data = bytes(n % 253 for n in range(20_000))
     station.drives.segments[URL].command("timing", slave=0, sdo_s=0.01)
     job = station.ok(load(station, "a", data, confirmed=True))
-    seen = until(lambda: (
-        now := station.ok(station.http.get(f"/jobs/{job['id']}")))["progress"] > 0 and now, 60
-    )  # fmt: skip
+    seen = until(
+        lambda: (now := station.ok(station.http.get(f"/jobs/{job['id']}")))["progress"] > 0 and now,
+        60,
+    )
     assert "bytes: do not switch off" in seen["step"]
     second = load(station, "a", data, confirmed=True)
     assert second.status_code == 409, "the axis is held meanwhile"

@@ -198,9 +198,13 @@ def read_all(day: Day) -> None:
 def home(day: Day) -> None:
     """A method that needs no switch; the position is zero afterwards."""
     body = {
-        "method": day.maker.homing, "speed_switch": 60.0, "speed_zero": 30.0,
-        "acceleration": 3000.0, "travel_limit": 3.0, "torque_limit": 200.0,
-    }  # fmt: skip
+        "method": day.maker.homing,
+        "speed_switch": 60.0,
+        "speed_zero": 30.0,
+        "acceleration": 3000.0,
+        "travel_limit": 3.0,
+        "torque_limit": 200.0,
+    }
     day.moved("jobs/home", body)
     assert abs(float(day.state()["position"])) < 0.02
 

@@ -123,8 +123,11 @@ def test_gear_is_planned_written_and_taken_back(station: Station, x: str) -> Non
     before = {key: raw(station, x, key) for key in keys}
     plan = station.ok(station.http.post(f"/drives/{x}/gear/plan", json=SCREW))
     assert {value["key"]: value["raw"] for value in plan["values"]} == {
-        "6091:01": 1, "6091:02": 1, "6092:01": 10000, "6092:02": 1,
-    }  # fmt: skip
+        "6091:01": 1,
+        "6091:02": 1,
+        "6092:01": 10000,
+        "6092:02": 1,
+    }
     assert "607D:01" in plan["counted"]
     # 3000 rpm (6080h, 004) times 10 mm.
     assert plan["max_speed"] == pytest.approx(plan["max_speed_rpm"] / 60 * 10)

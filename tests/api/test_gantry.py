@@ -54,8 +54,11 @@ yaw_damping_nms_per_rad = 2e-3
 square_error_rad = {SQUARE_RAD}
 """
 LIMITS = {
-    "travel_limit": 3.0, "speed_limit": 600.0, "torque_limit": 60.0, "time_limit_s": 60.0,
-}  # fmt: skip
+    "travel_limit": 3.0,
+    "speed_limit": 600.0,
+    "torque_limit": 60.0,
+    "time_limit_s": 60.0,
+}
 LEAD_MM = 10.0
 ASKED = {**LIMITS, "partner": "Right", "lead_mm": LEAD_MM, "resolution_hz": 5.0}
 SKEW_LIMIT_REV = 0.05

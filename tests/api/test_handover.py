@@ -192,8 +192,11 @@ def check_segment(station: Station, x: str, y: str, held: str) -> None:
     made = station.ok(station.http.post("/handover", json=body))
     names = [each["name"] for each in made["files"]]
     assert names == [
-        "segment.xml", "segment.xml.hal", "segment.xml.1.scaling.txt", "segment.xml.2.scaling.txt",
-    ]  # fmt: skip
+        "segment.xml",
+        "segment.xml.hal",
+        "segment.xml.1.scaling.txt",
+        "segment.xml.2.scaling.txt",
+    ]
     listed = base64.b64decode(made["files"][0]["content"])
     for drive, slave in ((y, 1), (x, 2)):
         newest = station.ok(station.http.get(f"/drives/{drive}/handovers"))[0]

@@ -97,8 +97,12 @@ def test_killed_server_leaves_an_axis_that_stops_by_itself(
     server = ServerProcess(tmp_path / "state")
     x = add_drive(server, url)
     page = server.live()
-    limits = {"speed": SPEED_RPM, "acceleration": RAMP_RPM_S, "travel_limit": 30,
-              "torque_limit": 150}  # fmt: skip
+    limits = {
+        "speed": SPEED_RPM,
+        "acceleration": RAMP_RPM_S,
+        "travel_limit": 30,
+        "torque_limit": 150,
+    }
     with jogged(
         server.http, page, x, lambda now, _: abs(now["velocity"] - SPEED_RPM) < 30, **limits
     ):

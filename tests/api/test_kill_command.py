@@ -46,8 +46,11 @@ class Bench:
         environment = child_environment() | {"SERVODECK_CONFIG": str(self.state)}
         return subprocess.Popen(
             self.command([sys.executable, "-m", "backend", *arguments]),
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment,
-        )  # fmt: skip
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=environment,
+        )
 
     def run(self, *arguments: str) -> tuple[str, str]:
         process = self.start(*arguments)

@@ -120,8 +120,11 @@ async def test_three_way(http: httpx.AsyncClient, bench: Bench) -> None:
     answer = await http.get("/drives/x/three-way", params={"base": "base", "theirs": "theirs"})
     found = {r["key"]: r for r in answer.json()["rows"]}
     assert {key: found[key]["status"] for key in [GAIN, *keys]} == {
-        GAIN: "same", there: "theirs", here: "drive", clash: "conflict",
-    }  # fmt: skip
+        GAIN: "same",
+        there: "theirs",
+        here: "drive",
+        clash: "conflict",
+    }
     assert [key for key in [GAIN, *keys] if found[key]["selected"]] == [there]
     assert found[clash]["base_raw"] == low[clash] + 3
     assert found[clash]["theirs_raw"] == low[clash] + 5
@@ -153,8 +156,11 @@ async def test_another_drive_s_set_needs_consent(
 
 async def test_values_of_one_motor_stay_with_it(http: httpx.AsyncClient, bench: Bench) -> None:
     profile = bench.connected("x").drive.profile
-    own = next(p for p in profile.parameters if p.motor_individual and p.access == "rw"
-               and p.type not in ("STRING", "OCTETS"))  # fmt: skip
+    own = next(
+        p
+        for p in profile.parameters
+        if p.motor_individual and p.access == "rw" and p.type not in ("STRING", "OCTETS")
+    )
     low = own.raw_limits[0]
     value = int(low if low is not None else 0)
     more = f'[[parameter]]\nkey = "{own.key}"\nraw = {value}\n'
@@ -243,8 +249,12 @@ async def test_the_audit_tells_who_wrote_what(http: httpx.AsyncClient, bench: Be
     page = (await http.get("/audit", params={"kind": "write"})).json()
     event = page["events"][0]
     assert (event["axis"], event["target"], event["old"], event["new"], event["outcome"]) == (
-        "X", GAIN, before, 360, "",
-    )  # fmt: skip
+        "X",
+        GAIN,
+        before,
+        360,
+        "",
+    )
     assert event["person"] == "local user"
     await put(http, set_of(350))
     await load(http, [GAIN])

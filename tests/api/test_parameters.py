@@ -9,8 +9,9 @@ from tests.support.station import HANG_S, Station, until
 
 
 def test_scan_finds_both_drives(station: Station) -> None:
-    result = station.done(station.http.post("/scan", json={"url": "mlink://virtual0",
-                                                           "stations": [1, 2, 3]}))  # fmt: skip
+    result = station.done(
+        station.http.post("/scan", json={"url": "mlink://virtual0", "stations": [1, 2, 3]})
+    )
     found = {drive["station"]: drive for drive in result["found"]}
     assert set(found) == {1, 2}
     assert "mms7" in [match["profile"] for match in found[1]["matches"]]

@@ -20,8 +20,12 @@ def command(*arguments: str, inside: Namespace | None = None) -> subprocess.Comp
     argv = [sys.executable, "-m", "backend", "preflight", *arguments]
     return subprocess.run(
         inside.command(argv) if inside else argv,
-        cwd=ROOT, capture_output=True, text=True, check=False, timeout=100,
-    )  # fmt: skip
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=100,
+    )
 
 
 @pytest.mark.skipif(unavailable() is not None, reason="no network namespaces here")
@@ -35,8 +39,11 @@ def test_frames_on_a_private_cable(tmp_path: Path) -> None:
         assert set(runs) == {1000, 250}
         assert sum(runs[1000]["round_trip"]["counts"]) > 100
         assert [one["purpose"] for one in result["verdicts"]] == [
-            "parameters", "scope_1khz", "response_1khz", "response_4khz",
-        ]  # fmt: skip
+            "parameters",
+            "scope_1khz",
+            "response_1khz",
+            "response_4khz",
+        ]
         silent = json.loads(command("ec0m", *options, inside=namespace).stdout)
         assert silent["measured"][0]["round_trip"] is None
         assert silent["measured"][0]["unanswered"] > 0

@@ -101,8 +101,9 @@ def test_a_subscription_follows_the_exchange_as_it_starts_and_ends(
 ) -> None:
     with station.live() as page:
         assert [c["synchronous"] for c in begin(page, axis, (POSITION, VELOCITY))["channels"]] == [
-            False, False,
-        ]  # fmt: skip
+            False,
+            False,
+        ]
         until(lambda: page.receive() and len(heads(page.binary)) > 3, HANG_S, "polled samples")
         exchange(station, run=True)
         info = page.wait("scope_info", 20)

@@ -83,8 +83,11 @@ def test_stop_does_not_wait_for_a_scope_that_ends(station: Station, x: str) -> N
         page.wait("scope_info", subscription=1)
         wait_for_samples(page)
         for number in range(20):
-            page.send(type="scope_start", subscription=1 + number % 2,
-                      channels=[{"drive": x, "key": "6064:00"}])  # fmt: skip
+            page.send(
+                type="scope_start",
+                subscription=1 + number % 2,
+                channels=[{"drive": x, "key": "6064:00"}],
+            )
         with OwnTime(with_children=True) as took:
             page.send(type="stop")
             page.send(type="ping", n=1)

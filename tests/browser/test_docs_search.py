@@ -20,8 +20,11 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # mkdocs fails on links, anchors and pages outside of the navigation.
     done = subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "--strict", "-q", "-d", str(folder)],
-        cwd=ROOT, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return folder
 

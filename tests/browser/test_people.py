@@ -188,18 +188,23 @@ def write_markup_everywhere(station: Station, bench: Bench) -> None:
     """Into every free text of the interface, as somebody with all rights would."""
     quoted, ask = f"\"'>{MARKUP}", station.http
     drive = f"/drives/{bench.drive}"
-    setup = {"traces": [], "maths": [{"id": "m1", "name": MARKUP, "unit": "<b>",
-                                      "expression": "1"}]}  # fmt: skip
+    setup = {
+        "traces": [],
+        "maths": [{"id": "m1", "name": MARKUP, "unit": "<b>", "expression": "1"}],
+    }
     kept: dict[str, Any] = {}
     for method, path, body in (
         ("PATCH", drive, {"name": MARKUP, "notes": quoted}),
         ("POST", f"{drive}/sets", {"file": "marked", "author": MARKUP, "notes": quoted}),
-        ("POST", f"{drive}/reports", {"format": "html", "person": MARKUP, "machine": quoted,
-                                      "notes": quoted}),
+        (
+            "POST",
+            f"{drive}/reports",
+            {"format": "html", "person": MARKUP, "machine": quoted, "notes": quoted},
+        ),
         ("POST", "/accounts", {"name": MARKUP, "role": "viewer", "password": PASSWORD}),
         ("POST", "/bundles", {"reason": quoted}),
         ("PUT", "/scope/setups/marked", setup),
-    ):  # fmt: skip
+    ):
         kept[path] = station.ok(ask.request(method, path, json=body))
     entries = station.ok(ask.get("/library"))["entries"]
     entry = next(each["id"] for each in entries if each["kind"] == "set")

@@ -142,8 +142,12 @@ def test_a_notch_is_dragged_and_predicted_but_not_written(
     expect(notch).to_have_attribute("aria-valuenow", "250")
 
     # Four views of the loop that would follow, compared with the loop as it is.
-    for view, name in (("Open loop", "Open loop"), ("Sensitivity", "Sensitivity"),
-                       ("Step", "Step"), ("Closed loop", "Closed loop")):  # fmt: skip
+    for view, name in (
+        ("Open loop", "Open loop"),
+        ("Sensitivity", "Sensitivity"),
+        ("Step", "Step"),
+        ("Closed loop", "Closed loop"),
+    ):
         page.get_by_text(view, exact=True).last.click()
         expect(page.get_by_role("img", name=name, exact=True)).to_be_visible()
     expect(page.get_by_text("edited, not written")).to_be_visible()
@@ -154,8 +158,11 @@ def test_a_notch_is_dragged_and_predicted_but_not_written(
 def test_a_loop_is_shown_three_ways(laptop: Page, axis: str) -> None:
     page = laptop
     show(page, axis, "Speed loop")
-    for view, guide in (("Open loop", "0 dB: crossover"), ("Sensitivity", "6 dB: Ms = 2"),
-                        ("Closed loop", "−3 dB: bandwidth")):  # fmt: skip
+    for view, guide in (
+        ("Open loop", "0 dB: crossover"),
+        ("Sensitivity", "6 dB: Ms = 2"),
+        ("Closed loop", "−3 dB: bandwidth"),
+    ):
         page.get_by_text(view, exact=True).click()
         expect(page.get_by_text(guide)).to_be_visible()
     assert tuning.number_in(tuning.reading(page, "Bandwidth (−3 dB)"), "Hz") > 10

@@ -309,7 +309,7 @@ def test_a_text_that_is_no_expression_is_said_to_be_none(page: Page) -> None:
         ("fetch(c1)", "“fetch” is no function"),
         ("", "Write something"),
         ("c1; c2", "“;” at place 3"),
-    ):  # fmt: skip
+    ):
         page.get_by_label("Expression").fill(text)
         expect(page.get_by_text(words)).to_be_visible()
     expect(page.get_by_role("button", name="Channels (3)")).to_be_visible()
@@ -372,14 +372,18 @@ def two_fingers_zoom(page: Page) -> None:
     soon(lambda: length(stretch_in_sight(page)), pytest.approx(5, rel=0.02), "5 s in sight")
     begin, end = stretch_in_sight(page)
     middle = up(0.5)
-    fingers.move(((across(0.4), middle), (across(0.3), middle)),
-                 ((across(0.6), middle), (across(0.7), middle)))  # fmt: skip
+    fingers.move(
+        ((across(0.4), middle), (across(0.3), middle)),
+        ((across(0.6), middle), (across(0.7), middle)),
+    )
     half = pytest.approx((end - begin) / 2, rel=0.03)
     soon(lambda: length(stretch_in_sight(page)), half, "twice as near")
     nearer = stretch_in_sight(page)
     assert sum(nearer) / 2 == pytest.approx((begin + end) / 2, abs=0.05)
-    fingers.move(((across(0.2), middle), (across(0.4), middle)),
-                 ((across(0.6), middle), (across(0.8), middle)))  # fmt: skip
+    fingers.move(
+        ((across(0.2), middle), (across(0.4), middle)),
+        ((across(0.6), middle), (across(0.8), middle)),
+    )
     wide = length(nearer)
     earlier = pytest.approx(nearer[0] - 0.2 * wide, abs=0.03 * wide)
     soon(lambda: stretch_in_sight(page)[0], earlier, "moved by a fifth")
@@ -388,8 +392,10 @@ def two_fingers_zoom(page: Page) -> None:
     assert page.evaluate("visualViewport.scale") == 1, "the page itself is not zoomed"
     scales = page.locator(".scales summary")
     expect(scales).to_have_text("Y scales follow the traces")
-    fingers.move(((across(0.5), up(0.4)), (across(0.5), up(0.3))),
-                 ((across(0.5), up(0.6)), (across(0.5), up(0.7))))  # fmt: skip
+    fingers.move(
+        ((across(0.5), up(0.4)), (across(0.5), up(0.3))),
+        ((across(0.5), up(0.6)), (across(0.5), up(0.7))),
+    )
     expect(scales).not_to_contain_text("follow")  # none of the three
     assert stretch_in_sight(page) == pytest.approx(moved, abs=0.02 * wide), "time is as it was"
     page.get_by_role("button", name="Autoscale").click()
@@ -415,8 +421,10 @@ def one_finger_moves_cursors(page: Page) -> None:
     there = pytest.approx((a - third / 2, b + 0.7 * third), abs=third / 10)
     soon(lambda: cursor_times(page), there, "B is tapped")
     tapped = cursor_times(page)
-    fingers.move(((x + wide / 2, y + high / 2), (x + 0.45 * wide, y + high / 2)),
-                 ((x + 0.7 * wide, y + high / 2), (x + 0.75 * wide, y + high / 2)))  # fmt: skip
+    fingers.move(
+        ((x + wide / 2, y + high / 2), (x + 0.45 * wide, y + high / 2)),
+        ((x + 0.7 * wide, y + high / 2), (x + 0.75 * wide, y + high / 2)),
+    )
     page.evaluate(AT_REST)
     assert cursor_times(page) == tapped, "two fingers zoom"
     before = page.evaluate(SCROLLED)

@@ -17,8 +17,11 @@ def run(station: Station, *words: str, code: int = 0) -> str:
     done = subprocess.run(
         [sys.executable, "-W", "error", str(DOCS / "scripts" / words[0]), *words[1:]],
         env=os.environ | {"SERVODECK_SERVER": station.url, "PYTHONIOENCODING": "utf-8"},
-        capture_output=True, text=True, timeout=100, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
     assert done.returncode == code, done.stdout + done.stderr
     return done.stdout + done.stderr
 

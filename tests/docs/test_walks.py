@@ -17,10 +17,14 @@ from tests.support.station import Station
 
 #: In this order: the pages of a station begin where the ones before left it.
 PAGES = [
-    "first-drive/mms7-ethercat.md", "first-drive/mms7-rs485.md", "first-drive/ds-c-can-rs232.md",
-    "how-to/save-restore-clone.md", "how-to/jog-and-home.md", "how-to/scope-and-record.md",
+    "first-drive/mms7-ethercat.md",
+    "first-drive/mms7-rs485.md",
+    "first-drive/ds-c-can-rs232.md",
+    "how-to/save-restore-clone.md",
+    "how-to/jog-and-home.md",
+    "how-to/scope-and-record.md",
     "how-to/report-and-hand-over.md",
-]  # fmt: skip
+]
 #: `params diff` ends with 1 where something differs, which a page may show.
 MAY_END_WITH_1 = ("params", "diff")
 #: What runs until it is ended; the station of the test stands for it.

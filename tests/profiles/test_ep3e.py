@@ -148,11 +148,15 @@ def test_process_data() -> None:
     assert PROFILE.pdo is not None
     sets = {s.index: [key[:4] for key in s.entries] for s in PROFILE.pdo.sets}
     assert sets == {
-        0x1600: ["6040", "6060", "607A", "60FF", "6071"], 0x1601: ["6040", "607A"],
-        0x1602: ["6040", "60FF"], 0x1603: ["6040", "6071"],
-        0x1A00: ["6041", "6061", "6064", "606C", "6077"], 0x1A01: ["6041", "6064"],
-        0x1A02: ["6041", "6064", "606C"], 0x1A03: ["6041", "6064", "6077"],
-    }  # fmt: skip
+        0x1600: ["6040", "6060", "607A", "60FF", "6071"],
+        0x1601: ["6040", "607A"],
+        0x1602: ["6040", "60FF"],
+        0x1603: ["6040", "6071"],
+        0x1A00: ["6041", "6061", "6064", "606C", "6077"],
+        0x1A01: ["6041", "6064"],
+        0x1A02: ["6041", "6064", "606C"],
+        0x1A03: ["6041", "6064", "6077"],
+    }
     for index, entries in sets.items():
         values = [
             PROFILE.by_key[f"{index:04X}:{n:02X}"].default_raw for n in range(len(entries) + 1)

@@ -92,9 +92,14 @@ def written(scheme: str, place: str) -> list[str]:
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("handler", HANDLERS)
 def test_no_url_of_pyserial_is_an_adapter(
-    server: GuardedServer, cast: Cast, terminal: str, listener: Listener, tmp_path: Path,
-    scheme: str, handler: str,
-) -> None:  # fmt: skip
+    server: GuardedServer,
+    cast: Cast,
+    terminal: str,
+    listener: Listener,
+    tmp_path: Path,
+    scheme: str,
+    handler: str,
+) -> None:
     file = tmp_path / "kept"
     file.write_text("precious")
     place = handler.format(pty=terminal, file=file, port=listener.port)
@@ -159,8 +164,11 @@ def test_the_command_line_opens_none(tmp_path: Path, listener: Listener) -> None
     ):
         ended = subprocess.run(
             [sys.executable, "-m", "backend", "scan", url],
-            capture_output=True, text=True, timeout=100, check=False,
-        )  # fmt: skip
+            capture_output=True,
+            text=True,
+            timeout=100,
+            check=False,
+        )
         assert ended.returncode != 0
         assert "is not a serial port" in ended.stderr + ended.stdout
     assert not (tmp_path / "made").exists()

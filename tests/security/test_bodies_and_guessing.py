@@ -373,8 +373,11 @@ def test_the_one_user_of_a_machine_is_asked_nothing_but_guests_cannot_come(tmp_p
         me = Caller(server)
         assert me.ask("GET", "/session").json()["role"] == "administrator"
         assert me.ask("GET", "/drives").status_code == 200
-        for headers in ({"Host": "evil.example"}, {"Origin": "http://evil.example"},
-                        {"Sec-Fetch-Site": "cross-site"}):  # fmt: skip
+        for headers in (
+            {"Host": "evil.example"},
+            {"Origin": "http://evil.example"},
+            {"Sec-Fetch-Site": "cross-site"},
+        ):
             assert me.ask("POST", "/stop", json={}, headers=headers).status_code == 403
         refused = me.ask("POST", "/invitations", json={"guest": "Gert"})
         assert refused.status_code == 409

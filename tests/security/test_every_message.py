@@ -37,7 +37,11 @@ EXAMPLES: dict[str, dict[str, object]] = {
     "scope_stop": {"subscription": 1},
     "jog_renew": AXIS,
     "jog_start": {
-        "drive": "nowhere", "direction": 1, "speed": 1, "acceleration": 1, "travel_limit": 1,
+        "drive": "nowhere",
+        "direction": 1,
+        "speed": 1,
+        "acceleration": 1,
+        "travel_limit": 1,
         "torque_limit": 1,
     },
     "lease": {**AXIS, "take": True},
@@ -52,7 +56,7 @@ EXAMPLES: dict[str, dict[str, object]] = {
     "enable_press": {"invitation": "none"},
     "enable_renew": {"invitation": "none"},
     "enable_release": {"invitation": "none"},
-}  # fmt: skip
+}
 
 
 def types() -> dict[str, type]:

@@ -177,10 +177,15 @@ def test_a_header_that_is_there_twice(server: GuardedServer, cast: Cast) -> None
         answer = cast.operator.http.request("POST", "/stop", json={}, headers=headers)
         if name != b"X-Servodeck-CSRF":
             assert answer.status_code == 403, name
-    assert cast.operator.ask(
-        "POST", "/scan", json={},
-        headers=[(b"X-Servodeck-CSRF", b"a"), (b"X-Servodeck-CSRF", b"b")],  # type: ignore[arg-type]
-    ).status_code == 403  # fmt: skip
+    assert (
+        cast.operator.ask(
+            "POST",
+            "/scan",
+            json={},
+            headers=[(b"X-Servodeck-CSRF", b"a"), (b"X-Servodeck-CSRF", b"b")],  # type: ignore[arg-type]
+        ).status_code
+        == 403
+    )
 
 
 # --- control --------------------------------------------------------------------------
@@ -354,8 +359,12 @@ def test_log_out_is_at_once_and_for_good(server: GuardedServer) -> None:
         closed = _closed(page)
     assert closed == 4401
     for method, path in (("GET", "/drives"), ("POST", "/stop")):
-        again = httpx.request(method, f"{server.url}/api/v1{path}",
-                              headers={"Cookie": f"servodeck={cookie}"}, timeout=30)  # fmt: skip
+        again = httpx.request(
+            method,
+            f"{server.url}/api/v1{path}",
+            headers={"Cookie": f"servodeck={cookie}"},
+            timeout=30,
+        )
         assert again.status_code == 401
 
 

@@ -64,10 +64,13 @@ def test_the_one_that_was_found_is_422(cast: Cast) -> None:
 
 
 FILES = [
-    ("PUT", "/sets/half"), ("POST", "/sets/list?file=half.csv&profile=mms7"),
-    ("POST", "/measurements?name=half"), ("POST", "/scope/snapshots/half"),
-    ("PUT", "/scope/setups/half"), ("POST", "/descriptions"),
-]  # fmt: skip
+    ("PUT", "/sets/half"),
+    ("POST", "/sets/list?file=half.csv&profile=mms7"),
+    ("POST", "/measurements?name=half"),
+    ("POST", "/scope/snapshots/half"),
+    ("PUT", "/scope/setups/half"),
+    ("POST", "/descriptions"),
+]
 
 
 @pytest.mark.parametrize(("method", "path"), FILES)
@@ -84,15 +87,23 @@ def test_half_a_character_in_a_file_is_no_defect(cast: Cast, method: str, path: 
 
 
 def test_half_a_character_in_an_address_is_no_defect(cast: Cast) -> None:
-    for path in ("/drives/%ED%A0%80", "/sets/%ED%A0%80", "/audit?words=%ED%A0%80",
-                 "/measurements/%ED%A0%80/file", "/recordings/%ED%A0%80/file"):  # fmt: skip
+    for path in (
+        "/drives/%ED%A0%80",
+        "/sets/%ED%A0%80",
+        "/audit?words=%ED%A0%80",
+        "/measurements/%ED%A0%80/file",
+        "/recordings/%ED%A0%80/file",
+    ):
         assert 200 <= cast.administrator.ask("GET", path).status_code < 500
 
 
 def test_half_a_character_in_a_message_is_refused(cast: Cast) -> None:
     with cast.operator.live() as page:
-        for text in ('{"type":"chat","text":"\\ud800"}', '{"type":"\\ud800"}',
-                     '{"type":"lease","drive":"\\ud800"}'):  # fmt: skip
+        for text in (
+            '{"type":"chat","text":"\\ud800"}',
+            '{"type":"\\ud800"}',
+            '{"type":"lease","drive":"\\ud800"}',
+        ):
             page.socket.send(text)
         page.send(type="ping", n=1)
         while True:
@@ -106,8 +117,13 @@ def test_half_a_character_in_a_message_is_refused(cast: Cast) -> None:
 def test_whole_characters_pass() -> None:
     for body in (b'"\\ud83d\\ude00"', b'"\\\\ud800"', b'"ud800"', b"\\ud800", b"", b"[" * 100_000):
         assert not has_half_characters(body)
-    for body in (b'"\\ud800"', b'"\\uDC00\\uD800"', b'{"\\udfff": 1}', b'[[["\\ud83dx"]]]',
-                 b'"\\\\\\ud800"'):  # fmt: skip
+    for body in (
+        b'"\\ud800"',
+        b'"\\uDC00\\uD800"',
+        b'{"\\udfff": 1}',
+        b'[[["\\ud83dx"]]]',
+        b'"\\\\\\ud800"',
+    ):
         assert has_half_characters(body)
 
 

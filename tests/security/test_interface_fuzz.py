@@ -15,8 +15,12 @@ from backend.people.rights import Right, Role
 from tests.support.guarded import Caller, GuardedServer
 
 load_all_checks()
-WANTED = ["not_a_server_error", "status_code_conformance", "content_type_conformance",
-          "response_schema_conformance"]  # fmt: skip
+WANTED = [
+    "not_a_server_error",
+    "status_code_conformance",
+    "content_type_conformance",
+    "response_schema_conformance",
+]
 #: Per operation; the seed makes a failure the same on every machine.
 EXAMPLES = 8
 #: Would take away what the other requests are made with, or looks outside this machine.
@@ -91,8 +95,13 @@ def tried(operation: Any, viewer: Caller, session: requests.Session) -> set[int]
     seen = set()
 
     @seed(8)
-    @settings(max_examples=2, deadline=None, database=None, phases=[Phase.generate],
-              suppress_health_check=list(HealthCheck))  # fmt: skip
+    @settings(
+        max_examples=2,
+        deadline=None,
+        database=None,
+        phases=[Phase.generate],
+        suppress_health_check=list(HealthCheck),
+    )
     @given(case=operation.as_strategy())
     def ask(case: schemathesis.Case) -> None:
         headers, cookies = dict(viewer.http.headers), {"servodeck": viewer.cookie}

@@ -190,9 +190,13 @@ async def test_turns_go_to_known_ones_first_then_place_by_place() -> None:
 
     tasks = []
     for name, place, known in (
-        ("first", "a", False), ("a1", "a", False), ("a2", "a", False), ("b1", "b", False),
-        ("c1", "c", False), ("known", "browser", True),
-    ):  # fmt: skip
+        ("first", "a", False),
+        ("a1", "a", False),
+        ("a2", "a", False),
+        ("b1", "b", False),
+        ("c1", "c", False),
+        ("known", "browser", True),
+    ):
         tasks.append(asyncio.create_task(one(name, place, known=known)))
         await asyncio.sleep(0)
     go.set()

@@ -36,8 +36,12 @@ BODIES: dict[str, Any] = {
 #: Take the axis, the bus or the caller away; what they do to a motion is tested elsewhere.
 _TAKES_AWAY = {f"DELETE {API}/drives/{{drive_id}}", f"DELETE {API}/buses", *ENDS_IT}
 #: Rights that a token or an invitation may give without the two that move.
-WITHOUT = [(Right.LOOK,), (Right.LOOK, Right.FILES), (Right.LOOK, Right.PARAMETERS),
-           (Right.LOOK, Right.FILES, Right.PARAMETERS, Right.STATION, Right.INVITE)]  # fmt: skip
+WITHOUT = [
+    (Right.LOOK,),
+    (Right.LOOK, Right.FILES),
+    (Right.LOOK, Right.PARAMETERS),
+    (Right.LOOK, Right.FILES, Right.PARAMETERS, Right.STATION, Right.INVITE),
+]
 
 
 def _body(path: str) -> dict[str, Any]:

@@ -50,9 +50,13 @@ STILL_RAD = 1e-3
 REACTION_S = 0.25
 #: 6060h = profile velocity; a speed; then the way to Operation enabled (CiA 402-2 clause 8.4).
 ATTACK: tuple[tuple[str, int], ...] = (
-    ("6060:00", 3), ("60FF:00", 1_000_000), ("6040:00", 0x06), ("6040:00", 0x07),
-    ("6040:00", 0x0F), ("6040:00", 0x1F),
-)  # fmt: skip
+    ("6060:00", 3),
+    ("60FF:00", 1_000_000),
+    ("6040:00", 0x06),
+    ("6040:00", 0x07),
+    ("6040:00", 0x0F),
+    ("6040:00", 0x1F),
+)
 
 
 class Scene:
@@ -146,8 +150,11 @@ def values_of(parameter: Parameter) -> list[Raw]:
         return sorted(parameter.enum)[:8]
     low, high = parameter.raw_limits
     wanted = [1, high, low, 3]
-    inside = [v for v in wanted if v is not None and (low is None or v >= low)
-              and (high is None or v <= high)]  # fmt: skip
+    inside = [
+        v
+        for v in wanted
+        if v is not None and (low is None or v >= low) and (high is None or v <= high)
+    ]
     return list(dict.fromkeys(inside)) or [1]
 
 

@@ -68,9 +68,13 @@ STILL_REV = 1e-3
 #: Written last, since what comes after them may find the drive away: restarts and restores.
 LAST = ("1010", "1011", "200C:01", "200C:08", "200D:00", "2202:00", "2002:17", "2011:1B")
 ATTACK: tuple[tuple[str, int], ...] = (
-    ("6060:00", 3), ("60FF:00", 1_000_000), ("6040:00", 0x06), ("6040:00", 0x07),
-    ("6040:00", 0x0F), ("6040:00", 0x1F),
-)  # fmt: skip
+    ("6060:00", 3),
+    ("60FF:00", 1_000_000),
+    ("6040:00", 0x06),
+    ("6040:00", 0x07),
+    ("6040:00", 0x0F),
+    ("6040:00", 0x1F),
+)
 
 
 class Wires:
@@ -186,8 +190,11 @@ def value_of(parameter: Parameter, turn: int) -> Raw:
         choices: list[Raw] = [*sorted(parameter.enum)[:8]]
         return choices[(turn + 1) % len(choices)]
     low, high = parameter.raw_limits
-    inside = [v for v in (1, high, low, 3) if v is not None and (low is None or v >= low)
-              and (high is None or v <= high)]  # fmt: skip
+    inside = [
+        v
+        for v in (1, high, low, 3)
+        if v is not None and (low is None or v >= low) and (high is None or v <= high)
+    ]
     values: list[Raw] = [*dict.fromkeys(inside)] or [1]
     return values[turn % len(values)]
 

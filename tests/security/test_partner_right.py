@@ -13,8 +13,11 @@ from drivers.errors import NotAllowed
 from tests.support.guarded import GuardedServer
 
 LIMITS = {
-    "travel_limit": 1.0, "speed_limit": 300.0, "torque_limit": 50.0, "time_limit_s": 30.0,
-}  # fmt: skip
+    "travel_limit": 1.0,
+    "speed_limit": 300.0,
+    "torque_limit": 50.0,
+    "time_limit_s": 30.0,
+}
 
 
 def test_the_partner_needs_the_right_too(

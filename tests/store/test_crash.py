@@ -43,8 +43,11 @@ class Nursery:
         self.folder = folder
         self._process = subprocess.Popen(
             [sys.executable, "-m", "tests.support.crash_child", str(folder), database],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT,
-        )  # fmt: skip
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=ROOT,
+        )
 
     def live(self, seed: int, deeds: int, rest_s: float) -> None:
         """A life that ends ``rest_s`` after so many deeds were reported."""
@@ -191,8 +194,11 @@ def test_two_stations_killed_in_turn_leave_one_chain(postgres: Postgres, tmp_pat
     with nursery(folders[0], url) as first, nursery(folders[1], url) as second:
         for life in range(3):
             for lives, folder in ((first, folders[0]), (second, folders[1])):
-                lives.live(2 * life + 10 * dice.randrange(10**5) + (folder.name == "b"),
-                           dice.randrange(3, 12), 0)  # fmt: skip
+                lives.live(
+                    2 * life + 10 * dice.randrange(10**5) + (folder.name == "b"),
+                    dice.randrange(3, 12),
+                    0,
+                )
         reported = [*first.reported(), *second.reported()]
     store = Store(folders[0], url)
     for folder in folders:  # what waits in their files goes into the chain when they start again

@@ -25,9 +25,13 @@ NAME = "20261121-101500-sweep-X.sdmeas"
 
 def measurement(drive: str = "X", samples: int = 200_000) -> bytes:
     meta = {
-        "version": 1, "saved": "2026-11-21T10:15:00+00:00", "kind": "sweep", "drive": drive,
-        "profile": "mms7", "identity": {"serial": 7},
-    }  # fmt: skip
+        "version": 1,
+        "saved": "2026-11-21T10:15:00+00:00",
+        "kind": "sweep",
+        "drive": drive,
+        "profile": "mms7",
+        "identity": {"serial": 7},
+    }
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:
         for name, values in (

@@ -34,11 +34,14 @@ BENCH = {
     "version": 1,
     "drives": [
         {
-            "name": "X axis", "notes": "left", "profile": "MMS7",
-            "ports": [{"url": "ethercat:eth1", "station": 1}], "serial": 7,
+            "name": "X axis",
+            "notes": "left",
+            "profile": "MMS7",
+            "ports": [{"url": "ethercat:eth1", "station": 1}],
+            "serial": 7,
         }
     ],
-}  # fmt: skip
+}
 PENDING = {
     "serial": 7,
     "in_motion": False,

@@ -31,8 +31,11 @@ class FakeComputer:
         self.write("proc/version", "Linux version 6.12.0 #1 SMP PREEMPT_DYNAMIC")
         self.write("proc/sys/kernel/osrelease", "6.12.0")
         self.capabilities(ALL)
-        self.write("proc/self/limits", "Max realtime priority     0     0\n"
-                   "Max locked memory         8388608      8388608     bytes\n")  # fmt: skip
+        self.write(
+            "proc/self/limits",
+            "Max realtime priority     0     0\n"
+            "Max locked memory         8388608      8388608     bytes\n",
+        )
         for core in (0, 1):
             cpu = f"sys/devices/system/cpu/cpu{core}"
             self.write(f"{cpu}/cpufreq/scaling_governor", "performance")
@@ -44,8 +47,11 @@ class FakeComputer:
         self.write(f"{net}/ifindex", "3")
         self.write(f"{net}/carrier", "1")
         self.write("proc/net/route", "Iface\tDestination\neth0\t00000000")
-        self.write("proc/interrupts", "            CPU0       CPU1\n"
-                   " 41:    100      0  PCI-MSI 524288-edge      eth1-TxRx-0\n")  # fmt: skip
+        self.write(
+            "proc/interrupts",
+            "            CPU0       CPU1\n"
+            " 41:    100      0  PCI-MSI 524288-edge      eth1-TxRx-0\n",
+        )
         self.write("proc/irq/41/smp_affinity_list", "0")
 
     def write(self, path: str, text: str) -> None:

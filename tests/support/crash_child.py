@@ -67,8 +67,13 @@ class Life:
         # What is not the thing itself, such as opening the database, happens before.
         self.records.store.open()
         cut_off_at(step)
-        acts = {"save": self.save, "save_large": self.save_large, "event": self.event,
-                "drop_file": self.drop_file, "change": self.change}  # fmt: skip
+        acts = {
+            "save": self.save,
+            "save_large": self.save_large,
+            "event": self.event,
+            "drop_file": self.drop_file,
+            "change": self.change,
+        }
         acts[act]()
         self.records.audit.close()
         self.tell(act="end")

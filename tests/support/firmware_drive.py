@@ -36,6 +36,10 @@ def make_device(
     assert os.environ["SERVODECK_PROFILES"]
     path = None if nvm is None else nvm / f"{drive}-{station}.json"
     return VirtualServo(
-        load_profile(drive), Mms7(), standard_mechanics(), nvm_path=path, station=station,
+        load_profile(drive),
+        Mms7(),
+        standard_mechanics(),
+        nvm_path=path,
+        station=station,
         seed=station,
-    )  # fmt: skip
+    )

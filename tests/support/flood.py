@@ -158,9 +158,12 @@ def stops(port: int, head: str) -> None:
 async def main(kind: str, port: int, head: str) -> None:
     flood = Flood(port, head)
     kinds: dict[str, Callable[[], Awaitable[None]]] = {
-        "idle": flood.idle, "logins": flood.logins, "jobs": flood.jobs, "bodies": flood.bodies,
+        "idle": flood.idle,
+        "logins": flood.logins,
+        "jobs": flood.jobs,
+        "bodies": flood.bodies,
         "requests": flood.requests,
-    }  # fmt: skip
+    }
     running = asyncio.ensure_future(kinds[kind]())
     await asyncio.wait_for(flood.ready.wait(), 30)
     print("under way", flush=True)

@@ -88,9 +88,12 @@ class GuardedServer:
     """``people`` may be moved in time by ``later``; ``bench`` has the axis x."""
 
     def __init__(
-        self, folder: Path, *, accounts: bool = True,
+        self,
+        folder: Path,
+        *,
+        accounts: bool = True,
         making: Callable[[Path], Awaitable[tuple[Bench, ConnectedDrive]]] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.servo = Servo()
         self._making = making or (lambda folder: bench_with(self.servo, folder))
         self.folder = folder

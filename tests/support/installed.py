@@ -44,9 +44,14 @@ def served(
     """
     began = time.monotonic()
     process = subprocess.Popen(
-        [str(part) for part in command], cwd=folder, env=dict(environment), text=True,
-        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-    )  # fmt: skip
+        [str(part) for part in command],
+        cwd=folder,
+        env=dict(environment),
+        text=True,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )
     guard = threading.Timer(HANG_S, process.kill)
     guard.start()
     try:

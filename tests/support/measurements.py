@@ -55,10 +55,13 @@ def _first_order(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 def _columns(velocity: npt.NDArray[np.float64], **more: Any) -> Arrays:
     n = velocity.size
     return {
-        "position_rad": np.cumsum(velocity) / RATE_HZ, "velocity_rad_s": velocity,
-        "torque_nm": np.zeros(n), "sent": np.zeros(n), "offset": np.zeros(n),
+        "position_rad": np.cumsum(velocity) / RATE_HZ,
+        "velocity_rad_s": velocity,
+        "torque_nm": np.zeros(n),
+        "sent": np.zeros(n),
+        "offset": np.zeros(n),
         "valid": np.ones(n, dtype=np.bool_),
-    } | more  # fmt: skip
+    } | more
 
 
 def step(size_rpm: float = 100.0) -> tuple[str, Arrays, dict[str, object]]:
@@ -77,9 +80,14 @@ def speed_loop() -> tuple[str, Arrays, dict[str, object]]:
     settings = SweepSettings(ENVELOPE, kind="speed_loop", realisations=1)
     room = excite.Room(1.0, 125.0, 19.0)
     sequences = excite.loop_reference(
-        RATE_HZ, excite.band_for(RATE_HZ, 5.0, None), room, 0.0, amplitude=4.0, realisations=1,
+        RATE_HZ,
+        excite.band_for(RATE_HZ, 5.0, None),
+        room,
+        0.0,
+        amplitude=4.0,
+        realisations=1,
         position=False,
-    )  # fmt: skip
+    )
     arrays: Arrays = {}
     structure = []
     for number, sequence in enumerate(sequences):

@@ -80,9 +80,14 @@ class Postgres:
     def _run(self, program: str, *arguments: str) -> None:
         done = subprocess.run(
             [str(self._bin / program), *arguments],
-            user=self._account, cwd=self.folder, check=False, text=True,
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE if program != "pg_ctl" else
-            subprocess.DEVNULL, stderr=subprocess.STDOUT, timeout=60,
-        )  # fmt: skip
+            user=self._account,
+            cwd=self.folder,
+            check=False,
+            text=True,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE if program != "pg_ctl" else subprocess.DEVNULL,
+            stderr=subprocess.STDOUT,
+            timeout=60,
+        )
         if done.returncode != 0:
             raise RuntimeError(f"{program} failed: {done.stdout}")

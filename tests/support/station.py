@@ -67,9 +67,12 @@ class Station:
         self.loop: asyncio.AbstractEventLoop | None = None
         self.folder = folder
         self.drives = DemoBench(
-            bench_file, folder / "wires", folder / "nvm", segment_options=segment_options,
+            bench_file,
+            folder / "wires",
+            folder / "nvm",
+            segment_options=segment_options,
             steady=steady,
-        )  # fmt: skip
+        )
         self._server: uvicorn.Server | None = None
         #: The running server's; made in its thread.
         self.bench: Bench | None = None

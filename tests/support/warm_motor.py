@@ -39,9 +39,14 @@ class WarmMotor:
         return size * (1.0 + self.saturation * np.maximum(size - 1.0, 0.0))
 
     def rates(
-        self, rise: FloatArray, copper: float, iron: float, ambient_c: float, losses: float,
+        self,
+        rise: FloatArray,
+        copper: float,
+        iron: float,
+        ambient_c: float,
+        losses: float,
         air: float,
-    ) -> FloatArray:  # fmt: skip
+    ) -> FloatArray:
         """K/s of each body; ``copper`` is current², ``losses`` the rated ones in W."""
         slot, ends, core, frame = rise
         at_rated = 1.0 + _COPPER * (RATED_RISE_K + 40.0 - 20.0)
@@ -56,12 +61,14 @@ class WarmMotor:
         across = self.ends_to_frame * (ends - frame)
         to_frame = self.iron_to_frame * (core - frame)
         away = air * frame * max(frame, 1e-6) ** 0.25
-        flows = np.array([
-            heat_slot + to_slot - to_iron,
-            heat_ends - to_slot - across,
-            self.iron_share * losses * iron + to_iron - to_frame,
-            to_frame + across - away,
-        ])  # fmt: skip
+        flows = np.array(
+            [
+                heat_slot + to_slot - to_iron,
+                heat_ends - to_slot - across,
+                self.iron_share * losses * iron + to_iron - to_frame,
+                to_frame + across - away,
+            ]
+        )
         return np.asarray(flows / np.array(self.capacities))
 
     def calibrated(self, losses: float) -> float:
@@ -85,8 +92,12 @@ class WarmMotor:
         """Times and rises [4, n] from cold under constant losses."""
         done = solve_ivp(
             lambda _t, rise: self.rates(rise, copper, iron, ambient_c, losses, air),
-            (0.0, until_s), np.zeros(4), method="LSODA", rtol=1e-6, atol=1e-6,
-        )  # fmt: skip
+            (0.0, until_s),
+            np.zeros(4),
+            method="LSODA",
+            rtol=1e-6,
+            atol=1e-6,
+        )
         return done.t, done.y
 
     def time_constant_s(self, losses: float, air: float) -> float:
@@ -96,9 +107,13 @@ class WarmMotor:
         return float(np.interp(1.0 - np.exp(-1.0), reached, times))
 
     def too_warm_s(
-        self, losses: float, air: float, torque: FloatArray, speed_ratio: FloatArray,
+        self,
+        losses: float,
+        air: float,
+        torque: FloatArray,
+        speed_ratio: FloatArray,
         ambient_c: float = 40.0,
-    ) -> float | None:  # fmt: skip
+    ) -> float | None:
         """When the end winding exceeds its temperature at rated load; the cycle is short."""
         copper = float(np.mean(self.current(torque) ** 2))
         iron = float(np.mean(np.abs(speed_ratio) ** 1.5))

@@ -40,9 +40,12 @@ def test_a_file_of_an_older_version_is_shown_as_it_stands() -> None:
 
 def inertia(**other: object) -> InertiaAnswer:
     ends = InertiaIntervals(
-        inertia_kgm2=NOTHING, viscous_nms=NOTHING, coulomb_nm=NOTHING, gravity_nm=NOTHING,
+        inertia_kgm2=NOTHING,
+        viscous_nms=NOTHING,
+        coulomb_nm=NOTHING,
+        gravity_nm=NOTHING,
         load_ratio=None,
-    )  # fmt: skip
+    )
     plain = {
         "method": "host", "inertia_kgm2": None, "viscous_nms": None, "coulomb_nm": None,
         "gravity_nm": None, "load_ratio": None, "ci95": ends, "r2": 0.0, "identifiable": False,

@@ -61,9 +61,10 @@ def _entries(language: Language) -> dict[str, set[str]]:
                 continue
             code = entry.id.name.replace("_", ".")
             assert code not in found, f"{code} is there twice"
-            for name, pattern in ((code, entry.value), *(
-                (f"{code}/{each.id.name}", each.value) for each in entry.attributes
-            )):  # fmt: skip
+            for name, pattern in (
+                (code, entry.value),
+                *((f"{code}/{each.id.name}", each.value) for each in entry.attributes),
+            ):
                 if pattern is not None:
                     variables = _Variables()
                     variables.visit(pattern)
@@ -122,9 +123,10 @@ def _shown() -> set[str]:
     """What errors and messages are made of: `NotAllowed("…")`, `text("…")`."""
     made = (_code_of(node) for source in _sources() for node in source.calls)
     return {
-        node.value for node in made
+        node.value
+        for node in made
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and is_code(node.value)
-    }  # fmt: skip
+    }
 
 
 def test_a_room_has_one_file() -> None:
@@ -227,10 +229,11 @@ def test_the_page_knows_the_same_earlier_names() -> None:
 
 def test_chinese_is_chinese() -> None:
     bare = [
-        code for code, names in CHINESE.items()
+        code
+        for code, names in CHINESE.items()
         if not re.search(r"[\u4e00-\u9fff]", render(Text(code, dict.fromkeys(names, "x")), "zh"))
         and re.search(r"[a-z]{3}", render(Text(code, dict.fromkeys(names, "x")), "en"))
-    ]  # fmt: skip
+    ]
     assert not bare
 
 
@@ -255,9 +258,12 @@ def test_no_error_carries_a_sentence() -> None:
     for source in _sources():
         kinds = (node for node in ast.walk(source.tree) if isinstance(node, ast.ClassDef))
         own = (
-            node for kind in kinds if kind.name in ERRORS
-            for node in ast.walk(kind) if _called(node) == "__init__"
-        )  # fmt: skip
+            node
+            for kind in kinds
+            if kind.name in ERRORS
+            for node in ast.walk(kind)
+            if _called(node) == "__init__"
+        )
         for node in (*(each for each in source.calls if _called(each) in ERRORS), *own):
             assert isinstance(node, ast.Call)
             advice = [each.value for each in node.keywords if each.arg == "remedy"]
@@ -277,14 +283,18 @@ def test_no_import_reports_a_sentence() -> None:
     ]
     assert len(calls) > 80
     found = [
-        place for place, node in calls
-        if (code := _code_of(node)) is None or _is_sentence(code)
+        place
+        for place, node in calls
+        if (code := _code_of(node)) is None
+        or _is_sentence(code)
         or len(node.args) > (1 if _called(node) == "ImportFailed" else 2)
-    ]  # fmt: skip
+    ]
     assert not found, "\n".join(found)
     codes = {
-        words for source in _sources() if source.name.startswith("profiles/")
+        words
+        for source in _sources()
+        if source.name.startswith("profiles/")
         for words in source.strings
         if is_code(words) and words.startswith(("description.", "profile-check."))
-    }  # fmt: skip
+    }
     assert codes <= set(ENGLISH), "in no file of texts/catalogue"

@@ -182,8 +182,12 @@ class _Function(ast.NodeVisitor):
             reads = function.attr in _READING and self.is_text(owner)
             module = owner.id if isinstance(owner, ast.Name) else ""
             matches = module in ("re", "fnmatch") or function.attr in (
-                "match", "search", "fullmatch", "findall", "finditer",
-            )  # fmt: skip
+                "match",
+                "search",
+                "fullmatch",
+                "findall",
+                "finditer",
+            )
             looks_up = function.attr in _LOOKING_UP and not isinstance(owner, ast.Constant)
             if reads or ((matches or looks_up) and any(self.is_text(a) for a in node.args)):
                 self.found.append(node)
@@ -230,8 +234,11 @@ def _all_readings() -> dict[tuple[str, str], int]:
 
 def test_no_control_flow_reads_the_words_of_a_message() -> None:
     found = _all_readings()
-    unknown = [f"{file}:{line}: {text}" for (file, text), line in found.items()
-               if (file, text) not in ALLOWED]  # fmt: skip
+    unknown = [
+        f"{file}:{line}: {text}"
+        for (file, text), line in found.items()
+        if (file, text) not in ALLOWED
+    ]
     assert not unknown, "decide by a type or a field instead:\n" + "\n".join(unknown)
     assert not set(ALLOWED) - set(found), "no longer there: take it off the list"
 

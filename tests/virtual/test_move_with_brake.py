@@ -46,9 +46,14 @@ def test_the_first_move_arrives_although_the_brake_opens_slowly(family: str) -> 
             assert await brake_opens_s(axis.drive) == pytest.approx(opens_s)
             start = _turns(bench)
             settings = MoveSettings(
-                "PP", 1.5, ENVELOPE, relative=True, speed_rpm=300.0,
-                acceleration_rpm_s=3000.0, deceleration_rpm_s=3000.0,
-            )  # fmt: skip
+                "PP",
+                1.5,
+                ENVELOPE,
+                relative=True,
+                speed_rpm=300.0,
+                acceleration_rpm_s=3000.0,
+                deceleration_rpm_s=3000.0,
+            )
             bench.bench.motion.permit(bench.connected.drive.id)
             await move(axis, settings, Progress(lambda: None))
             assert _turns(bench) - start == pytest.approx(1.5, abs=0.05)

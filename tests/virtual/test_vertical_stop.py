@@ -69,8 +69,13 @@ def test_the_judge_sees_a_load_that_falls() -> None:
 
 
 def test_what_the_judge_reads_from_a_recording() -> None:
-    rows = [Row(0.0, 300.0, 10.0), Row(0.1, 1.0, 50.0), Row(0.2, 0.0, 50.0, released=False),
-            Row(0.3, 0.0, 49.0, powered=False, released=False), Row(0.4, 0.0, 48.5)]  # fmt: skip
+    rows = [
+        Row(0.0, 300.0, 10.0),
+        Row(0.1, 1.0, 50.0),
+        Row(0.2, 0.0, 50.0, released=False),
+        Row(0.3, 0.0, 49.0, powered=False, released=False),
+        Row(0.4, 0.0, 48.5),
+    ]
     assert sinking(rows) == (0.1, 1.5)
     assert lead_s(rows) == pytest.approx(0.1)
     assert lead_s(rows[:2]) is None

@@ -191,9 +191,13 @@ class _Fit:
         high += [band[1], np.log(threshold.DAMPING_RANGE[1])] * modes
         inside = np.clip(start, np.array(low) + 1e-9, np.array(high) - 1e-9)
         found = scipy.optimize.least_squares(
-            self.residuals, inside, self._jacobian, bounds=(low, high),
-            x_scale=np.maximum(np.abs(inside), 0.1), max_nfev=threshold.EVALUATIONS,
-        )  # fmt: skip
+            self.residuals,
+            inside,
+            self._jacobian,
+            bounds=(low, high),
+            x_scale=np.maximum(np.abs(inside), 0.1),
+            max_nfev=threshold.EVALUATIONS,
+        )
         return np.asarray(found.x)
 
     def candidates(self, x: FloatArray) -> list[FloatArray]:
@@ -246,7 +250,7 @@ class _Fit:
                     ),
                     share,
                 )
-            )  # fmt: skip
+            )
         modes = [mode for mode in modes if self._shown(mode)]
         modes.sort(key=lambda mode: mode.frequency_hz)
         # Mean of the four entries: R₀ + R₁ of common motion is 1/J of the whole machine.

@@ -73,9 +73,14 @@ def permitted_rise(ambient_c: float, rated_rise_k: float | None) -> float | None
 
 
 def heat_of(
-    signals: Signals, rated_rpm: float | None, *, permitted: float, time_constant_s: float | None,
-    scale: tuple[float, float] = (1.0, 1.0), standstill: float | None = None,
-) -> Heat:  # fmt: skip
+    signals: Signals,
+    rated_rpm: float | None,
+    *,
+    permitted: float,
+    time_constant_s: float | None,
+    scale: tuple[float, float] = (1.0, 1.0),
+    standstill: float | None = None,
+) -> Heat:
     """The range of the rise, and of the moment at which it exceeds what is permitted.
 
     ``scale`` are the ends of the effective torque's interval, as shares of it. ``standstill`` is
@@ -116,9 +121,11 @@ def _winding_taus(time_constant_s: float | None) -> tuple[float, ...]:
 
 
 def _losses(
-    even: Signals, rated_rpm: float | None, shares: tuple[float, float],
+    even: Signals,
+    rated_rpm: float | None,
+    shares: tuple[float, float],
     currents: Iterable[tuple[float, float]],
-) -> Iterator[_Losses]:  # fmt: skip
+) -> Iterator[_Losses]:
     for (saturation, factor), share, power in itertools.product(
         currents, shares, _SPEED_POWER if rated_rpm is not None else (0.0, np.inf)
     ):
@@ -126,9 +133,13 @@ def _losses(
 
 
 def _one(
-    even: Signals, rated_rpm: float | None, share: float, power: float, saturation: float,
+    even: Signals,
+    rated_rpm: float | None,
+    share: float,
+    power: float,
+    saturation: float,
     factor: float = 1.0,
-) -> _Losses:  # fmt: skip
+) -> _Losses:
     """Losses of one kind of motor. Without a rated speed nothing is known of the speed's part:
     ``power`` 0 takes it as that of the rated speed, infinity as none, others as half."""
     torque = np.abs(even.torque_percent) / 100.0
@@ -172,10 +183,12 @@ class _Bodies:
             return None
         r_w, r_h = self._to_housing, self._to_air
         c_w, c_h = self._tau_w / r_w, tau_s / r_h
-        matrix = np.array([
-            [(-1.0 / r_w + self._copper * copper) / c_w, 1.0 / (r_w * c_w)],
-            [1.0 / (r_w * c_h), (-1.0 / r_w - 1.0 / r_h) / c_h],
-        ])  # fmt: skip
+        matrix = np.array(
+            [
+                [(-1.0 / r_w + self._copper * copper) / c_w, 1.0 / (r_w * c_w)],
+                [1.0 / (r_w * c_h), (-1.0 / r_w - 1.0 / r_h) / c_h],
+            ]
+        )
         given = np.array([self._copper * (1.0 - copper * permitted) / c_w, self._elsewhere / c_h])
         values, vectors = np.linalg.eig(matrix)
         still = np.linalg.solve(vectors, given)

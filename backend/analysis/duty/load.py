@@ -57,9 +57,10 @@ class Signals:
         spacing = max(self.spacing_s, self.duration_s / most)
         time = np.arange(self.time_s[0], self.time_s[-1], spacing)
         return Signals(
-            time, np.interp(time, self.time_s, self.torque_percent),
+            time,
+            np.interp(time, self.time_s, self.torque_percent),
             np.interp(time, self.time_s, self.speed_rpm),
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True)
@@ -119,9 +120,13 @@ def period_of(signals: Signals) -> float | None:
     if not fallen.size:
         return None
     begin = int(fallen[0])
-    peaks = 1 + begin + np.flatnonzero(
-        (half[begin + 1 : -1] >= half[begin:-2]) & (half[begin + 1 : -1] >= half[begin + 2 :])
-    )  # fmt: skip
+    peaks = (
+        1
+        + begin
+        + np.flatnonzero(
+            (half[begin + 1 : -1] >= half[begin:-2]) & (half[begin + 1 : -1] >= half[begin + 2 :])
+        )
+    )
     if not peaks.size or float(np.max(half[peaks])) < _REPEATS:
         return None
     best = float(np.max(half[peaks]))
@@ -176,10 +181,12 @@ def power_of(signals: Signals, rated_nm: float, moments: FloatArray) -> Power:
     braking = over(np.maximum(-power, 0.0), np.maximum(-middle, 0.0))
     mean_braking = float(np.mean(_means(signals, braking, moments)))
     return Power(
-        float(np.max(power)), float(np.mean(_means(signals, over(power, middle), moments))),
+        float(np.max(power)),
+        float(np.mean(_means(signals, over(power, middle), moments))),
         float(np.max(np.maximum(-power, 0.0))),
-        mean_braking * float(moments[-1] - moments[0]) / max(moments.size - 1, 1), mean_braking,
-    )  # fmt: skip
+        mean_braking * float(moments[-1] - moments[0]) / max(moments.size - 1, 1),
+        mean_braking,
+    )
 
 
 def _means(signals: Signals, by_interval: FloatArray, moments: FloatArray) -> list[float]:

@@ -125,9 +125,14 @@ def _candidate(search: LoopSearch, found: Found, marks: tuple[Mark, ...]) -> Can
         TURN * hz * search.inertia_kgm2, hz / INTEGRAL_RATIO, _position_gain(f, loops, hz), hz
     )
     row = described(
-        f, plant.response(), filters, gains, worst_of(loops).guaranteed, notches=shape.notches,
+        f,
+        plant.response(),
+        filters,
+        gains,
+        worst_of(loops).guaranteed,
+        notches=shape.notches,
         filters=search.filters[shape.choice],
-    )  # fmt: skip
+    )
     cost = _phase_cost(search, found, filters, row.nominal.crossover_hz)
     return replace(row, phase_cost_deg=cost, marks=marks)
 

@@ -70,9 +70,12 @@ def _known(octaves: FloatArray, sharp: BoolArray) -> BoolArray:
 
 
 def _averaged(
-    centres: FloatArray, octaves: FloatArray, value: ComplexArray, scatter: FloatArray,
+    centres: FloatArray,
+    octaves: FloatArray,
+    value: ComplexArray,
+    scatter: FloatArray,
     off: FloatArray,
-) -> tuple[ComplexArray, FloatArray]:  # fmt: skip
+) -> tuple[ComplexArray, FloatArray]:
     """A straight line through the neighbours of each centre, and what is left of their scatter."""
     out = np.empty(centres.size, dtype=np.complex128)
     left = np.empty(centres.size)

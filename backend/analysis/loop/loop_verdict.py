@@ -353,9 +353,12 @@ def _beyond(
     )
     gain = Interval(mean.gain_margin_db, least_db, mean.gain_margin_db)
     return BandVerdict(
-        float(f[0]), float(f[-1]), phase, gain if least_db < threshold.MOST_DB else None,
+        float(f[0]),
+        float(f[-1]),
+        phase,
+        gain if least_db < threshold.MOST_DB else None,
         Interval(peak, peak, max(worst.ms, peak)),
-    )  # fmt: skip
+    )
 
 
 def _worst(measured: BandVerdict | None, beyond: BandVerdict | None) -> tuple[Goals, Goals]:

@@ -85,9 +85,14 @@ class MeasuredPlant:
 
 
 def measured_plant(
-    frf: Frf, model: MechanicalModel, *, highest_hz: float = 6000.0, lines: int = 400,
-    variants: tuple[MechanicalModel, ...] = (), fitted: bool = True,
-) -> MeasuredPlant:  # fmt: skip
+    frf: Frf,
+    model: MechanicalModel,
+    *,
+    highest_hz: float = 6000.0,
+    lines: int = 400,
+    variants: tuple[MechanicalModel, ...] = (),
+    fitted: bool = True,
+) -> MeasuredPlant:
     """Join a corrected measurement with its model.
 
     A model that is ``fitted`` to all lines counts next to each of them by how exactly that line is

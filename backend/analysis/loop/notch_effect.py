@@ -97,9 +97,12 @@ def fit_effect(frequency_hz: FloatArray, ratio: ComplexArray, path: SignalPath) 
 
 
 def fit_effect_in_loop(
-    frequency_hz: FloatArray, plain: LoopLines, notched: LoopLines, loop: LoopModel,
+    frequency_hz: FloatArray,
+    plain: LoopLines,
+    notched: LoopLines,
+    loop: LoopModel,
     path: SignalPath,
-) -> NotchEffect:  # fmt: skip
+) -> NotchEffect:
     """The same with a closed speed loop, ``loop`` being its controller without the notch.
 
     What the reference alone makes of torque is the plain torque and what the loop took of it by
@@ -132,9 +135,13 @@ def fit_effect_in_loop(
         )
     scale = np.abs(forward[good])
     seen = _Seen(
-        f[good], notched.torque[good] / scale, forward[good] / scale, own[good] / scale,
-        notched.torque[good] / driven[good], deviation[good],
-    )  # fmt: skip
+        f[good],
+        notched.torque[good] / scale,
+        forward[good] / scale,
+        own[good] / scale,
+        notched.torque[good] / driven[good],
+        deviation[good],
+    )
     found = _fitted(seen, path)
     centre = found.notch.center_hz
     about = np.count_nonzero((seen.frequency_hz > centre / 2) & (seen.frequency_hz < centre * 2))
@@ -188,11 +195,16 @@ def _fitted(seen: _Seen, path: SignalPath) -> NotchEffect:
     high = np.log([1.4 * centre, 4.0 * centre, -threshold.DEEPEST_DB])
     fits = [
         scipy.optimize.least_squares(
-            rest, np.log([centre, share * centre, depth]), bounds=(low, high), loss="soft_l1",
-            f_scale=0.1, max_nfev=60,
+            rest,
+            np.log([centre, share * centre, depth]),
+            bounds=(low, high),
+            loss="soft_l1",
+            f_scale=0.1,
+            max_nfev=60,
         )
-        for share in (0.05, 0.3, 1.0) for depth in (8.0, 25.0)
-    ]  # fmt: skip
+        for share in (0.05, 0.3, 1.0)
+        for depth in (8.0, 25.0)
+    ]
     found = notch_of(min(fits, key=lambda fit: float(fit.cost)).x)
     error = float(np.median(np.abs(seen.rest(found, path))))
     return NotchEffect(found, error, float(np.median(seen.deviation)))

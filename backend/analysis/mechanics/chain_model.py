@@ -118,8 +118,12 @@ def modal_start(x: FloatArray) -> FloatArray:
     out = [np.log(model.gain), np.log(max(model.pole_rad_s, 1e-6)), *x[2:RIGID_PARAMETERS]]
     for m in model.modes:
         part = m.zero_rad_s / (TURN * m.frequency_hz)
-        out += [np.log(m.frequency_hz), np.log(min(m.damping, 0.99)),
-                np.log(max(m.residue, 1e-12)), part]  # fmt: skip
+        out += [
+            np.log(m.frequency_hz),
+            np.log(min(m.damping, 0.99)),
+            np.log(max(m.residue, 1e-12)),
+            part,
+        ]
     assert (len(out) - RIGID_PARAMETERS) % MODE_PARAMETERS == 0
     return np.array(out)
 
@@ -150,8 +154,12 @@ def responses_with_load(
     loads = [tuple(float(v) for v in row) for row in loads_of(x)]
     inertias = [float(np.exp(x[0])), *(load[0] for load in loads)]
 
-    def hung(inertia: FloatArray | float, stiffness: FloatArray | float,
-             damping: FloatArray | float, behind: ComplexArray) -> ComplexArray:  # fmt: skip
+    def hung(
+        inertia: FloatArray | float,
+        stiffness: FloatArray | float,
+        damping: FloatArray | float,
+        behind: ComplexArray,
+    ) -> ComplexArray:
         coupling, hanging = stiffness / s + damping, s * inertia + behind
         return np.asarray(coupling * hanging / (coupling + hanging))
 

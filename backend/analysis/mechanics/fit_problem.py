@@ -71,9 +71,12 @@ class View:
     def thinned(self, lines: npt.NDArray[np.int64]) -> View:
         """Some of the lines."""
         return replace(
-            self, f=self.f[lines], g=self.g[lines], weight=self.weight[lines],
+            self,
+            f=self.f[lines],
+            g=self.g[lines],
+            weight=self.weight[lines],
             sampler=self.sampler.thinned(lines),
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True)

@@ -79,9 +79,12 @@ def _beyond_chance(s: LineSpectra, share: float, left: float) -> bool:
 
 
 def _least(
-    s: LineSpectra, plain: list[ComplexArray], turned: list[ComplexArray], weight: FloatArray,
+    s: LineSpectra,
+    plain: list[ComplexArray],
+    turned: list[ComplexArray],
+    weight: FloatArray,
     limit: float,
-) -> tuple[float, float]:  # fmt: skip
+) -> tuple[float, float]:
     """Friction up to ``limit`` that leaves the least scatter, and the share that it leaves."""
     found = scipy.optimize.minimize_scalar(
         _scatter, bounds=(0.0, limit), method="bounded", args=(s, plain, turned, weight)
@@ -91,9 +94,12 @@ def _least(
 
 
 def _scatter(
-    coulomb_nm: float, s: LineSpectra, plain: list[ComplexArray], turned: list[ComplexArray],
+    coulomb_nm: float,
+    s: LineSpectra,
+    plain: list[ComplexArray],
+    turned: list[ComplexArray],
     weight: FloatArray,
-) -> float:  # fmt: skip
+) -> float:
     """What no linear mechanics explain with this friction removed, as torque."""
     inputs = [u - coulomb_nm * d for u, d in zip(plain, turned, strict=True)]
     g, _, _ = instrument_estimate(s, inputs)

@@ -71,10 +71,13 @@ def design_moves(
         share = 1.0 if i % 2 == 0 else 0.5
         parts.append(
             _there_and_back(
-                0.95 * limits.travel_rad, share * limits.speed_rad_s,
-                acceleration * (1.0 if i % 2 == 0 else 0.6), dwell_s, sample_rate_hz,
+                0.95 * limits.travel_rad,
+                share * limits.speed_rad_s,
+                acceleration * (1.0 if i % 2 == 0 else 0.6),
+                dwell_s,
+                sample_rate_hz,
             )
-        )  # fmt: skip
+        )
     velocity: FloatArray = np.concatenate(parts)
     width = max(1, round(smoothing_s * sample_rate_hz))
     velocity = np.convolve(velocity, np.ones(width) / width)

@@ -69,17 +69,25 @@ class Task:
     loop: LoopModel | None = None
 
     def trial(
-        self, path: SignalPath, coulomb_nm: float | None = None, motion: SampledFit | None = None,
+        self,
+        path: SignalPath,
+        coulomb_nm: float | None = None,
+        motion: SampledFit | None = None,
         start: Solution | None = None,
-    ) -> Trial:  # fmt: skip
+    ) -> Trial:
         """Estimates and fit with one path; ``motion`` is a fit before, which shows the images."""
         if self.quantity == "closed_loop":
             raise ValueError("mechanics are identified from torque, not from a loop's reference")
         views = self.views(path, coulomb_nm)
         solution = fit_sampled_model(
-            views.velocity, path, from_position=views.position, loop=self._loop(path, motion),
-            max_modes=self.max_modes, start=start, inertia=self.inertia,
-        )  # fmt: skip
+            views.velocity,
+            path,
+            from_position=views.position,
+            loop=self._loop(path, motion),
+            max_modes=self.max_modes,
+            start=start,
+            inertia=self.inertia,
+        )
         return Trial(views, path, solution)
 
     def trials(self, paths: tuple[SignalPath, ...]) -> list[Trial]:
@@ -130,9 +138,13 @@ class Task:
         if any(record.position is None for record in self.records):
             return Views(velocity, None)
         position = estimate_periodic(
-            self.records, path, self.quantity, coulomb_nm=velocity.coulomb_nm,
-            jitter_s=self.jitter_s, position=True,
-        )  # fmt: skip
+            self.records,
+            path,
+            self.quantity,
+            coulomb_nm=velocity.coulomb_nm,
+            jitter_s=self.jitter_s,
+            position=True,
+        )
         return Views(velocity, position)
 
     def refined(self, first: Trial, path_of: Callable[[SampledFit], SignalPath]) -> Trial:
@@ -204,9 +216,13 @@ class Task:
         """
         closed = self.quantity == "torque_injection"
         covariance = path_covariance(
-            self.records, trial.path, loop_closed=closed, corner_known=corner_known,
-            motion=trial.fit if closed else None, controller=self.loop,
-        )  # fmt: skip
+            self.records,
+            trial.path,
+            loop_closed=closed,
+            corner_known=corner_known,
+            motion=trial.fit if closed else None,
+            controller=self.loop,
+        )
         problem = trial.solution.problem
         shifted = []
         for n in range(len(covariance)):

@@ -108,9 +108,14 @@ def identify_mechanics(
 
 
 def identify_with_path(
-    records: tuple[Record, ...], path: SignalPath, quantity: Quantity, *, hold_known: bool,
-    inertia: KnownInertia | None = None, loop: ReferenceLoop | None = None,
-) -> Identification:  # fmt: skip
+    records: tuple[Record, ...],
+    path: SignalPath,
+    quantity: Quantity,
+    *,
+    hold_known: bool,
+    inertia: KnownInertia | None = None,
+    loop: ReferenceLoop | None = None,
+) -> Identification:
     """As `identify_mechanics`, with what ``path`` does not give found from the recording.
 
     The torque alone cannot always show whether setpoints are interpolated; the motion can: a

@@ -174,16 +174,25 @@ def estimate_inertia(
     highest_hz = threshold.SWINGS_TO * cutoff_hz
     terms, matrix, bends = _machine(matrix, torque, motion, keep, sample_rate_hz, highest_hz)
     found, sizes = _regress(
-        matrix[keep], torque[keep], bends[keep], keep,
-        round(threshold.ALIKE_S * sample_rate_hz), saturated_share, motor_inertia_kgm2,
-    )  # fmt: skip
+        matrix[keep],
+        torque[keep],
+        bends[keep],
+        keep,
+        round(threshold.ALIKE_S * sample_rate_hz),
+        saturated_share,
+        motor_inertia_kgm2,
+    )
     return replace(found, load_terms=terms.sized(motion, sizes[_RIGID:]))
 
 
 def _machine(
-    rigid: FloatArray, torque: FloatArray, motion: Motion, keep: BoolArray, rate: float,
+    rigid: FloatArray,
+    torque: FloatArray,
+    motion: Motion,
+    keep: BoolArray,
+    rate: float,
     highest_hz: float,
-) -> tuple[Terms, FloatArray, FloatArray]:  # fmt: skip
+) -> tuple[Terms, FloatArray, FloatArray]:
     """What of the machine shows in the torque in addition to a rigid inertia and friction.
 
     Returns the terms, all columns (the rigid ones, those of the terms, those of loads that
@@ -246,9 +255,14 @@ def _nothing(saturated_share: float) -> InertiaResult:
 
 
 def _intervals(
-    a: FloatArray, bends: FloatArray, x: FloatArray, residual: FloatArray, weight: FloatArray,
-    keep: BoolArray, block: int,
-) -> list[Interval]:  # fmt: skip
+    a: FloatArray,
+    bends: FloatArray,
+    x: FloatArray,
+    residual: FloatArray,
+    weight: FloatArray,
+    keep: BoolArray,
+    block: int,
+) -> list[Interval]:
     """J, viscous, Coulomb and gravity torque with their 95 % intervals.
 
     ``bends`` are what frequencies and dampings of swings, which were searched, do to the torque.
@@ -277,9 +291,14 @@ def _intervals(
 
 
 def _regress(
-    a: FloatArray, b: FloatArray, bends: FloatArray, keep: BoolArray, block: int,
-    saturated_share: float, motor_inertia_kgm2: float | None,
-) -> tuple[InertiaResult, FloatArray]:  # fmt: skip
+    a: FloatArray,
+    b: FloatArray,
+    bends: FloatArray,
+    keep: BoolArray,
+    block: int,
+    saturated_share: float,
+    motor_inertia_kgm2: float | None,
+) -> tuple[InertiaResult, FloatArray]:
     """Solve, judge and report; the result, and the size of every column."""
     scale = np.maximum(np.max(np.abs(a), axis=0), 1e-12)
     x, weight = _huber(a / scale, b)

@@ -121,7 +121,7 @@ def load_side(sides: TwoSides, motor_inertia_kgm2: float | None) -> LoadSide:
     sizes = tuple(
         (order, value(partial(_Fit.amplitude, number=n), floor))
         for n, order in enumerate(shape.orders)
-    )  # fmt: skip
+    )
     return LoadSide(
         counts_per_rev=whole.counts_per_rad * _TURN,
         lost_motion_rad=value(lambda fit: fit.lost, floor),
@@ -131,10 +131,12 @@ def load_side(sides: TwoSides, motor_inertia_kgm2: float | None) -> LoadSide:
         load_inertia_kgm2=_load_inertia(table, groups, motor_inertia_kgm2),
         orders=sizes,
         error_span_rad=value(lambda fit: float(np.ptp(columns @ fit.errors)), floor),
-        error_angle_rad=angle, error_rad=columns @ whole.errors,
-        whole_revolution=shape.powers == 0, pulled=pulled,
+        error_angle_rad=angle,
+        error_rad=columns @ whole.errors,
+        whole_revolution=shape.powers == 0,
+        pulled=pulled,
         residual_rad=float(np.sqrt(whole.square)),
-    )  # fmt: skip
+    )
 
 
 # --- flanks ----------------------------------------------------------------------------------
@@ -192,9 +194,7 @@ def _pulled(table: Table) -> bool:
     return abs(_pulls(table, largest)[0]) > threshold.PULLED * largest
 
 
-def _agrees(
-    table: Table, fit: _Fit, flanks: FloatArray, pull: float, largest: float
-) -> bool:  # fmt: skip
+def _agrees(table: Table, fit: _Fit, flanks: FloatArray, pull: float, largest: float) -> bool:
     """Whether the friction that was found puts the load on the flanks that were assumed."""
     gap = abs(fit.half_gap or 0.0)
     if fit.friction <= max(threshold.SMALL * gap, threshold.COUNTS / abs(fit.counts_per_rad)):
@@ -261,10 +261,14 @@ def _fit(table: Table, flanks: FloatArray) -> _Fit:
     first, last = table.fixed.shape[1] - 4, table.fixed.shape[1]
     forward, backward = found[last - 3], found[last - 2]
     return _Fit(
-        scale, float(-found[-3] / scale) if separable else None, float(-found[-2] / scale),
-        float(-found[-1] / scale), found[1:first] / scale, float((backward - forward) / scale),
+        scale,
+        float(-found[-3] / scale) if separable else None,
+        float(-found[-2] / scale),
+        float(-found[-1] / scale),
+        found[1:first] / scale,
+        float((backward - forward) / scale),
         float(np.mean(rest**2)) / scale**2,
-    )  # fmt: skip
+    )
 
 
 def _residual(table: Table, flanks: FloatArray, kept: BoolArray) -> FloatArray:
@@ -273,9 +277,7 @@ def _residual(table: Table, flanks: FloatArray, kept: BoolArray) -> FloatArray:
     return np.asarray(table.counts - columns @ _solved(columns[used], table.counts[used]))
 
 
-def _load_inertia(
-    table: Table, groups: IntArray, motor_inertia_kgm2: float | None
-) -> Value | None:  # fmt: skip
+def _load_inertia(table: Table, groups: IntArray, motor_inertia_kgm2: float | None) -> Value | None:
     """What the torque beyond the motor's own acceleration accelerates, in kg·m²."""
     if motor_inertia_kgm2 is None:
         return None

@@ -105,9 +105,13 @@ class _Problem:
     """Least squares in the inertias, for given frequencies and dampings."""
 
     def __init__(
-        self, others: FloatArray, torque: FloatArray, acceleration: FloatArray,
-        rows: IntArray, rate: float,
-    ) -> None:  # fmt: skip
+        self,
+        others: FloatArray,
+        torque: FloatArray,
+        acceleration: FloatArray,
+        rows: IntArray,
+        rate: float,
+    ) -> None:
         scale = np.maximum(np.max(np.abs(others), axis=0), 1e-12)
         self._others, self._torque = others / scale, torque
         self._inertia_scale = float(scale[0])

@@ -36,9 +36,12 @@ class ModeUncertainty:
     residue: float
 
     def with_band(
-        self, mode: Mode, frequency_hz: FloatArray, distortion: FloatArray,
+        self,
+        mode: Mode,
+        frequency_hz: FloatArray,
+        distortion: FloatArray,
         by_place: FloatArray | None,
-    ) -> ModeUncertainty:  # fmt: skip
+    ) -> ModeUncertainty:
         """Wider by what the model leaves open: ``distortion`` and ``by_place`` [lines] of the band.
 
         A line's phase next to a mode turns by 1/damping of a relative change of its frequency. An
@@ -64,9 +67,13 @@ class ModeUncertainty:
 
 
 def mode_uncertainties(
-    problem: Problem, x: FloatArray, covariance: FloatArray, together: Sequence[ComplexArray],
-    *, friction_seen: bool,
-) -> tuple[ModeUncertainty, ...]:  # fmt: skip
+    problem: Problem,
+    x: FloatArray,
+    covariance: FloatArray,
+    together: Sequence[ComplexArray],
+    *,
+    friction_seen: bool,
+) -> tuple[ModeUncertainty, ...]:
     """For each mode of the model at ``x``, in its order.
 
     ``covariance`` is that of ``x``; ``together`` are, per view, one deviation [lines] of the

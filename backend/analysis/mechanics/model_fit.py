@@ -114,9 +114,12 @@ def fit_sampled_model(
 
 
 def views_of(
-    frf: Frf | None, from_position: Frf | None, path: SignalPath, loop: LoopModel,
+    frf: Frf | None,
+    from_position: Frf | None,
+    path: SignalPath,
+    loop: LoopModel,
     use: BoolArray | None = None,
-) -> tuple[View, ...]:  # fmt: skip
+) -> tuple[View, ...]:
     """The estimates as the fit sees them, all lines; those not in ``use`` weigh nothing."""
     given = [part for part in (frf, from_position) if part is not None]
     if use is None:

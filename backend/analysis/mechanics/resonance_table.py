@@ -42,11 +42,14 @@ def resonance_table(
         if shown and sure and inside and mode.damping < 1.0:
             rows.append(
                 Resonance(
-                    "resonance", mode.frequency_hz, mode.damping, height,
+                    "resonance",
+                    mode.frequency_hz,
+                    mode.damping,
+                    height,
                     _around(mode.frequency_hz, known.frequency if known else None),
                     known.damping_interval(mode.damping, _CI95) if known else None,
                 )
-            )  # fmt: skip
+            )
     kept = [row.frequency_hz for row in rows]
     for frequency, damping in model.antiresonances():
         # An antiresonance belongs to the next mode above it, which may lie beyond the band.

@@ -23,9 +23,12 @@ from backend.analysis.thresholds import reversals as threshold
 
 
 def with_balanced_reversals(
-    records: tuple[Record, ...], quantity: Quantity, fit: SampledFit, coulomb_nm: float,
+    records: tuple[Record, ...],
+    quantity: Quantity,
+    fit: SampledFit,
+    coulomb_nm: float,
     lag_s: float,
-) -> tuple[Record, ...]:  # fmt: skip
+) -> tuple[Record, ...]:
     """The records with directions of motion that the balance of torques shows, by this fit.
 
     ``lag_s`` is how late the speed is reported (:func:`line_spectra.speed_lag_s`). They are as
@@ -49,9 +52,13 @@ def with_balanced_reversals(
 
 
 def _reported(
-    record: Record, by_speed: FloatArray, quantity: Quantity, fit: SampledFit, coulomb_nm: float,
+    record: Record,
+    by_speed: FloatArray,
+    quantity: Quantity,
+    fit: SampledFit,
+    coulomb_nm: float,
     motor_kgm2: float,
-) -> FloatArray | None:  # fmt: skip
+) -> FloatArray | None:
     """Mean direction between each sample and the next [n]; None where the balance is too weak."""
     path, period_s = fit.path, 1.0 / fit.path.sample_rate_hz
     velocity, drawn_nm = _motion(record, quantity, fit, motor_kgm2)

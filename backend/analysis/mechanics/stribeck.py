@@ -149,9 +149,12 @@ def _columns(speed: FloatArray, stribeck: float | None, exponent: float) -> Floa
 
 
 def _fit(
-    speed: FloatArray, torque: FloatArray, weight: FloatArray, stribeck: float | None,
+    speed: FloatArray,
+    torque: FloatArray,
+    weight: FloatArray,
+    stribeck: float | None,
     exponent: float,
-) -> Fit:  # fmt: skip
+) -> Fit:
     columns = _columns(speed, stribeck, exponent) * weight[:, None]
     scale = np.max(np.abs(columns), axis=0)
     values = np.linalg.lstsq(columns / scale, torque * weight, rcond=None)[0]

@@ -142,8 +142,11 @@ def distortion(
     return Distortion(
         # What lies below the first empty bins is shown by all of them, not by one next to a valley.
         np.asarray(np.interp(frf.frequency_hz, f, share, left=float(np.median(share)))),
-        float(np.median(share[upper])), float(np.median(plain[upper])), _ratio(falls), detected,
-    )  # fmt: skip
+        float(np.median(share[upper])),
+        float(np.median(plain[upper])),
+        _ratio(falls),
+        detected,
+    )
 
 
 def _detected(
@@ -193,9 +196,14 @@ class _Way:
     placed: bool
 
     def seen(
-        self, record: Record, between: Excitation, good: list[int], path: SignalPath,
-        own: ComplexArray | float, friction: ComplexArray,
-    ) -> _Seen:  # fmt: skip
+        self,
+        record: Record,
+        between: Excitation,
+        good: list[int],
+        path: SignalPath,
+        own: ComplexArray | float,
+        friction: ComplexArray,
+    ) -> _Seen:
         """``own`` [periods, bins] is the motion by the loop's own torque, ``friction`` by that."""
         if self.placed:
             moved = velocity_from_position(record, between, good, path.sample_rate_hz)

@@ -142,9 +142,11 @@ class _Lines:
 
 
 def evaluate(
-    signal_in: FloatArray, signal_out: FloatArray, sample_rate_hz: float,
+    signal_in: FloatArray,
+    signal_out: FloatArray,
+    sample_rate_hz: float,
     band_hz: tuple[float, float] | None = None,
-) -> ForeignResponse:  # fmt: skip
+) -> ForeignResponse:
     """Response from input to output, both [n], evenly sampled.
 
     Raises:
@@ -181,10 +183,13 @@ def _cut(lines: _Lines, band_hz: tuple[float, float] | None) -> _Lines:
         raise NoResponse("few-lines", lines=count, least=LEAST_LINES)
     kept = lines.frequency_hz[use]
     return replace(
-        lines, frequency_hz=kept, response=lines.response[use],
-        coherence=lines.coherence[use], noise=lines.noise[use],
+        lines,
+        frequency_hz=kept,
+        response=lines.response[use],
+        coherence=lines.coherence[use],
+        noise=lines.noise[use],
         empty=lines.empty.within(kept[0], kept[-1]) if lines.empty is not None else None,
-    )  # fmt: skip
+    )
 
 
 def _by_periods(u: FloatArray, y: FloatArray, rate: float, period: int) -> _Lines:
@@ -301,9 +306,12 @@ def _by_window(u: FloatArray, y: FloatArray, rate: float) -> _Lines:
     found = local_polynomial(spectra[0], spectra[1], np.asarray(centres), half)
     relative = np.sqrt(found.variance / 2.0) / np.maximum(np.abs(found.response), 1e-300)
     return _Lines(
-        centres * (rate / n), found.response, found.coherence, np.asarray(relative),
+        centres * (rate / n),
+        found.response,
+        found.coherence,
+        np.asarray(relative),
         independent=False,
-    )  # fmt: skip
+    )
 
 
 def _with_band(lines: _Lines) -> ForeignResponse:
@@ -343,9 +351,11 @@ def _with_feedback(band: RepeatBand, coherence: FloatArray) -> RepeatBand:
     noise = np.minimum(1.0 / np.maximum(seen, 1e-3) - 1.0, threshold.MOST_FEEDBACK)
     own = threshold.FEEDBACK * noise
     return replace(
-        band, real=np.hypot(band.real, own), imag=np.hypot(band.imag, own),
+        band,
+        real=np.hypot(band.real, own),
+        imag=np.hypot(band.imag, own),
         level=np.hypot(band.level, own),
-    )  # fmt: skip
+    )
 
 
 def _fitted(lines: _Lines) -> ProductFit | None:

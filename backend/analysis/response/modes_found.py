@@ -53,11 +53,14 @@ def modes_of(fit: ProductFit, f: FloatArray) -> tuple[FoundMode, ...]:
                     i,
                     Resonance(
                         "resonance" if kind == "resonance" else "antiresonance",
-                        pair.frequency_hz, pair.damping, signed,
-                        _around(pair.frequency_hz, spread), _around(pair.damping, of_damping),
+                        pair.frequency_hz,
+                        pair.damping,
+                        signed,
+                        _around(pair.frequency_hz, spread),
+                        _around(pair.damping, of_damping),
                     ),
                 )
-            )  # fmt: skip
+            )
     return tuple(sorted(found, key=lambda mode: mode.row.frequency_hz))
 
 

@@ -59,9 +59,14 @@ def find_paths(
 
 
 def path_covariance(
-    records: tuple[Record, ...], path: SignalPath, *, loop_closed: bool, corner_known: bool,
-    motion: SampledFit | None = None, controller: LoopModel | None = None,
-) -> FloatArray:  # fmt: skip
+    records: tuple[Record, ...],
+    path: SignalPath,
+    *,
+    loop_closed: bool,
+    corner_known: bool,
+    motion: SampledFit | None = None,
+    controller: LoopModel | None = None,
+) -> FloatArray:
     """How exactly the torque shows a path that it was found with: cycles and log of the corner.
 
     Covariance [2, 2], or [1, 1] without a corner. What the torque leaves open is as unusual as
@@ -148,9 +153,12 @@ class PathFit:
 
     @staticmethod
     def of(
-        records: tuple[Record, ...], path: SignalPath, loop_closed: bool,
-        motion: SampledFit | None, controller: LoopModel | None = None,
-    ) -> PathFit:  # fmt: skip
+        records: tuple[Record, ...],
+        path: SignalPath,
+        loop_closed: bool,
+        motion: SampledFit | None,
+        controller: LoopModel | None = None,
+    ) -> PathFit:
         """From recordings, as `find_paths` has them."""
         f, sent, torque, velocity = mean_spectra(records)
         size = np.sqrt(np.abs(sent) / np.sum(np.abs(sent)))

@@ -44,9 +44,13 @@ class ReferenceLoop:
 
 
 def reference_gain(
-    records: tuple[Record, ...], path: SignalPath, integral_rad_s: float | None, *,
-    hold_known: bool, motion: SampledFit | None = None,
-) -> ReferenceLoop:  # fmt: skip
+    records: tuple[Record, ...],
+    path: SignalPath,
+    integral_rad_s: float | None,
+    *,
+    hold_known: bool,
+    motion: SampledFit | None = None,
+) -> ReferenceLoop:
     """Controller and path that explain the recorded torque.
 
     ``records`` have the reference as what was sent, in the unit of the response.

@@ -60,9 +60,14 @@ def reference_paths(
 
 
 def _fitted(
-    hold: Hold, f: FloatArray, closed: ComplexArray, expected: ComplexArray, s: ComplexArray,
-    weight: FloatArray, rate_hz: float,
-) -> ReferencePath:  # fmt: skip
+    hold: Hold,
+    f: FloatArray,
+    closed: ComplexArray,
+    expected: ComplexArray,
+    s: ComplexArray,
+    weight: FloatArray,
+    rate_hz: float,
+) -> ReferencePath:
     """Delay of the reference and delay and size of the loop, by robust linear least squares."""
     rows = np.log(closed / expected)
     turn = -2j * np.pi * f
@@ -84,6 +89,11 @@ def _fitted(
     stds = np.sqrt(np.diag(covariance)) * max(misfit, 1.0)
     late = float(x[0]) if abs(x[0]) > threshold.SURE * stds[0] else 0.0
     return ReferencePath(
-        hold, float(x[0]), float(stds[0]), misfit, np.asarray(closed * np.exp(-turn * late)),
-        (float(x[1]), float(stds[1])), (float(x[2]), float(stds[2])),
-    )  # fmt: skip
+        hold,
+        float(x[0]),
+        float(stds[0]),
+        misfit,
+        np.asarray(closed * np.exp(-turn * late)),
+        (float(x[1]), float(stds[1])),
+        (float(x[2]), float(stds[2])),
+    )

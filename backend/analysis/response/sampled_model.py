@@ -90,19 +90,29 @@ class Sampler:
     def thinned(self, lines: npt.NDArray[np.int64]) -> Sampler:
         """Some of the lines."""
         return Sampler(
-            self.frequency_hz[:, lines], self.true, self.torque[:, lines],
-            self.reported[:, lines], self.controller[:, lines], self.seen_as[:, lines],
-            self.command[lines], self.as_reported[lines],
-        )  # fmt: skip
+            self.frequency_hz[:, lines],
+            self.true,
+            self.torque[:, lines],
+            self.reported[:, lines],
+            self.controller[:, lines],
+            self.seen_as[:, lines],
+            self.command[lines],
+            self.as_reported[lines],
+        )
 
     def nearest(self, images: int) -> Sampler:
         """Only so many images to either side: what comes from further off is weak."""
         rows = slice(max(self.true - images, 0), self.true + images + 1)
         return Sampler(
-            self.frequency_hz[rows], min(self.true, images), self.torque[rows],
-            self.reported[rows], self.controller[rows], self.seen_as[rows], self.command,
+            self.frequency_hz[rows],
+            min(self.true, images),
+            self.torque[rows],
+            self.reported[rows],
+            self.controller[rows],
+            self.seen_as[rows],
+            self.command,
             self.as_reported,
-        )  # fmt: skip
+        )
 
     def single(self) -> Sampler:
         """In single precision, to rank very many."""
@@ -189,9 +199,13 @@ class SampledFit:
         """What an estimate that ignores images returns, relative to the true response."""
         late = self.position_delay_s if integrated else self.delay_s
         seen = seen_response(
-            frequency_hz, self.model, self.delay_s, self.path, self.loop,
+            frequency_hz,
+            self.model,
+            self.delay_s,
+            self.path,
+            self.loop,
             position_delay_s=late if integrated else None,
-        )  # fmt: skip
+        )
         true = self.model.response(frequency_hz) * delay_response(frequency_hz, late)
         return np.asarray(seen / true, dtype=np.complex128)
 

@@ -46,9 +46,12 @@ class Uncertainty:
 
 
 def uncertainty(
-    problem: Problem, x: FloatArray, shifted: Sequence[Shifted], path_covariance: FloatArray,
+    problem: Problem,
+    x: FloatArray,
+    shifted: Sequence[Shifted],
+    path_covariance: FloatArray,
     moved: FloatArray,
-) -> Uncertainty:  # fmt: skip
+) -> Uncertainty:
     """Joint uncertainty at a solution ``x``; ``path_covariance`` [n, n] is known of the n shifts.
 
     ``moved`` [n] is how far the path already is from where the torque alone would have it.

@@ -53,8 +53,12 @@ class Record:
     def __post_init__(self) -> None:
         n = self.excitation.samples.size
         for signal in (
-            self.response, self.torque, self.valid, self.position, self.known_direction,
-        ):  # fmt: skip
+            self.response,
+            self.torque,
+            self.valid,
+            self.position,
+            self.known_direction,
+        ):
             if signal is not None and signal.shape != (n,):
                 raise ValueError(f"signals must have {n} samples, as the excitation has")
 
@@ -302,9 +306,13 @@ def _centre_of_interval(frequency_hz: FloatArray, sample_rate_hz: float) -> Comp
 
 
 def continuous_input(
-    s: LineSpectra, path: SignalPath, quantity: Quantity, coulomb_nm: float = 0.0,
-    *, position: bool = False,
-) -> list[ComplexArray]:  # fmt: skip
+    s: LineSpectra,
+    path: SignalPath,
+    quantity: Quantity,
+    coulomb_nm: float = 0.0,
+    *,
+    position: bool = False,
+) -> list[ComplexArray]:
     """What really drove the measured quantity, per realisation [periods, lines]."""
     f = s.frequency_hz
     inputs: list[ComplexArray]
@@ -333,9 +341,13 @@ def _late(s: LineSpectra, path: SignalPath, *, position: bool) -> ComplexArray:
 
 
 def friction_input(
-    s: LineSpectra, path: SignalPath, quantity: Quantity, inputs: list[ComplexArray],
-    *, position: bool = False,
-) -> list[ComplexArray]:  # fmt: skip
+    s: LineSpectra,
+    path: SignalPath,
+    quantity: Quantity,
+    inputs: list[ComplexArray],
+    *,
+    position: bool = False,
+) -> list[ComplexArray]:
     """What one Nm of Coulomb friction takes from the inputs, per realisation [periods, lines].
 
     Within a closed speed loop it takes what of the reference would have made that torque. Its

@@ -115,9 +115,14 @@ def fit_mode(ring: RingDown, low_hz: float, high_hz: float) -> ModeFit | None:
     )
     std = _deviations(np.asarray(found.jac), found.fun, int(np.count_nonzero(moving)))
     return ModeFit(
-        frequency, damping, frequency * float(std[0]), damping * float(std[1]), explained,
-        np.hypot(solved[0], solved[1]), noise,
-    )  # fmt: skip
+        frequency,
+        damping,
+        frequency * float(std[0]),
+        damping * float(std[1]),
+        explained,
+        np.hypot(solved[0], solved[1]),
+        noise,
+    )
 
 
 def common_mode(rings: list[RingDown], low_hz: float, high_hz: float) -> CommonMode | None:

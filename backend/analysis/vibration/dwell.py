@@ -56,9 +56,13 @@ class Followed:
 
 
 def followed(
-    signal: FloatArray, valid: BoolArray, frequency_hz: float, rate_hz: float, first: int,
+    signal: FloatArray,
+    valid: BoolArray,
+    frequency_hz: float,
+    rate_hz: float,
+    first: int,
     harmonics: int,
-) -> Followed:  # fmt: skip
+) -> Followed:
     """Amplitudes in blocks of whole periods; ``first`` is the sample number of ``signal[0]``.
 
     By least squares with a polynomial in each block, so that slow motion and lost samples do not

@@ -173,6 +173,10 @@ def _component(kind: Kind, group: Sequence[Seen]) -> Component:
     half = float(scipy.special.stdtrit(value.size - 1, 0.975) * error)
     rps = [one.speed_rps for one in group]
     return Component(
-        kind, mean, (mean - half, mean + half), len({one.speed for one in group}),
-        max(rps), min(rps),
-    )  # fmt: skip
+        kind,
+        mean,
+        (mean - half, mean + half),
+        len({one.speed for one in group}),
+        max(rps),
+        min(rps),
+    )

@@ -99,11 +99,14 @@ def sinusoids(segment: Segment, low_hz: float, high_hz: float) -> list[Sinusoid]
     per_ratio = np.sqrt(3.0) / (np.pi * segment.duration_s)
     return [
         Sinusoid(
-            found[i][0], float(per_ratio * deviations[i] / abs(amplitudes[i])),
-            float(abs(amplitudes[i])), float(deviations[i]), found[i][1],
+            found[i][0],
+            float(per_ratio * deviations[i] / abs(amplitudes[i])),
+            float(abs(amplitudes[i])),
+            float(deviations[i]),
+            found[i][1],
         )
         for i in order
-    ]  # fmt: skip
+    ]
 
 
 def _together(segment: Segment, components: list[tuple[float, bool]]) -> list[tuple[float, bool]]:

@@ -22,8 +22,11 @@ from backend.tools.registry import TOOLS
 #: Longest that an answer waits. The change itself never does.
 WAIT_S = 1.0
 _ACTIONS: dict[str, Action] = {
-    "POST": "made", "PUT": "changed", "PATCH": "changed", "DELETE": "deleted",
-}  # fmt: skip
+    "POST": "made",
+    "PUT": "changed",
+    "PATCH": "changed",
+    "DELETE": "deleted",
+}
 _DRIVE = "/drives/{drive_id}"
 #: Routes whose changes are recorded where they happen: value by value, as jobs, or as what people
 #: do. `tests/security/test_every_change_is_reported.py` asks each of them.

@@ -34,13 +34,23 @@ _CHUNK = 200
 
 
 def _filter(
-    kind: list[AuditKind] | None, person: str, axis: str, station: str, words: str,
-    since: datetime | None, until: datetime | None,
-) -> Filter:  # fmt: skip
+    kind: list[AuditKind] | None,
+    person: str,
+    axis: str,
+    station: str,
+    words: str,
+    since: datetime | None,
+    until: datetime | None,
+) -> Filter:
     return Filter(
-        kinds=tuple(kind or ()), person=person, axis=axis, station=station, words=words,
-        since=in_utc(since), until=in_utc(until),
-    )  # fmt: skip
+        kinds=tuple(kind or ()),
+        person=person,
+        axis=axis,
+        station=station,
+        words=words,
+        since=in_utc(since),
+        until=in_utc(until),
+    )
 
 
 def _message(event: Event) -> AuditEvent:
@@ -109,9 +119,13 @@ async def verify_audit(
     known = Anchor(int(number), digest) if anchor else None
     verdict = await bench.records.store.call(bench.records.trail.verify, known)
     return AuditVerdict(
-        ok=verdict.ok, entries=verdict.entries, head=str(verdict.head), broken=verdict.broken,
-        why=words_of(verdict.why), why_message=message_or_none(verdict.why),
-    )  # fmt: skip
+        ok=verdict.ok,
+        entries=verdict.entries,
+        head=str(verdict.head),
+        broken=verdict.broken,
+        why=words_of(verdict.why),
+        why_message=message_or_none(verdict.why),
+    )
 
 
 @router.get("/export", response_class=StreamingResponse)

@@ -64,9 +64,13 @@ async def motion_class(profile: ProfileName, key: Key) -> MotionClass:
 
 @router.put(_PATH)
 async def set_motion_class(
-    bench: TheBench, people: ThePeople, me: Me, profile: ProfileName, key: Key,
+    bench: TheBench,
+    people: ThePeople,
+    me: Me,
+    profile: ProfileName,
+    key: Key,
     request: MotionClassRequest,
-) -> MotionClass:  # fmt: skip
+) -> MotionClass:
     """Say what writing an object of an imported profile does, on one's own responsibility.
 
     Another class than ``energises`` takes the right to move as well.
@@ -122,8 +126,11 @@ async def _changed(bench: Bench, profile: str, parameter: Parameter) -> MotionCl
             connected.drive.profile = known
     bench.journal.add(
         text(
-            "journal.motion-class", title=known.title, key=parameter.key, name=parameter.name,
+            "journal.motion-class",
+            title=known.title,
+            key=parameter.key,
+            name=parameter.name,
             motion=parameter.motion,
         )
-    )  # fmt: skip
+    )
     return _answer(profile, parameter.key)

@@ -121,9 +121,14 @@ async def _export(
     name = next(iter(files))
     for drive, each, axis in zip(drives, given, axes, strict=True):
         made = HandedOver(
-            datetime.now(UTC), acting_person(), request.format, name, digest(files[name]),
-            each.set_file, {write.key: write.raw for write in axis.writes},
-        )  # fmt: skip
+            datetime.now(UTC),
+            acting_person(),
+            request.format,
+            name,
+            digest(files[name]),
+            each.set_file,
+            {write.key: write.raw for write in axis.writes},
+        )
         await asyncio.to_thread(handover_log(bench).add, drive.id, made)
         bench.journal.add(
             text(
@@ -166,13 +171,16 @@ def _axes(
     return [
         fitting(
             hand_over(
-                content, drive.profile, choice=request.choice, only=request.only,
+                content,
+                drive.profile,
+                choice=request.choice,
+                only=request.only,
                 motor_individual=request.include_motor_individual,
             ),
             request.format,
         )
         for content, drive in zip(contents, drives, strict=True)
-    ]  # fmt: skip
+    ]
 
 
 def _sources(request: HandoverChoice) -> tuple[tuple[bytes, str], ...]:

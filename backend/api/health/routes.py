@@ -110,9 +110,13 @@ async def read_health_permission(
 
 @router.put("/drives/{drive_id}/health/permission")
 async def permit_health(
-    bench: TheBench, connected: Controlled, me: Me, people: ThePeople, schedule: TheSchedule,
+    bench: TheBench,
+    connected: Controlled,
+    me: Me,
+    people: ThePeople,
+    schedule: TheSchedule,
     request: HealthPermissionRequest,
-) -> HealthPermissionInfo:  # fmt: skip
+) -> HealthPermissionInfo:
     """Permit runs of the baseline's measurements without a person. It replaces an older one."""
     if not request.secured:
         raise NotAllowed("health.permission-secured", drive=connected.drive.name)
@@ -129,8 +133,12 @@ async def permit_health(
         trigger=request.trigger, pause_s=request.pause_min * 60.0, handled=given,
     )  # fmt: skip
     await schedule.permit(connected, me, made)
-    line = text("journal.health-permitted", drive=connected.drive.name, person=made.person,
-                until=until.isoformat(sep=" ", timespec="minutes"))  # fmt: skip
+    line = text(
+        "journal.health-permitted",
+        drive=connected.drive.name,
+        person=made.person,
+        until=until.isoformat(sep=" ", timespec="minutes"),
+    )
     bench.journal.add(line, drive=connected.drive.id)
     found = _permission(schedule, connected.drive.id)
     assert found is not None, "it was given just now"
@@ -175,9 +183,12 @@ def _permission(schedule: Unattended, drive: str) -> HealthPermissionInfo | None
 def _attempt(each: Attempt) -> HealthAttempt:
     why = None if each.why is None else Text.from_wire(each.why)
     return HealthAttempt(
-        at=each.at, cause=each.cause, outcome=each.outcome, why=message_or_none(why),
+        at=each.at,
+        cause=each.cause,
+        outcome=each.outcome,
+        why=message_or_none(why),
         remedy=None if why is None else message_or_none(why.remedy()),
-    )  # fmt: skip
+    )
 
 
 def info_of(found: Condition) -> AxisHealth:
@@ -185,7 +196,9 @@ def info_of(found: Condition) -> AxisHealth:
     baseline = found.baseline
     sha256 = None if baseline is None else baseline.settings_sha256
     return AxisHealth(
-        key=found.axis.key, axis=found.axis.name, profile=found.axis.profile,
+        key=found.axis.key,
+        axis=found.axis.name,
+        profile=found.axis.profile,
         serial=found.axis.serial,
         baseline=None if baseline is None else _baseline(baseline),
         findings=[_finding(each) for each in found.findings],
@@ -193,7 +206,7 @@ def info_of(found: Condition) -> AxisHealth:
         suspected=sum(each.code in ("suspected", "not_seen") for each in found.findings),
         other_settings=found.other_settings,
         runs=[_run(row, comparable=row.settings_sha256 == sha256) for row in found.rows],
-    )  # fmt: skip
+    )
 
 
 def _baseline(baseline: Baseline) -> HealthBaselineInfo:
@@ -218,7 +231,12 @@ def _finding(each: Finding) -> HealthFinding:
 
 def _run(row: HealthRow, *, comparable: bool) -> HealthRunInfo:
     return HealthRunInfo(
-        id=row.id, station=row.station, taken=row.taken, person=row.person, comparable=comparable,
-        measurements=list(row.measurements), values=list(row.round.values),
+        id=row.id,
+        station=row.station,
+        taken=row.taken,
+        person=row.person,
+        comparable=comparable,
+        measurements=list(row.measurements),
+        values=list(row.round.values),
         missing=list(row.round.missing),
-    )  # fmt: skip
+    )

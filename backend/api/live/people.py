@@ -119,9 +119,12 @@ class PeopleLive:
                 self._to_others(page, "pointer", moved)
             case PlotCursor():
                 cursor = CursorMoved(
-                    connection=page.id, person=identity.person, plot=request.plot,
-                    x=request.x, y=request.y,
-                )  # fmt: skip
+                    connection=page.id,
+                    person=identity.person,
+                    plot=request.plot,
+                    x=request.x,
+                    y=request.y,
+                )
                 self._to_others(page, f"cursor {request.plot}", cursor)
 
     def _to_others(self, page: Page, kind: str, message: BaseModel) -> None:

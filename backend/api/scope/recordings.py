@@ -288,9 +288,12 @@ def _samples(path: Path, from_s: float, until_s: float) -> RecordedSamples:
         blocks = [reader.block(ref) for ref in wanted]
         traces = [_trace(channel, blocks, first, from_s, until_s) for channel in reader.channels]
         return RecordedSamples(
-            start=convert.moment(reader.clock.epoch(first)), from_s=from_s, until_s=until_s,
-            more=any(ref.last_s - first >= until_s for ref in refs), traces=traces,
-        )  # fmt: skip
+            start=convert.moment(reader.clock.epoch(first)),
+            from_s=from_s,
+            until_s=until_s,
+            more=any(ref.last_s - first >= until_s for ref in refs),
+            traces=traces,
+        )
 
 
 def _trace(
@@ -306,9 +309,13 @@ def _trace(
         times += t_s[inside].tolist()
         values += [value if math.isfinite(value) else None for value in shown.tolist()]
     return RecordedTrace(
-        drive=channel.drive, key=channel.key, name=channel.name, unit=channel.shown_unit,
-        t_s=times, values=values,
-    )  # fmt: skip
+        drive=channel.drive,
+        key=channel.key,
+        name=channel.name,
+        unit=channel.shown_unit,
+        t_s=times,
+        values=values,
+    )
 
 
 @router.patch("/recordings/{name}")

@@ -108,17 +108,26 @@ async def _info(bench: Bench, interface: str, language: Language) -> PreflightIn
 def _finding(one: Finding, language: Language) -> PreflightFinding:
     what, remedy = words(one, language)
     return PreflightFinding(
-        code=one.code, effect=one.effect.name.lower(), delay_us=one.delay_us, params=one.params,
-        what=what, remedy=remedy, fix=one.fix,
+        code=one.code,
+        effect=one.effect.name.lower(),
+        delay_us=one.delay_us,
+        params=one.params,
+        what=what,
+        remedy=remedy,
+        fix=one.fix,
         fix_name=fix_name(one.fix, language) if one.fix else "",
-    )  # fmt: skip
+    )
 
 
 def _verdict(one: Verdict, language: Language) -> PreflightVerdict:
     return PreflightVerdict(
-        purpose=one.purpose, grade=one.grade, name=purpose_name(one.purpose, language),
-        words=verdict_words(one, language), missed_bound=one.missed_bound, allowed=one.allowed,
-    )  # fmt: skip
+        purpose=one.purpose,
+        grade=one.grade,
+        name=purpose_name(one.purpose, language),
+        words=verdict_words(one, language),
+        missed_bound=one.missed_bound,
+        allowed=one.allowed,
+    )
 
 
 def _runs(measured: Mapping[int, Measured]) -> list[PreflightRun]:
@@ -128,8 +137,13 @@ def _runs(measured: Mapping[int, Measured]) -> list[PreflightRun]:
 def _run(one: Measured) -> PreflightRun:
     trip = one.round_trip
     return PreflightRun(
-        period_us=one.period_us, cycles=one.cycles, missed=one.missed, fifo=one.fifo,
-        memory_locked=one.memory_locked, edges_us=list(EDGES_US), lateness=one.lateness.counts,
+        period_us=one.period_us,
+        cycles=one.cycles,
+        missed=one.missed,
+        fifo=one.fifo,
+        memory_locked=one.memory_locked,
+        edges_us=list(EDGES_US),
+        lateness=one.lateness.counts,
         lateness_median_us=one.lateness.below_us(_MEDIAN),
         lateness_999_us=one.lateness.below_us(_NEARLY_ALL),
         lateness_most_us=one.lateness.most_us,
@@ -137,4 +151,4 @@ def _run(one: Measured) -> PreflightRun:
         round_trip_median_us=trip.below_us(_MEDIAN) if trip else None,
         round_trip_most_us=trip.most_us if trip else None,
         unanswered=one.unanswered,
-    )  # fmt: skip
+    )

@@ -55,9 +55,11 @@ router = APIRouter()
 
 
 def _shape(found: Notch | None) -> NotchShape | None:
-    return None if found is None else NotchShape(
-        center_hz=found.center_hz, width_hz=found.width_hz, depth_db=found.depth_db
-    )  # fmt: skip
+    return (
+        None
+        if found is None
+        else NotchShape(center_hz=found.center_hz, width_hz=found.width_hz, depth_db=found.depth_db)
+    )
 
 
 def _realised(found: RealisedNotch | None) -> RealisedInfo | None:
@@ -88,11 +90,16 @@ async def read_notches(connected: TheDrive) -> list[NotchSlotInfo]:
     """All notches of the drive, read now."""
     return [
         NotchSlotInfo(
-            slot=s.slot, enabled=s.enabled, notch=_shape(s.notch), realised=_realised(s.realised),
-            raw=dict(s.raw), note=words_of(s.note), note_message=message_or_none(s.note),
+            slot=s.slot,
+            enabled=s.enabled,
+            notch=_shape(s.notch),
+            realised=_realised(s.realised),
+            raw=dict(s.raw),
+            note=words_of(s.note),
+            note_message=message_or_none(s.note),
         )
         for s in await notch.read_notches(connected.drive, meaning_of(connected.drive))
-    ]  # fmt: skip
+    ]
 
 
 @router.post("/drives/{drive_id}/notches/preview")
@@ -106,15 +113,19 @@ async def preview_notches(connected: TheDrive, request: NotchPreviewRequest) -> 
     return NotchPreviewInfo(
         slots=[
             NotchSlotInfo(
-                slot=p.slot, enabled=p.asked is not None, notch=_shape(p.asked),
-                realised=_realised(p.realised), raw=dict(p.raw),
-                note=words_of(p.note), note_message=message_or_none(p.note),
+                slot=p.slot,
+                enabled=p.asked is not None,
+                notch=_shape(p.asked),
+                realised=_realised(p.realised),
+                raw=dict(p.raw),
+                note=words_of(p.note),
+                note_message=message_or_none(p.note),
             )
             for p in slots
         ],
         magnitude_db=magnitude_db(total).tolist(),
         phase_deg=np.degrees(np.angle(total)).tolist(),
-    )  # fmt: skip
+    )
 
 
 @router.put("/drives/{drive_id}/notches")
@@ -260,9 +271,14 @@ async def candidates(
     facts = sweep_evaluation.completed(await read_facts(connected.axis), found)
     load = request.load or tune_candidates.load_class(found)
     table = await asyncio.to_thread(
-        tune_candidates.candidates_for, connected.drive, facts, plant, request.inertia_kgm2, load,
+        tune_candidates.candidates_for,
+        connected.drive,
+        facts,
+        plant,
+        request.inertia_kgm2,
+        load,
         request.sample_rate_hz,
-    )  # fmt: skip
+    )
     return CandidatesInfo(load=load, candidates=[candidate_info(each) for each in table])
 
 
@@ -281,9 +297,11 @@ async def predict(bench: TheBench, connected: TheDrive, request: PredictRequest)
         ) from error
     fixed = gains.loops_of(connected.drive, facts).response(f) * filters
     opened = speed_loop(
-        f, plant.response(), np.asarray(fixed),
+        f,
+        plant.response(),
+        np.asarray(fixed),
         _gains(g.speed_bandwidth_hz, g.integral_hz, g.position_1_s, g.inertia_kgm2),
-    )  # fmt: skip
+    )
     closed = closed_from_open(opened)
     time, value = step_of_closed_loop(f, closed, duration_s=0.5)
     thin = slice(None, None, max(1, time.size // 2000))

@@ -75,9 +75,12 @@ def partner_of(
 
 
 async def start_tool(
-    bench: Bench, connected: ConnectedDrive, tool: AnyTool, request: ToolSettings,
+    bench: Bench,
+    connected: ConnectedDrive,
+    tool: AnyTool,
+    request: ToolSettings,
     partner: ConnectedDrive | None = None,
-) -> JobInfo:  # fmt: skip
+) -> JobInfo:
     """Start a tool as a job, as its route does for whoever acts now.
 
     Raw data are stored before they are evaluated. ``partner`` is moved as well, see `Tool.pair`.
@@ -199,13 +202,16 @@ async def list_tools() -> list[ToolInfo]:
             motion=tool.motion,
         )
         for tool in TOOLS
-    ]  # fmt: skip
+    ]
 
 
 async def _start_reading(
-    bench: Bench, connected: ConnectedDrive, recordings: Recordings, tool: AnyTool,
+    bench: Bench,
+    connected: ConnectedDrive,
+    recordings: Recordings,
+    tool: AnyTool,
     request: BaseModel,
-) -> JobInfo:  # fmt: skip
+) -> JobInfo:
     """Start a tool that moves nothing: no exchange, no grant, and no control of the axis."""
     files: list[str] = []
 
@@ -215,9 +221,7 @@ async def _start_reading(
         files.append(bench.measurements.save(name, connected.drive, arrays, meta))
 
     async def work(progress: Progress) -> JobResult:
-        given = Run(
-            connected.axis, None, progress, keep, recording=recordings.library.existing
-        )  # fmt: skip
+        given = Run(connected.axis, None, progress, keep, recording=recordings.library.existing)
         found: ToolResult = await tool.run(given, request)
         await asyncio.to_thread(_conclude, bench.measurements, files, tool, found)
         return _answer(found, files)
@@ -240,9 +244,13 @@ def _add(tool: AnyTool) -> None:
         return await start_tool(bench, connected, tool, request)
 
     async def start_pair(
-        bench: TheBench, connected: Controlled, request: ToolSettings, people: ThePeople, me: Me,
+        bench: TheBench,
+        connected: Controlled,
+        request: ToolSettings,
+        people: ThePeople,
+        me: Me,
         connection: Connection = None,
-    ) -> JobInfo:  # fmt: skip
+    ) -> JobInfo:
         name = str(request.model_dump()["partner"])
         partner = partner_of(bench, connected, name, connection)
         # The gate knows of the drive in the path alone; a guest may have rights on that one only.
@@ -254,9 +262,13 @@ def _add(tool: AnyTool) -> None:
     route = moving if tool.motion else start_reading
     route.__annotations__["request"] = tool.settings
     router.add_api_route(
-        f"/drives/{{drive_id}}/jobs/{tool.kind}", route, methods=["POST"], status_code=202,
-        name=f"start_{tool.kind}", description=tool.text("help"),
-    )  # fmt: skip
+        f"/drives/{{drive_id}}/jobs/{tool.kind}",
+        route,
+        methods=["POST"],
+        status_code=202,
+        name=f"start_{tool.kind}",
+        description=tool.text("help"),
+    )
 
 
 for each in TOOLS:

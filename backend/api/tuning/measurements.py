@@ -65,9 +65,13 @@ def info_of(name: str, found: Head) -> MeasurementInfo:
     identity = found.meta.get("identity")
     serial = identity.get("serial") if isinstance(identity, dict) else None
     return MeasurementInfo(
-        file=name, kind=found.kind, drive=found.drive, profile=str(found.meta.get("profile", "")),
-        serial=serial, saved=found.saved.astimezone(UTC),
-    )  # fmt: skip
+        file=name,
+        kind=found.kind,
+        drive=found.drive,
+        profile=str(found.meta.get("profile", "")),
+        serial=serial,
+        saved=found.saved.astimezone(UTC),
+    )
 
 
 @router.get("/measurements")
@@ -158,8 +162,13 @@ async def sign_measurement(
     await asyncio.to_thread(
         bench.measurements.sign, name, signature, result.model_dump(mode="json")
     )
-    line = text("journal.record-signed", drive=found.head.drive, name=name, person=person,
-                sha256=str(signature["sha256"]))  # fmt: skip
+    line = text(
+        "journal.record-signed",
+        drive=found.head.drive,
+        name=name,
+        person=person,
+        sha256=str(signature["sha256"]),
+    )
     bench.journal.add(line)
     return result.model_copy(update={"measurements": (name,)})
 

@@ -109,12 +109,16 @@ def _past(drive: Drive, past: PastFault) -> dict[str, Any]:
         "title": past.fault.name if past.fault else "",
         **sentence("error", past.problem),
         "values": [
-            {"key": r.key, "name": drive.parameter(r.key).name,
-             "unit": drive.parameter(r.key).unit, "value": _plain(r.value)}
+            {
+                "key": r.key,
+                "name": drive.parameter(r.key).name,
+                "unit": drive.parameter(r.key).unit,
+                "value": _plain(r.value),
+            }
             | sentence("error", r.problem)
             for r in past.values
         ],
-    }  # fmt: skip
+    }
 
 
 def _plain(value: object) -> object:

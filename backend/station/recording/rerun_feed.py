@@ -42,9 +42,14 @@ _HEAD = struct.Struct("<IIII")
 _LENGTH = struct.Struct("<I")
 
 ROLES = (
-    "position_actual", "position_demand", "velocity_actual", "velocity_demand", "torque_actual",
-    "following_error", "status_word",
-)  # fmt: skip
+    "position_actual",
+    "position_demand",
+    "velocity_actual",
+    "velocity_demand",
+    "torque_actual",
+    "following_error",
+    "status_word",
+)
 
 
 @dataclass(eq=False, slots=True)

@@ -144,9 +144,11 @@ async def again(
     candidate = first.candidate
     async with nothing_stays(trials.axis, first.before):
         reported = Again(
-            expected(trials, first, how.plant), _measured(first.verified), "unclear",
+            expected(trials, first, how.plant),
+            _measured(first.verified),
+            "unclear",
             first.verified.sweep.motion_s,
-        )  # fmt: skip
+        )
         if not contradictions(reported.predicted, reported.measured):
             return first, None
         # Where the second one fails, a more careful design must still be possible.
@@ -170,9 +172,13 @@ async def again(
     f = lines.frequency_hz
     closed = _closed(trials, second, plant, f)
     return applied, replace(
-        reported, outcome="same" if same else "other", plant=plant,
-        frequency_hz=f, closed_db=magnitude_db(closed), closed_deg=phase_deg(closed),
-    )  # fmt: skip
+        reported,
+        outcome="same" if same else "other",
+        plant=plant,
+        frequency_hz=f,
+        closed_db=magnitude_db(closed),
+        closed_deg=phase_deg(closed),
+    )
 
 
 def loop_lines(frf: Frf) -> LoopLines:

@@ -69,17 +69,22 @@ def candidates_for(
 
     def designed(loops: DriveLoops) -> tuple[Candidate, ...]:
         return design(
-            plant, inertia_kgm2, loops, load, slots=slots,
+            plant,
+            inertia_kgm2,
+            loops,
+            load,
+            slots=slots,
             notch_response=lambda notch, f: notch_tool.response(profile, notch, f, meaning),
-        )  # fmt: skip
+        )
 
     return _seen_by_the_bus(designed, loops, sample_rate_hz)
 
 
 def _seen_by_the_bus(
     designed: Callable[[DriveLoops], tuple[Candidate, ...]],
-    loops: DriveLoops, sample_rate_hz: float | None,
-) -> tuple[Candidate, ...]:  # fmt: skip
+    loops: DriveLoops,
+    sample_rate_hz: float | None,
+) -> tuple[Candidate, ...]:
     """Slower designs as long as the -3 dB point of one lies above what this bus can see."""
     table: tuple[Candidate, ...] = ()
     for _ in range(threshold.NARROWINGS):
@@ -95,9 +100,13 @@ def _seen_by_the_bus(
 
 
 def design_for(
-    drive: Drive, facts: AxisFacts, mechanics: SweepResult, inertia_kgm2: float,
-    load: LoadClass | None, sample_rate_hz: float,
-) -> Design:  # fmt: skip
+    drive: Drive,
+    facts: AxisFacts,
+    mechanics: SweepResult,
+    inertia_kgm2: float,
+    load: LoadClass | None,
+    sample_rate_hz: float,
+) -> Design:
     """The best designs; cautious ones where no model explains what was measured, or none is good.
 
     Empty where not even those keep their goals.
@@ -125,9 +134,13 @@ def plant_of(
 
 
 def cautious_design(
-    drive: Drive, facts: AxisFacts, mechanics: SweepResult, inertia_kgm2: float,
-    sample_rate_hz: float, caution: Text,
-) -> Design:  # fmt: skip
+    drive: Drive,
+    facts: AxisFacts,
+    mechanics: SweepResult,
+    inertia_kgm2: float,
+    sample_rate_hz: float,
+    caution: Text,
+) -> Design:
     """Gains alone, safe for whatever the axis may be, slower than a design on a model.
 
     An axis with backlash is now the whole and now the motor alone.

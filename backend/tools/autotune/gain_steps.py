@@ -50,9 +50,14 @@ class GainSteps:
 
 
 async def gain_steps(
-    axis: Axis, session: CyclicSession, settings: StepSettings, present: StepResult,
-    wanted_db: float, progress: Progress, keep: Keep | None = None,
-) -> GainSteps:  # fmt: skip
+    axis: Axis,
+    session: CyclicSession,
+    settings: StepSettings,
+    present: StepResult,
+    wanted_db: float,
+    progress: Progress,
+    keep: Keep | None = None,
+) -> GainSteps:
     """Raise the speed gain up to ``wanted_db`` and step at each; the gain is as before afterwards.
 
     ``present`` is the same step with the gain as it is.

@@ -83,10 +83,14 @@ async def read_gains(axis: Axis, facts: AxisFacts | None = None) -> GainState:
     speed = values.get(spec.speed or "")
     inertia = facts.drive_inertia_kgm2
     return GainState(
-        spec.convention, position, speed,
+        spec.convention,
+        position,
+        speed,
         None if speed is None or inertia is None else TURN * speed * inertia,
-        integral, level, raw,
-    )  # fmt: skip
+        integral,
+        level,
+        raw,
+    )
 
 
 def _engineering(drive: Drive, key: str, raw: int) -> float:

@@ -41,10 +41,15 @@ class Learning:
 
 
 async def learn_notches(
-    axis: Axis, session: CyclicSession, how: Learning, facts: AxisFacts,
-    outcome: inertia_evaluation.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
-    progress: Progress, time_left: TimeLeft | None = None,
-) -> Text | None:  # fmt: skip
+    axis: Axis,
+    session: CyclicSession,
+    how: Learning,
+    facts: AxisFacts,
+    outcome: inertia_evaluation.InertiaOutcome,
+    mechanics: sweep_evaluation.SweepResult,
+    progress: Progress,
+    time_left: TimeLeft | None = None,
+) -> Text | None:
     """Measure what no manual prints, where it is worth it: with the loop where one is needed.
 
     A load that pulls needs one, and an axis whose mechanics were measured with one.
@@ -128,10 +133,15 @@ def out_of_sight(mechanics: sweep_evaluation.SweepResult) -> Text | None:
 
 
 async def _learn_free(
-    axis: Axis, session: CyclicSession, how: Learning, facts: AxisFacts,
-    outcome: inertia_evaluation.InertiaOutcome, mechanics: sweep_evaluation.SweepResult,
-    progress: Progress, repeats: Repeats,
-) -> NotchMeaning:  # fmt: skip
+    axis: Axis,
+    session: CyclicSession,
+    how: Learning,
+    facts: AxisFacts,
+    outcome: inertia_evaluation.InertiaOutcome,
+    mechanics: sweep_evaluation.SweepResult,
+    progress: Progress,
+    repeats: Repeats,
+) -> NotchMeaning:
     """On an axis that no load pulls, without a loop."""
     envelope: Envelope | None = how.envelope
     still = how.scheme != "free"

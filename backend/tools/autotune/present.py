@@ -111,9 +111,14 @@ async def present(
 
 
 def judged(
-    axis: Axis, facts: AxisFacts, plant: MeasuredPlant, gains: Gains, notches: tuple[Notch, ...],
-    filters: LoopFilters, goals: Goals,
-) -> tuple[Candidate, bool]:  # fmt: skip
+    axis: Axis,
+    facts: AxisFacts,
+    plant: MeasuredPlant,
+    gains: Gains,
+    notches: tuple[Notch, ...],
+    filters: LoopFilters,
+    goals: Goals,
+) -> tuple[Candidate, bool]:
     """A loop as a design, and whether it keeps the goals for all that the axis may be.
 
     Raises:

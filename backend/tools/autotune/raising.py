@@ -27,9 +27,14 @@ def wanted_db(missed: tuple[Missed, ...], guaranteed: Goals) -> float:
 
 
 def raised_to(
-    axis: Axis, facts: AxisFacts, plant: MeasuredPlant | None, candidate: Candidate,
-    verdict: LoopVerdict | None, guaranteed: Goals, missed: tuple[Missed, ...],
-) -> float:  # fmt: skip
+    axis: Axis,
+    facts: AxisFacts,
+    plant: MeasuredPlant | None,
+    candidate: Candidate,
+    verdict: LoopVerdict | None,
+    guaranteed: Goals,
+    missed: tuple[Missed, ...],
+) -> float:
     """By how many dB the gain is raised: what must be shown, or more, where that shows the goals.
 
     A slow loop of which too few lines stand out may be late by a whole loop period; with so much
@@ -64,8 +69,11 @@ def not_shown(
         top = 0.0 if verdict.measured is None else verdict.measured.high_hz
         said.append(
             text(
-                "autotune.crossover-not-shown", crossover_hz=verdict.last_crossover_hz,
-                measured_hz=top, shown_db=shown.shown_db, wanted_db=wanted,
+                "autotune.crossover-not-shown",
+                crossover_hz=verdict.last_crossover_hz,
+                measured_hz=top,
+                shown_db=shown.shown_db,
+                wanted_db=wanted,
             )
-        )  # fmt: skip
+        )
     return said

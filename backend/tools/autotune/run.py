@@ -125,9 +125,14 @@ async def autotune(
 
 
 async def _tuned(
-    axis: Axis, session: CyclicSession, settings: AutotuneSettings, facts: AxisFacts,
-    progress: Progress, keep: Keep | None, time_left: TimeLeft,
-) -> AutotuneResult:  # fmt: skip
+    axis: Axis,
+    session: CyclicSession,
+    settings: AutotuneSettings,
+    facts: AxisFacts,
+    progress: Progress,
+    keep: Keep | None,
+    time_left: TimeLeft,
+) -> AutotuneResult:
     """Everything that moves."""
     home = await axis.position_raw()
     gains = await _steady_gains(axis, session, facts)
@@ -164,34 +169,46 @@ async def _measured(
             await go_back(axis, session, begun_raw, settings.envelope, facts)
         moving = time_left.moving()
         outcome = await inertia_tool.inertia(
-            axis, session,
+            axis,
+            session,
             inertia_evaluation.InertiaSettings(
-                settings.envelope, settings.scheme, settings.ends_rev,
+                settings.envelope,
+                settings.scheme,
+                settings.ends_rev,
                 rated_torque_nm=settings.rated_torque_nm,
                 motor_inertia_kgm2=settings.motor_inertia_kgm2,
             ),
             part(progress, 0.05, 0.3, text("autotune.inertia-and-friction", step=2, steps=6)),
-            keep, moving,
-        )  # fmt: skip
+            keep,
+            moving,
+        )
         if moving.left_out:
             time_left.give_up(_ONE_MOVE)
         _require_inertia(axis, outcome)
         how = Learning(settings.envelope, settings.loop, settings.scheme)
         playing = time_left.measuring(learning_s(axis, how, facts, outcome))
         mechanics = await sweep_tool.sweep(
-            axis, session, _sweep_settings(settings, outcome),
+            axis,
+            session,
+            _sweep_settings(settings, outcome),
             part(progress, 0.3, 0.5, text("autotune.frequency-response", step=3, steps=6)),
-            keep, playing,
-        )  # fmt: skip
+            keep,
+            playing,
+        )
         time_left.lossy = playing.lossy
         if playing.left_out:
             time_left.give_up(NOT_AGAIN)
         _require_torque(axis, mechanics)
         plain = await learn_notches(
-            axis, session, how,
-            sweep_evaluation.completed(facts, mechanics), outcome, mechanics,
-            part(progress, 0.5, 0.6, text("autotune.what-notches-do", step=3, steps=6)), time_left,
-        )  # fmt: skip
+            axis,
+            session,
+            how,
+            sweep_evaluation.completed(facts, mechanics),
+            outcome,
+            mechanics,
+            part(progress, 0.5, 0.6, text("autotune.what-notches-do", step=3, steps=6)),
+            time_left,
+        )
     return AutotuneResult(
         outcome,
         mechanics,
@@ -269,10 +286,12 @@ def _sweep_settings(
     if loop == "auto" and settings.scheme != "free":
         loop = "speed"
     return sweep_evaluation.SweepSettings(
-        settings.envelope, loop=loop, rated_torque_nm=settings.rated_torque_nm,
+        settings.envelope,
+        loop=loop,
+        rated_torque_nm=settings.rated_torque_nm,
         inertia_kgm2=inertia.value,
         inertia_deviation=(inertia.high - inertia.low) / 2.0 / _CI95 / inertia.value,
-    )  # fmt: skip
+    )
 
 
 def _require_torque(axis: Axis, mechanics: sweep_evaluation.SweepResult) -> None:

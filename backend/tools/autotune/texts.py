@@ -99,11 +99,15 @@ def _row(each: CandidateInfo) -> tuple[Cell, ...]:
     centers = ", ".join(fixed(notch.center_hz, 0, "Hz") for notch in each.notches)
     return (
         Note(each.marks[0]) if len(each.marks) == 1 else "/".join(each.marks),
-        fixed(each.gains.speed_bandwidth_hz, 1, "Hz"), fixed(each.bandwidth_hz, 1, "Hz"),
-        fixed(goals.phase_margin_deg, 1, "°"), fixed(goals.gain_margin_db, 1, "dB"),
-        fixed(goals.ms, 2), milliseconds(each.settling_s), fixed(each.overshoot_percent, 0, "%"),
+        fixed(each.gains.speed_bandwidth_hz, 1, "Hz"),
+        fixed(each.bandwidth_hz, 1, "Hz"),
+        fixed(goals.phase_margin_deg, 1, "°"),
+        fixed(goals.gain_margin_db, 1, "dB"),
+        fixed(goals.ms, 2),
+        milliseconds(each.settling_s),
+        fixed(each.overshoot_percent, 0, "%"),
         centers or Note("none"),
-    )  # fmt: skip
+    )
 
 
 def _figures(applied: CandidateInfo, verified: VerifiedInfo) -> Grid:
@@ -140,11 +144,12 @@ def _bands(verified: VerifiedInfo) -> Iterator[Note]:
 
 def _of_band(band: BandInfo) -> dict[str, str]:
     return {
-        "low": fixed(band.low_hz, 0, "Hz"), "high": fixed(band.high_hz, 0, "Hz"),
+        "low": fixed(band.low_hz, 0, "Hz"),
+        "high": fixed(band.high_hz, 0, "Hz"),
         "phase": _interval(band.phase_margin_deg, 0, "°"),
         "gain": _interval(band.gain_margin_db, 1, "dB"),
         "peak": _interval(band.peak_sensitivity, 2),
-    }  # fmt: skip
+    }
 
 
 def _interval(found: IntervalInfo | None, digits: int, unit: str = "") -> str:

@@ -77,10 +77,11 @@ def _again(again: Again) -> AgainInfo:
     lines = {
         name: None if values is None else tuple(values.tolist())
         for name, values in (
-            ("frequency_hz", again.frequency_hz), ("closed_db", again.closed_db),
+            ("frequency_hz", again.frequency_hz),
+            ("closed_db", again.closed_db),
             ("closed_deg", again.closed_deg),
         )
-    }  # fmt: skip
+    }
     return AgainInfo(
         predicted=FiguresInfo.model_validate(figures_of(again.predicted)),
         measured=FiguresInfo.model_validate(figures_of(again.measured)),

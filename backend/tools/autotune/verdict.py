@@ -99,9 +99,14 @@ def loops_of(
 
 
 def verdict_of(
-    axis: Axis, facts: AxisFacts, plant: MeasuredPlant, candidate: Candidate, frf: Frf,
-    hold: Hold | None, shown_gain_db: float | None = None,
-) -> LoopVerdict:  # fmt: skip
+    axis: Axis,
+    facts: AxisFacts,
+    plant: MeasuredPlant,
+    candidate: Candidate,
+    frf: Frf,
+    hold: Hold | None,
+    shown_gain_db: float | None = None,
+) -> LoopVerdict:
     """What is known of this design's loop; the worst over the ways its reference may have come.
 
     Raises:
@@ -125,17 +130,26 @@ def verdict_of(
     f = seen.frequency_hz
     expected = loops(f, plant.on(f).response())
     paths = reference_paths(
-        f, seen.closed, seen.deviation, expected, rate_hz=frf.sample_rate_hz,
+        f,
+        seen.closed,
+        seen.deviation,
+        expected,
+        rate_hz=frf.sample_rate_hz,
         hold=hold or ("linear" if facts.interpolates else "zero"),
-    )  # fmt: skip
+    )
     found = [
         judge(
-            Lines(f, path.closed, seen.deviation) if crossing else None, dense, every, nominal,
-            shown_gain_db=shown_gain_db, late_s=path.loop_late_s, size=path.loop_size,
+            Lines(f, path.closed, seen.deviation) if crossing else None,
+            dense,
+            every,
+            nominal,
+            shown_gain_db=shown_gain_db,
+            late_s=path.loop_late_s,
+            size=path.loop_size,
             alternatives=alternatives,
         )
         for path in paths
-    ]  # fmt: skip
+    ]
     return min(found, key=lambda v: v.stated.phase_margin_deg)
 
 
@@ -151,9 +165,10 @@ def in_words(missed: tuple[Missed, ...]) -> list[Text]:
             said.append(
                 text(
                     "autotune.crossover-above-measured",
-                    crossover_hz=each.value, measured_hz=each.limit,
+                    crossover_hz=each.value,
+                    measured_hz=each.limit,
                 )
-            )  # fmt: skip
+            )
         else:
             code, unit = _MARGINS.get((each.what, each.end)) or _STATED[each.what]
             said.append(Text(code, {f"have{unit}": each.value, f"wanted{unit}": each.limit}))

@@ -101,10 +101,15 @@ class Check:
 
 
 async def verify(
-    axis: Axis, session: CyclicSession, check: Check, candidate: Candidate, guaranteed: Goals,
-    reported: tuple[Progress, Progress, Progress], keep: Keep | None,
+    axis: Axis,
+    session: CyclicSession,
+    check: Check,
+    candidate: Candidate,
+    guaranteed: Goals,
+    reported: tuple[Progress, Progress, Progress],
+    keep: Keep | None,
     time_left: TimeLeft | None = None,
-) -> Verified:  # fmt: skip
+) -> Verified:
     """Stand still, measure the closed speed loop, make a step; ``reported``: a progress each.
 
     The loop is measured once more, with as many pairs of realisations as ``time_left`` allows,
@@ -120,10 +125,15 @@ async def verify(
         await quiet(axis)
         await go_back(axis, session, check.home_raw, check.envelope, check.facts)
     settings = sweep_evaluation.SweepSettings(
-        check.envelope, kind="speed_loop", realisations=1,
-        inertia_kgm2=check.inertia_kgm2, hold=check.hold, pairs_before=check.pairs_before,
-        rated_torque_nm=check.rated_torque_nm, coulomb_nm=check.coulomb_nm,
-    )  # fmt: skip
+        check.envelope,
+        kind="speed_loop",
+        realisations=1,
+        inertia_kgm2=check.inertia_kgm2,
+        hold=check.hold,
+        pairs_before=check.pairs_before,
+        rated_torque_nm=check.rated_torque_nm,
+        coulomb_nm=check.coulomb_nm,
+    )
     clock = time_left or TimeLeft()
     begun_s = time.monotonic()
     again = clock.verifying_again()
@@ -184,9 +194,12 @@ async def verify(
 
 
 def _verdict(
-    axis: Axis, check: Check, candidate: Candidate, swept: sweep_evaluation.SweepResult,
+    axis: Axis,
+    check: Check,
+    candidate: Candidate,
+    swept: sweep_evaluation.SweepResult,
     shown_db: float | None,
-) -> LoopVerdict | None:  # fmt: skip
+) -> LoopVerdict | None:
     """None where there is no plant to predict from: a design always has one."""
     if check.plant is None:
         return None

@@ -115,10 +115,13 @@ def reevaluate(arrays: Arrays, meta: Meta) -> BrakeResult:
                 )
             )
     test = Trials(
-        tuple(trials), float(str(meta["sample_rate_hz"])), float(str(meta["torque_step_nm"])),
-        float(str(meta["test_percent"])), "supply" if meta["means"] == "supply" else "output",
+        tuple(trials),
+        float(str(meta["sample_rate_hz"])),
+        float(str(meta["torque_step_nm"])),
+        float(str(meta["test_percent"])),
+        "supply" if meta["means"] == "supply" else "output",
         str(meta["measured_at"]),
-    )  # fmt: skip
+    )
     return evaluate(test, BrakeSettings.model_validate(given), AxisFacts(**facts))
 
 
@@ -236,12 +239,17 @@ class _Way:
         most = float(np.max(self._torque[loading])) - self._still(self._torque, Phase.PRELOADED)
         after = np.flatnonzero(self._trial.valid & (self._trial.phase >= Phase.RAMP))
         return BrakeWay(
-            direction=self._trial.direction, verdict=verdict, torque_percent=carried,
-            torque_ci95_percent=(low, high), travel_rev=float(np.max(way[after])),
-            windup_rev=compliance * most, slip_rev=slip, abort_ms=self._abort_ms(),
+            direction=self._trial.direction,
+            verdict=verdict,
+            torque_percent=carried,
+            torque_ci95_percent=(low, high),
+            travel_rev=float(np.max(way[after])),
+            windup_rev=compliance * most,
+            slip_rev=slip,
+            abort_ms=self._abort_ms(),
             curve_travel_rev=tuple(map(float, way[shown])),
             curve_torque_percent=tuple(map(float, self._torque[shown])),
-        )  # fmt: skip
+        )
 
     def _abort_ms(self) -> float | None:
         """From the first sample beyond the limit until the torque was gone."""

@@ -78,12 +78,16 @@ def sequence(
     """Torque [n] of one direction, in the unit of ``peak``, and the phase of each sample."""
     low = PRELOAD * peak
     parts = [
-        (Phase.LEAD, 0.0, 0.0, lead_s), (Phase.PRELOADING, 0.0, low, threshold.PRELOAD_S),
-        (Phase.PRELOADED, low, low, threshold.STILL_S), (Phase.RAMP, low, peak, ramp_s),
-        (Phase.TOP, peak, peak, threshold.TOP_S), (Phase.UNLOADING, peak, low, threshold.DOWN_S),
-        (Phase.UNLOADED, low, low, threshold.STILL_S), (Phase.END, low, 0.0, threshold.PRELOAD_S),
+        (Phase.LEAD, 0.0, 0.0, lead_s),
+        (Phase.PRELOADING, 0.0, low, threshold.PRELOAD_S),
+        (Phase.PRELOADED, low, low, threshold.STILL_S),
+        (Phase.RAMP, low, peak, ramp_s),
+        (Phase.TOP, peak, peak, threshold.TOP_S),
+        (Phase.UNLOADING, peak, low, threshold.DOWN_S),
+        (Phase.UNLOADED, low, low, threshold.STILL_S),
+        (Phase.END, low, 0.0, threshold.PRELOAD_S),
         (Phase.END, 0.0, 0.0, threshold.END_S),
-    ]  # fmt: skip
+    ]
     values, phases = [], []
     for phase, begin, end, seconds in parts:
         n = max(1, round(seconds * rate))
@@ -121,9 +125,13 @@ async def run(run: Run, settings: BrakeSettings) -> BrakeResult:
                 break  # it is open: the other direction would only turn the axis as well
     run.progress(0.95, text("brake.evaluating"))
     test = Trials(
-        tuple(trials), 1.0 / cycle_s(run.session),
-        abs(units.torque(1.0)) / 100.0 * facts.rated_torque_nm, percent, means, measured_at,
-    )  # fmt: skip
+        tuple(trials),
+        1.0 / cycle_s(run.session),
+        abs(units.torque(1.0)) / 100.0 * facts.rated_torque_nm,
+        percent,
+        means,
+        measured_at,
+    )
     if run.keep is not None:
         meta = {"settings": settings.model_dump(mode="json"), "facts": asdict(facts)}
         run.keep("brake-test", test.arrays(), {"tool": "brake-test", **meta, **test.facts()})
@@ -162,9 +170,13 @@ def _test_percent(settings: BrakeSettings, facts: AxisFacts, name: str) -> float
     needed = threshold.ABOVE_SHARE * percent + threshold.ABOVE_PERCENT
     if needed > settings.torque_limit:
         raise OutOfRange(
-            "brake.torque-not-permitted", drive=name, value=round(percent, 2),
-            limit=f"{settings.torque_limit:g} %", percent=percent, needed=needed,
-        )  # fmt: skip
+            "brake.torque-not-permitted",
+            drive=name,
+            value=round(percent, 2),
+            limit=f"{settings.torque_limit:g} %",
+            percent=percent,
+            needed=needed,
+        )
     return percent
 
 
@@ -172,11 +184,16 @@ def _cannot(
     obstacle: Obstacle, settings: BrakeSettings, facts: AxisFacts, percent: float, measured_at: str
 ) -> BrakeResult:
     return BrakeResult(
-        verdict="cannot_be_tested", obstacle=obstacle, measured_at=measured_at,
+        verdict="cannot_be_tested",
+        obstacle=obstacle,
+        measured_at=measured_at,
         rated_torque_nm=facts.rated_torque_nm if facts.torque_known else None,
-        brake_rated_nm=settings.brake_rated_nm, test_percent=percent,
-        slip_limit_rev=settings.envelope.travel_rev, torque_percent=None, of_brake_percent=None,
-    )  # fmt: skip
+        brake_rated_nm=settings.brake_rated_nm,
+        test_percent=percent,
+        slip_limit_rev=settings.envelope.travel_rev,
+        torque_percent=None,
+        of_brake_percent=None,
+    )
 
 
 @asynccontextmanager

@@ -169,8 +169,11 @@ TEXTS: dict[str, tuple[str, str]] = {
     "backward": ("backwards", "反向"),
 }
 _TONES: dict[Verdict, Literal["good", "warn"]] = {
-    "held": "good", "slipped": "warn", "not_closed": "warn", "cannot_be_tested": "warn",
-}  # fmt: skip
+    "held": "good",
+    "slipped": "warn",
+    "not_closed": "warn",
+    "cannot_be_tested": "warn",
+}
 
 
 def report(result: BrakeResult) -> Section:

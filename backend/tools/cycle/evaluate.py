@@ -55,17 +55,21 @@ class Samples:
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
         """For storage."""
         return {
-            "time_s": self.signals.time_s, "torque_percent": self.signals.torque_percent,
-            "speed_rpm": self.signals.speed_rpm, "dc_voltage": self.dc_voltage,
+            "time_s": self.signals.time_s,
+            "torque_percent": self.signals.torque_percent,
+            "speed_rpm": self.signals.speed_rpm,
+            "dc_voltage": self.dc_voltage,
             "drive_load": self.drive_load,
-        }  # fmt: skip
+        }
 
 
 def meta_of(settings: CycleSettings, facts: CycleFacts) -> dict[str, object]:
     """For storage, with the arrays."""
     return {
-        "tool": "cycle", "settings": settings.model_dump(mode="json"), "facts": asdict(facts),
-    }  # fmt: skip
+        "tool": "cycle",
+        "settings": settings.model_dump(mode="json"),
+        "facts": asdict(facts),
+    }
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> CycleResult:
@@ -139,14 +143,20 @@ def _heat(
     scale = (1.0 if low is None else low / value, 1.0 if high is None else high / value)
     minutes, still = settings.thermal_time_min, settings.standstill_percent
     found = heat.heat_of(
-        signals, facts.rated_speed_rpm, permitted=permitted,
-        time_constant_s=None if minutes is None else 60.0 * minutes, scale=scale,
+        signals,
+        facts.rated_speed_rpm,
+        permitted=permitted,
+        time_constant_s=None if minutes is None else 60.0 * minutes,
+        scale=scale,
         standstill=None if still is None else still / 100.0,
-    )  # fmt: skip
+    )
     return CycleHeat(
-        ambient_c=settings.ambient_c, time_constant_min=minutes, rise_share=found.rise,
-        trip_s=found.trip_s, about_s=found.about_s,
-    )  # fmt: skip
+        ambient_c=settings.ambient_c,
+        time_constant_min=minutes,
+        rise_share=found.rise,
+        trip_s=found.trip_s,
+        about_s=found.about_s,
+    )
 
 
 def _overload(signals: Signals, settings: CycleSettings) -> CycleOverload | None:
@@ -154,9 +164,11 @@ def _overload(signals: Signals, settings: CycleSettings) -> CycleOverload | None
         return None
     found = load.i2t(signals, settings.overload_percent, settings.overload_s)
     return CycleOverload(
-        percent=settings.overload_percent, seconds=settings.overload_s, used_share=found.used,
+        percent=settings.overload_percent,
+        seconds=settings.overload_s,
+        used_share=found.used,
         trip_s=found.trip_s,
-    )  # fmt: skip
+    )
 
 
 def _verdict(idle: bool, warm: CycleHeat | None, budget: CycleOverload | None) -> Verdict:

@@ -173,9 +173,11 @@ def _recorded(run: Run, keys: dict[str, str], name: str) -> dict[str, _Column]:
         for role in _NEEDED:
             if keys[role] not in where:
                 raise NotAllowed(
-                    "cycle.recording-lacks-signal", value=path.name, drive=drive.name,
+                    "cycle.recording-lacks-signal",
+                    value=path.name,
+                    drive=drive.name,
                     parameter=keys[role],
-                )  # fmt: skip
+                )
         courses: dict[int, _Course] = {}
         for block in reader.blocks():
             courses.setdefault(block.stream, _Course()).add(
@@ -183,8 +185,9 @@ def _recorded(run: Run, keys: dict[str, str], name: str) -> dict[str, _Column]:
             )
     return {
         role: courses.get(where[key][0], _Course()).column(where[key][1])
-        for role, key in keys.items() if key in where
-    }  # fmt: skip
+        for role, key in keys.items()
+        if key in where
+    }
 
 
 def _samples(
@@ -210,11 +213,13 @@ def _samples(
     begin = torque_s[0] if torque_s.size else 0.0
     return Samples(
         Signals(
-            torque_s - begin, raw("torque_actual", torque) * units.torque(1.0),
+            torque_s - begin,
+            raw("torque_actual", torque) * units.torque(1.0),
             raw("velocity_actual", speed) * units.velocity(1.0),
         ),
-        reading("dc_voltage"), reading("load_ratio"),
-    )  # fmt: skip
+        reading("dc_voltage"),
+        reading("load_ratio"),
+    )
 
 
 TOOL = Tool(

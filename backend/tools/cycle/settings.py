@@ -26,31 +26,41 @@ class CycleSettings(BaseModel):
         default=None, gt=0, description="rated speed in rpm, if not the drive's"
     )
     peak_percent: float | None = Field(
-        default=None, gt=0, le=1000,
+        default=None,
+        gt=0,
+        le=1000,
         description="peak torque of the motor, in % of rated; the drive's limit without it",
-    )  # fmt: skip
+    )
     overload_percent: float | None = Field(
-        default=None, gt=100, le=1000,
+        default=None,
+        gt=100,
+        le=1000,
         description="overload that the catalogue permits, in % of rated torque; with --overload-s",
-    )  # fmt: skip
+    )
     overload_s: float | None = Field(
         default=None, gt=0, description="for how long it permits it, in s"
     )
     thermal_time_min: float | None = Field(
-        default=None, gt=0, le=600,
+        default=None,
+        gt=0,
+        le=600,
         description="thermal time constant of the motor by its catalogue, in min",
-    )  # fmt: skip
+    )
     standstill_percent: float | None = Field(
-        default=None, ge=100, le=300,
+        default=None,
+        ge=100,
+        le=300,
         description="torque that the motor carries for long at standstill, in % of rated",
-    )  # fmt: skip
+    )
     ambient_c: float = Field(
         default=40.0, ge=-20, le=90, description="temperature about the motor, in °C"
     )
     rise_k: float | None = Field(
-        default=None, ge=30, le=160,
+        default=None,
+        ge=30,
+        le=160,
         description="rise of the winding at rated torque in K; needed where it is not 40 °C",
-    )  # fmt: skip
+    )
 
     @model_validator(mode="after")
     def _whole(self) -> CycleSettings:

@@ -201,8 +201,11 @@ TEXTS: dict[str, tuple[str, str]] = {
     "limit": ("peak", "峰值"),
 }
 _TONES: dict[Verdict, Literal["good", "warn", "plain"]] = {
-    "endures": "good", "overloads": "warn", "undecided": "warn", "idle": "warn",
-}  # fmt: skip
+    "endures": "good",
+    "overloads": "warn",
+    "undecided": "warn",
+    "idle": "warn",
+}
 _WARN = frozenset(
     {"gaps", "peak_beyond", "peak_reached", "speed_beyond_rated", "overload_exceeded"}
 )
@@ -257,11 +260,12 @@ def _rows(result: CycleResult) -> list[Row]:
     rated = result.rated_torque_nm
     low, high = result.rms_ci95_percent
     rows = [
-        Row("period", result.period_s, "s"), Row("read", result.duration_s, "s"),
+        Row("period", result.period_s, "s"),
+        Row("read", result.duration_s, "s"),
         Row("rate", result.sample_rate_hz, "/s"),
         Row("rms_of_rated", result.rms_percent, "%", (low, high)),
         Row("peak", result.peak_percent, "%"),
-    ]  # fmt: skip
+    ]
     if rated is not None:
         rows.insert(4, Row("rms", 0.01 * rated * result.rms_percent, "N·m"))
     if result.peak_limit_percent:
@@ -278,10 +282,12 @@ def _rows(result: CycleResult) -> list[Row]:
     if (power := result.power) is not None:
         energy = "braking_energy_all" if result.period_s is None else "braking_energy"
         rows += [
-            Row("power", power.highest_w, "W"), Row("mean_power", power.mean_w, "W"),
-            Row("braking_peak", power.highest_braking_w, "W"), Row(energy, power.braking_j, "J"),
+            Row("power", power.highest_w, "W"),
+            Row("mean_power", power.mean_w, "W"),
+            Row("braking_peak", power.highest_braking_w, "W"),
+            Row(energy, power.braking_j, "J"),
             Row("braking_mean", power.braking_mean_w, "W"),
-        ]  # fmt: skip
+        ]
     if result.dc_voltage_v is not None:
         rows.append(Row("voltage_high", result.dc_voltage_v[1], "V"))
     if result.drive_load_percent is not None:
@@ -305,6 +311,7 @@ def _cloud(result: CycleResult) -> Chart:
         lines += [
             Line(name, ends, (sign * level, sign * level))
             for name, level in (("rated", 100.0), ("limit", result.peak_limit_percent))
-            if level is not None for sign in (1.0, -1.0)
-        ]  # fmt: skip
+            if level is not None
+            for sign in (1.0, -1.0)
+        ]
     return Chart("cloud", "speed", "torque", tuple(lines))

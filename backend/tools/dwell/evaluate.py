@@ -38,11 +38,13 @@ class Dwelt:
     def meta(self, settings: DwellSettings) -> dict[str, object]:
         """For storage, beside the arrays."""
         return {
-            "tool": "dwell", "settings": settings.model_dump(mode="json"),
+            "tool": "dwell",
+            "settings": settings.model_dump(mode="json"),
             "sample_rate_hz": self.recording.sample_rate_hz,
-            "rated_torque_nm": self.rated_torque_nm, "position_step_rad": self.position_step_rad,
+            "rated_torque_nm": self.rated_torque_nm,
+            "position_step_rad": self.position_step_rad,
             "torque_step_percent": self.torque_step_percent,
-        }  # fmt: skip
+        }
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> DwellResult:
@@ -59,10 +61,14 @@ def reevaluate(arrays: Arrays, meta: Meta) -> DwellResult:
         return np.asarray(arrays[name], np.float64)
 
     recording = Recording(
-        float(str(meta["sample_rate_hz"])), column("position_rad"), column("velocity_rad_s"),
-        column("torque_nm"), column("sent"), column("offset"),
+        float(str(meta["sample_rate_hz"])),
+        column("position_rad"),
+        column("velocity_rad_s"),
+        column("torque_nm"),
+        column("sent"),
+        column("offset"),
         np.asarray(arrays["valid"], np.bool_),
-    )  # fmt: skip
+    )
     names = ("rated_torque_nm", "position_step_rad", "torque_step_percent")
     facts = (float(str(meta[name])) for name in names)
     dwelt = Dwelt(recording, column("sine"), np.asarray(arrays["counts"], np.bool_), *facts)
@@ -105,22 +111,27 @@ def evaluate(dwelt: Dwelt, settings: DwellSettings) -> DwellResult:
         phase = DwellEstimate(value=degrees, ci95=(degrees - half, degrees + half))
     harmonics = tuple(
         DwellHarmonic(
-            multiple=int(k), speed_rpm=abs(speed.mean(k - 1)),
+            multiple=int(k),
+            speed_rpm=abs(speed.mean(k - 1)),
             speed_ci95_rpm=_ends(abs(speed.mean(k - 1)), speed.half(k - 1) + k * step_rpm),
         )
         for k in multiples[1:]
-    )  # fmt: skip
+    )
     return DwellResult(
-        frequency_hz=frequency, by=settings.by, excitation=abs(sine.mean()), seen=seen,
+        frequency_hz=frequency,
+        by=settings.by,
+        excitation=abs(sine.mean()),
+        seen=seen,
         speed_rpm=_estimate(speed, 1.0, step_rpm),
         position_deg=_estimate(turned, 360.0 / _TURN, step),
         torque_percent=_estimate(twisted, 1.0, threshold.STEP * dwelt.torque_step_percent),
-        phase_deg=phase, harmonics=harmonics,
+        phase_deg=phase,
+        harmonics=harmonics,
         over_s=float(np.count_nonzero(good)) / rate,
         trace_s=tuple(float(v) for v in turned.middle_s),
         trace_rpm=tuple(float(v) for v in np.abs(speed.blocks[:, 0])),
         findings=tuple(_findings(speed, seen, step_rpm, settings, rate, good)),
-    )  # fmt: skip
+    )
 
 
 def _estimate(found: Followed, factor: float, step: float) -> DwellEstimate:
@@ -133,9 +144,13 @@ def _ends(value: float, half: float) -> Interval:
 
 
 def _findings(
-    speed: Followed, seen: bool, step_rpm: float, settings: DwellSettings, rate: float,
+    speed: Followed,
+    seen: bool,
+    step_rpm: float,
+    settings: DwellSettings,
+    rate: float,
     good: npt.NDArray[np.bool_],
-) -> list[DwellFinding]:  # fmt: skip
+) -> list[DwellFinding]:
     level = abs(speed.mean())
     if not seen:
         first = [DwellFinding(code="not_seen", value=level + speed.half() + step_rpm, unit="rpm")]

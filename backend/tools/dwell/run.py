@@ -81,9 +81,11 @@ def require_inside(settings: DwellSettings, rate: float, units: AxisUnits) -> No
     envelope, highest_hz = settings.envelope, threshold.HIGHEST * rate
     if settings.frequency_hz > highest_hz:
         raise OutOfRange(
-            "dwell.frequency-too-high", value=settings.frequency_hz, limit=f"{highest_hz:g} Hz",
+            "dwell.frequency-too-high",
+            value=settings.frequency_hz,
+            limit=f"{highest_hz:g} Hz",
             highest_hz=highest_hz,
-        )  # fmt: skip
+        )
     by_speed = settings.by == "speed"
     needed_rpm = settings.turn_rpm + (settings.amplitude_rpm if by_speed else 0.0)
     swing_rev = settings.amplitude_rpm / 60.0 / (_TURN * settings.frequency_hz) if by_speed else 0.0
@@ -92,29 +94,41 @@ def require_inside(settings: DwellSettings, rate: float, units: AxisUnits) -> No
     permitted_rpm = threshold.FAST * envelope.speed_rpm
     if needed_rpm > permitted_rpm or way_rev > threshold.USED * envelope.travel_rev:
         raise OutOfRange(
-            "dwell.beyond-envelope", value=needed_rpm, limit=f"{permitted_rpm:g} rpm",
-            needed_rpm=needed_rpm, way_rev=way_rev, permitted_rpm=permitted_rpm,
+            "dwell.beyond-envelope",
+            value=needed_rpm,
+            limit=f"{permitted_rpm:g} rpm",
+            needed_rpm=needed_rpm,
+            way_rev=way_rev,
+            permitted_rpm=permitted_rpm,
             travel_rev=threshold.USED * envelope.travel_rev,
-        )  # fmt: skip
+        )
     least_percent = threshold.SHARE * envelope.torque_percent
     if not by_speed and settings.amplitude_percent > least_percent:
         raise OutOfRange(
-            "dwell.torque-beyond-envelope", value=settings.amplitude_percent,
-            limit=f"{least_percent:g} %", permitted_percent=least_percent,
-        )  # fmt: skip
+            "dwell.torque-beyond-envelope",
+            value=settings.amplitude_percent,
+            limit=f"{least_percent:g} %",
+            permitted_percent=least_percent,
+        )
     step = abs(units.velocity(1.0)) if by_speed else abs(units.torque(1.0))
     amplitude = settings.amplitude_rpm if by_speed else settings.amplitude_percent
     if amplitude < threshold.STEPS * step:
         raise OutOfRange(
-            "dwell.amplitude-too-small", value=amplitude, limit=f"{threshold.STEPS * step:.3g}",
-            least=threshold.STEPS * step, unit="rpm" if by_speed else "%",
-        )  # fmt: skip
+            "dwell.amplitude-too-small",
+            value=amplitude,
+            limit=f"{threshold.STEPS * step:.3g}",
+            least=threshold.STEPS * step,
+            unit="rpm" if by_speed else "%",
+        )
     takes_s = settings.duration_s + 2.0 * (threshold.FADE_S + threshold.LEAD_S)
     if takes_s > envelope.time_s:
         raise OutOfRange(
-            "dwell.takes-too-long", value=takes_s, limit=f"{envelope.time_s:g} s",
-            takes_s=takes_s, time_s=envelope.time_s,
-        )  # fmt: skip
+            "dwell.takes-too-long",
+            value=takes_s,
+            limit=f"{envelope.time_s:g} s",
+            takes_s=takes_s,
+            time_s=envelope.time_s,
+        )
 
 
 @dataclass
@@ -186,9 +200,10 @@ class Shown:
     def __call__(self, fraction: float) -> None:
         """So much of the motion is over."""
         step = text(
-            "dwell.vibrating", frequency_hz=self.live.frequency_hz,
+            "dwell.vibrating",
+            frequency_hz=self.live.frequency_hz,
             amplitude_rpm=self.live.amplitude_rpm,
-        )  # fmt: skip
+        )
         self.progress(0.05 + 0.9 * fraction, step)
 
 

@@ -23,7 +23,7 @@ class DwellSettings(ToolSettings):
     by: By = Field(
         default="speed",
         description="what carries the sine: the speed setpoint, or torque ahead of the speed loop",
-    )  # fmt: skip
+    )
     amplitude_rpm: float = Field(
         default=5.0, gt=0, le=300, description="amplitude of the speed setpoint, in rpm"
     )
@@ -31,7 +31,9 @@ class DwellSettings(ToolSettings):
         default=5.0, gt=0, le=100, description="amplitude of the torque, in % of rated"
     )
     turn_rpm: float = Field(
-        default=0.0, ge=0, le=500,
+        default=0.0,
+        ge=0,
+        le=500,
         description="slow speed to and fro that the vibration is added to; 0: about standstill",
-    )  # fmt: skip
+    )
     duration_s: float = Field(default=10.0, ge=1, le=60, description="time at full amplitude, in s")

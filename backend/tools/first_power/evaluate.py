@@ -76,14 +76,19 @@ def reevaluate(arrays: Arrays, meta: Meta) -> FirstPowerResult:
         raise ValueError("not the raw data of a first power")
     pulses = [
         Pulse(
-            direction=1 if way > 0 else -1, torque_percent=float(percent), from_rev=float(begin),
+            direction=1 if way > 0 else -1,
+            torque_percent=float(percent),
+            from_rev=float(begin),
             to_rev=float(end),
         )
         for way, percent, begin, end in zip(
-            arrays["direction"], arrays["pulse_percent"], arrays["from_rev"], arrays["to_rev"],
+            arrays["direction"],
+            arrays["pulse_percent"],
+            arrays["from_rev"],
+            arrays["to_rev"],
             strict=True,
         )
-    ]  # fmt: skip
+    ]
     switches = facts.get("switches")
     pair = None if switches is None else (bool(switches[0]), bool(switches[1]))
     seen = Seen(**(facts | {"switches": pair}))
@@ -99,17 +104,24 @@ def evaluate(seen: Seen, pulses: Sequence[Pulse], settings: FirstPowerSettings) 
         phases = _phases(_way_of(pulses, settings), backwards, settings.pole_pairs, covers)
     moved = any(abs(each.to_rev - each.from_rev) > STILL_REV for each in pulses)
     checks = (
-        _supply(seen), _resolution(seen), *_turned(seen, settings), _switches(seen, settings),
+        _supply(seen),
+        _resolution(seen),
+        *_turned(seen, settings),
+        _switches(seen, settings),
         _check("brake", "ok" if moved else "not_seen" if pulses else "not_done"),
         _check("phases", phases),
-    )  # fmt: skip
+    )
     places = [abs(place) for each in pulses for place in (each.from_rev, each.to_rev)]
     return FirstPowerResult(
-        verdict=_verdict(checks), measured_at=seen.measured_at, checks=checks,
-        pulses=tuple(pulses), travel_rev=max(places, default=0.0),
+        verdict=_verdict(checks),
+        measured_at=seen.measured_at,
+        checks=checks,
+        pulses=tuple(pulses),
+        travel_rev=max(places, default=0.0),
         torque_percent=max((each.torque_percent for each in pulses), default=0.0),
-        covers_pole_pairs=covers if pulses else None, guide=seen.guide,
-    )  # fmt: skip
+        covers_pole_pairs=covers if pulses else None,
+        guide=seen.guide,
+    )
 
 
 def covered_pole_pairs(travel_rev: float) -> int:

@@ -108,11 +108,14 @@ async def _read(axis: Axis) -> Seen:
     inputs = await _limit_inputs(drive)
     faults = len(await axis.active_faults()) if await axis.state() is State.FAULT else 0
     return Seen(
-        measured_at=datetime.now(UTC).isoformat(timespec="seconds"), supply_v=voltage,
+        measured_at=datetime.now(UTC).isoformat(timespec="seconds"),
+        supply_v=voltage,
         faults=faults,
         counts_per_rev=abs(float(units.position_raw(1.0))) if _certain(units) else None,
-        certain=_certain(units), switch_inputs=inputs is not None, guide=_guide(drive),
-    )  # fmt: skip
+        certain=_certain(units),
+        switch_inputs=inputs is not None,
+        guide=_guide(drive),
+    )
 
 
 def _certain(units: AxisUnits) -> bool:
@@ -294,9 +297,13 @@ class _Test:
         raw = self._sequence(direction * percent)
         try:
             await play(
-                axis, session, Play(Mode.CST, raw), self._around(before), self._rated_nm,
+                axis,
+                session,
+                Play(Mode.CST, raw),
+                self._around(before),
+                self._rated_nm,
                 lambda _: None,
-            )  # fmt: skip
+            )
             await self._settled()
         except EnvelopeExceeded as error:
             if error.halt.cause not in (HaltCause.POSITION, HaltCause.SPEED):

@@ -60,23 +60,32 @@ class Map:
             np.concatenate([each.torque_nm for each in recordings]),
             np.concatenate([each.valid for each in recordings]),
             np.concatenate(plateau).astype(np.int64),
-            torque_step_nm, inertia_kgm2, ripple_rpm, by_travel, by_time,
-        )  # fmt: skip
+            torque_step_nm,
+            inertia_kgm2,
+            ripple_rpm,
+            by_travel,
+            by_time,
+        )
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
         """For storage."""
         return {
-            "position_rad": self.position_rad, "torque_nm": self.torque_nm, "valid": self.valid,
+            "position_rad": self.position_rad,
+            "torque_nm": self.torque_nm,
+            "valid": self.valid,
             "plateau": self.plateau,
-        }  # fmt: skip
+        }
 
     def facts(self) -> dict[str, object]:
         """For storage, with the arrays."""
         return {
-            "sample_rate_hz": self.sample_rate_hz, "torque_step_nm": self.torque_step_nm,
-            "inertia_kgm2": self.inertia_kgm2, "ripple_rpm": self.ripple_rpm,
-            "by_travel": self.by_travel, "by_time": self.by_time,
-        }  # fmt: skip
+            "sample_rate_hz": self.sample_rate_hz,
+            "torque_step_nm": self.torque_step_nm,
+            "inertia_kgm2": self.inertia_kgm2,
+            "ripple_rpm": self.ripple_rpm,
+            "by_travel": self.by_travel,
+            "by_time": self.by_time,
+        }
 
 
 @dataclass(frozen=True)
@@ -129,9 +138,10 @@ def evaluate(data: Map, settings: FrictionSettings, facts: AxisFacts) -> Frictio
     step = data.torque_step_nm / facts.rated_torque_nm * 100.0
     findings: list[Finding] = []
     slow = [
-        each for each in even
+        each
+        for each in even
         if data.ripple_rpm is not None and abs(abs(each.rpm) / data.ripple_rpm - 1.0) < 0.1
-    ]  # fmt: skip
+    ]
     inertia = data.inertia_kgm2 / facts.rated_torque_nm * 100.0
     rate = data.sample_rate_hz
     ripple = _ripple(slow, settings.orders, rate, inertia, step)
@@ -165,18 +175,23 @@ def evaluate(data: Map, settings: FrictionSettings, facts: AxisFacts) -> Frictio
         findings.append(Finding(code="compensation_in_controller"))
     return FrictionResult(
         rated_torque_nm=facts.rated_torque_nm if facts.torque_known else None,
-        points=tuple(points), curve_speed_rpm=speeds, curve_percent=curve,
+        points=tuple(points),
+        curve_speed_rpm=speeds,
+        curve_percent=curve,
         coulomb_percent=_estimate(model.value(1)),
         viscous_percent_per_rpm=_estimate(model.value(2)),
         stribeck_percent=_estimate(model.value(3)) if model.reached else None,
         stribeck_speed_rpm=_estimate(model.stribeck_speed()) if model.reached else None,
-        load_percent=_estimate(model.value(0)), harmonics=harmonics,
+        load_percent=_estimate(model.value(0)),
+        harmonics=harmonics,
         ripple_speed_rpm=data.ripple_rpm if ripple is not None else None,
-        ripple_angle_deg=angle, ripple_forward_percent=forward, ripple_backward_percent=backward,
+        ripple_angle_deg=angle,
+        ripple_forward_percent=forward,
+        ripple_backward_percent=backward,
         compensation_percent=_compensation(harmonics, angle),
         findings=(Finding(code="mapped", value=float(len(points))), *findings),
         motion_s=data.position_rad.size / data.sample_rate_hz,
-    )  # fmt: skip
+    )
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> FrictionResult:
@@ -191,12 +206,16 @@ def reevaluate(arrays: Arrays, meta: Meta) -> FrictionResult:
     ripple = meta["ripple_rpm"]
     data = Map(
         float(str(meta["sample_rate_hz"])),
-        np.asarray(arrays["position_rad"], np.float64), np.asarray(arrays["torque_nm"], np.float64),
-        np.asarray(arrays["valid"], np.bool_), np.asarray(arrays["plateau"], np.int64),
-        float(str(meta["torque_step_nm"])), float(str(meta["inertia_kgm2"])),
-        None if ripple is None else float(str(ripple)), bool(meta["by_travel"]),
+        np.asarray(arrays["position_rad"], np.float64),
+        np.asarray(arrays["torque_nm"], np.float64),
+        np.asarray(arrays["valid"], np.bool_),
+        np.asarray(arrays["plateau"], np.int64),
+        float(str(meta["torque_step_nm"])),
+        float(str(meta["inertia_kgm2"])),
+        None if ripple is None else float(str(ripple)),
+        bool(meta["by_travel"]),
         bool(meta["by_time"]),
-    )  # fmt: skip
+    )
     return evaluate(data, FrictionSettings.model_validate(given), AxisFacts(**facts))
 
 
@@ -388,11 +407,12 @@ def _harmonics(ripple: _Ripple | None) -> tuple[Harmonic, ...]:
         phase = float(np.degrees(np.angle(ripple.amplitude[index]))) + 90.0
         found.append(
             Harmonic(
-                order_per_rev=int(ripple.orders[index]), amplitude_percent=size,
+                order_per_rev=int(ripple.orders[index]),
+                amplitude_percent=size,
                 amplitude_ci95_percent=(max(size - half, 0.0), size + half),
                 phase_deg=(phase + 180.0) % 360.0 - 180.0,
             )
-        )  # fmt: skip
+        )
     return tuple(sorted(found, key=lambda each: -each.amplitude_percent))
 
 

@@ -144,11 +144,14 @@ async def run(run: Run, settings: FrictionSettings) -> FrictionResult:
             await go_back(axis, session, home, envelope, facts)
     run.progress(0.92, text("friction.going-back-evaluating"))
     found = Map.of(
-        [recording for recording, _ in taken], [numbers for _, numbers in taken],
+        [recording for recording, _ in taken],
+        [numbers for _, numbers in taken],
         torque_step_nm=abs(units.torque(1.0)) / 100.0 * facts.rated_torque_nm,
-        inertia_kgm2=look.rough.inertia_kgm2, by_travel=plan.by_travel, by_time=plan.by_time,
+        inertia_kgm2=look.rough.inertia_kgm2,
+        by_travel=plan.by_travel,
+        by_time=plan.by_time,
         ripple_rpm=None if plan.ripple_rps is None else plan.ripple_rps * 60.0,
-    )  # fmt: skip
+    )
     if run.keep is not None:
         meta = {"settings": settings.model_dump(mode="json"), "facts": asdict(facts)}
         run.keep("friction", found.arrays(), {"tool": "friction", **meta, **found.facts()})
@@ -158,9 +161,12 @@ async def run(run: Run, settings: FrictionSettings) -> FrictionResult:
 
 
 async def _stroke(
-    run: Run, settings: FrictionSettings, facts: AxisFacts, stroke: Stroke,
+    run: Run,
+    settings: FrictionSettings,
+    facts: AxisFacts,
+    stroke: Stroke,
     where: tuple[float, float, Text],
-) -> tuple[Recording, FloatArray]:  # fmt: skip
+) -> tuple[Recording, FloatArray]:
     """The recording of one speed, and the number of the plateau that each sample counts for."""
     slow_rps = 0.25 * settings.speed_limit / 60.0
     speed_rpm, numbers = speeds_of(stroke, 1.0 / cycle_s(run.session), slow_rps)

@@ -121,11 +121,14 @@ def report(result: FrictionResult) -> Section:
     ]
     rows += [
         Row(
-            "harmonic", torque * each.amplitude_percent, unit,
-            _scaled(each.amplitude_ci95_percent, torque), {"order": str(each.order_per_rev)},
+            "harmonic",
+            torque * each.amplitude_percent,
+            unit,
+            _scaled(each.amplitude_ci95_percent, torque),
+            {"order": str(each.order_per_rev)},
         )
         for each in result.harmonics[:_SHOWN]
-    ]  # fmt: skip
+    ]
     notes = tuple(_note(finding) for finding in result.findings)
     charts = [_over_speed(result)]
     if result.ripple_angle_deg:

@@ -103,10 +103,13 @@ class Experiments:
             )  # fmt: skip
             found.append(
                 PairRecord(
-                    e, self.sent[number], self.torque[number], self.speed[number],
+                    e,
+                    self.sent[number],
+                    self.torque[number],
+                    self.speed[number],
                     self.valid[number],
                 )
-            )  # fmt: skip
+            )
         return tuple(found)
 
 
@@ -304,9 +307,12 @@ def _square_rev(data: Experiments, steady: _Steady, modes: CoupledModes) -> Gant
 
 
 def _machine_findings(
-    data: Experiments, steady: _Steady, square: GantryValue | None, in_mm: GantryValue | None,
+    data: Experiments,
+    steady: _Steady,
+    square: GantryValue | None,
+    in_mm: GantryValue | None,
     modes: CoupledModes,
-) -> list[GantryFinding]:  # fmt: skip
+) -> list[GantryFinding]:
     found = [_square_finding(steady, square, in_mm)]
     if square is None and found[0].code == "out_of_square":
         code = "no_skew_stiffness" if data.torque_known else "rated_torque_unknown"
@@ -359,10 +365,13 @@ def _loop_findings(
     if margins.stable is None:
         return [GantryFinding(code="margins_beyond_band", values={"top": top})]
     values = {
-        "ms": f"{margins.ms:.3g}", "ms_high": f"{margins.ms_ci95[1]:.3g}",
-        "hz": f"{margins.ms_hz:.3g}", "goal": f"{threshold.MS:g}",
-        "alone": f"{max(margins.ms_alone):.3g}", "top": top,
-    }  # fmt: skip
+        "ms": f"{margins.ms:.3g}",
+        "ms_high": f"{margins.ms_ci95[1]:.3g}",
+        "hz": f"{margins.ms_hz:.3g}",
+        "goal": f"{threshold.MS:g}",
+        "alone": f"{max(margins.ms_alone):.3g}",
+        "top": top,
+    }
     if not margins.stable:
         found = [GantryFinding(code="pair_unstable", values=values)]
     elif margins.ms_ci95[1] <= threshold.MS:
@@ -385,13 +394,14 @@ def _entries(response: CoupledResponse) -> tuple[GantryEntry, ...]:
             half = response.spread * std[:, i, j] / np.maximum(np.abs(g[:, i, j]), 1e-300)
             made.append(
                 GantryEntry(
-                    speed=1 if i == 0 else 2, torque=1 if j == 0 else 2,
+                    speed=1 if i == 0 else 2,
+                    torque=1 if j == 0 else 2,
                     magnitude_db=_tuple(magnitude_db(g[:, i, j])),
                     half_db=_tuple(20.0 / np.log(10.0) * half),
                     phase_deg=_tuple(phase_deg(g[:, i, j])),
                     coherence=_tuple(response.coherence[:, i, j]),
                 )
-            )  # fmt: skip
+            )
     return tuple(made)
 
 
@@ -414,10 +424,14 @@ def _motions(response: CoupledResponse) -> tuple[GantryMotion, GantryMotion]:
 
 def _margins(found: JointMargins) -> GantryMargins:
     return GantryMargins(
-        stable=found.stable, ms=found.ms, ms_ci95=found.ms_ci95, ms_hz=found.ms_hz,
-        ms_alone=found.ms_alone, phase_margin_deg=found.phase_margin_deg,
+        stable=found.stable,
+        ms=found.ms,
+        ms_ci95=found.ms_ci95,
+        ms_hz=found.ms_hz,
+        ms_alone=found.ms_alone,
+        phase_margin_deg=found.phase_margin_deg,
         crossover_hz=found.crossover_hz,
-    )  # fmt: skip
+    )
 
 
 def _stiffness(modes: CoupledModes) -> GantryValue | None:

@@ -80,10 +80,15 @@ def planned(settings: GantrySettings, rate: float) -> Plan:
     lines = choose_lines(lowest, top, rate / n, count=threshold.LINES)
     corner = np.hypot(1.0, lines * (rate / n) / threshold.CORNER_HZ)
     made = orthogonal_multisines(
-        sample_rate_hz=rate, period_samples=n, lines=lines, periods=threshold.PERIODS + 1,
-        transient_periods=1, realisations=threshold.REALISATIONS, ramp_samples=n // 2,
+        sample_rate_hz=rate,
+        period_samples=n,
+        lines=lines,
+        periods=threshold.PERIODS + 1,
+        transient_periods=1,
+        realisations=threshold.REALISATIONS,
+        ramp_samples=n // 2,
         amplitude=1.0 / corner,
-    )  # fmt: skip
+    )
     ramp = round(threshold.RAMP_S * rate)
     way_s = (made[0].excitation.samples.size + ramp) / rate
     highest = max(float(np.max(np.abs(each.excitation.samples))) for each in made)
@@ -132,11 +137,14 @@ async def run(run: Run, settings: GantrySettings) -> GantryResult:
         data = await _data(pair, plan, recordings, used, facts)
         if run.keep is not None:
             meta = {
-                "tool": "gantry", "settings": settings.model_dump(mode="json"),
-                "shape": asdict(data.shape), "rated_torque_nm": list(rated),
-                "torque_known": data.torque_known, "partner": data.partner,
+                "tool": "gantry",
+                "settings": settings.model_dump(mode="json"),
+                "shape": asdict(data.shape),
+                "rated_torque_nm": list(rated),
+                "torque_known": data.torque_known,
+                "partner": data.partner,
                 "interpolates": data.interpolates,
-            }  # fmt: skip
+            }
             run.keep("gantry", data.arrays(), meta)
         return await meanwhile(lambda: evaluate(data, settings), _go_back(pair, settings))
 
@@ -169,9 +177,13 @@ async def _experiments(
 
 
 async def _one(
-    pair: Pair, plan: Plan, settings: GantrySettings, number: int, used: float,
+    pair: Pair,
+    plan: Plan,
+    settings: GantrySettings,
+    number: int,
+    used: float,
     reported: Callable[[float], None],
-) -> tuple[Recording, Recording]:  # fmt: skip
+) -> tuple[Recording, Recording]:
     """One experiment, from near home where it begins there."""
     if number % 2 == 0:
         await _go_back(pair, settings)
@@ -203,9 +215,12 @@ async def _go_back(pair: Pair, settings: GantrySettings) -> None:
 
 
 async def _data(
-    pair: Pair, plan: Plan, recordings: list[tuple[Recording, Recording]], used: float,
+    pair: Pair,
+    plan: Plan,
+    recordings: list[tuple[Recording, Recording]],
+    used: float,
     facts: list[AxisFacts],
-) -> Experiments:  # fmt: skip
+) -> Experiments:
     """The recordings as turning alike, and the controllers of both axes on the lines."""
     sense = np.array([1.0, pair.sense])[None, :, None]
     lines = plan.experiments[0].excitation.lines

@@ -13,16 +13,19 @@ class GantrySettings(ToolSettings):
     """The limits of every measurement, for both axes, and what couples them."""
 
     partner: Annotated[str, Option(("--partner",))] = Field(
-        default="", max_length=60,
+        default="",
+        max_length=60,
         description="the other axis: its name on the server, or its station on a bus of one's own",
-    )  # fmt: skip
+    )
     mirrored: bool = Field(
         default=False, description="the other motor turns the other way when the beam moves"
     )
     skew_limit_rev: float = Field(
-        default=0.05, gt=0, le=10,
+        default=0.05,
+        gt=0,
+        le=10,
         description="largest change of the difference of both positions, in revolutions",
-    )  # fmt: skip
+    )
     resolution_hz: float = Field(
         default=2.0, ge=0.5, le=5.0, description="distance of the lines, in Hz"
     )

@@ -173,10 +173,15 @@ def report(result: GantryResult) -> Section:
     rows.append(_row("stiffness", result.skew_stiffness_nm_per_rad, "N·m/rad"))
     rows.append(_row("inertia", result.inertia_kgm2, "kg·m²"))
     rows += [
-        Row(f"mode.{m.kind}", m.frequency_hz, "Hz", m.frequency_ci95_hz,
-            {"damping": f"{100.0 * m.damping:.2g}"})
+        Row(
+            f"mode.{m.kind}",
+            m.frequency_hz,
+            "Hz",
+            m.frequency_ci95_hz,
+            {"damping": f"{100.0 * m.damping:.2g}"},
+        )
         for m in result.modes
-    ]  # fmt: skip
+    ]
     rows += _margin_rows(result)
     lines = tuple(
         Line(f"entry.{e.speed}{e.torque}", result.frequency_hz, e.magnitude_db, e.half_db)

@@ -14,9 +14,13 @@ Quantity = Literal[
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 Unit = Literal["Hz", "%", "kg·m²", "s"]
 UNITS: dict[Quantity, Unit] = {
-    "resonance": "Hz", "antiresonance": "Hz", "friction": "%", "inertia": "kg·m²",
-    "step_rise": "s", "step_overshoot": "%",
-}  # fmt: skip
+    "resonance": "Hz",
+    "antiresonance": "Hz",
+    "friction": "%",
+    "inertia": "kg·m²",
+    "step_rise": "s",
+    "step_overshoot": "%",
+}
 
 
 class HealthValue(BaseModel):

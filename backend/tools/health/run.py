@@ -99,9 +99,11 @@ async def _inertia(run: Run, settings: HealthSettings, progress: Progress) -> He
 
 async def _friction(run: Run, settings: HealthSettings, progress: Progress) -> HealthValue | None:
     asked = FrictionSettings(
-        **_envelope(settings), speeds=settings.speeds, slowest_rpm=settings.slowest_rpm,
+        **_envelope(settings),
+        speeds=settings.speeds,
+        slowest_rpm=settings.slowest_rpm,
         ripple=False,
-    )  # fmt: skip
+    )
     found = FrictionResult.model_validate(
         (await FRICTION.run(_inner(run, progress), asked)).model_dump()
     )
@@ -128,10 +130,13 @@ async def _step(
 def _envelope(settings: HealthSettings) -> dict[str, float | None]:
     """What every tool's settings have in common, as numbers."""
     return {
-        "travel_limit": settings.travel_limit, "speed_limit": settings.speed_limit,
-        "torque_limit": settings.torque_limit, "time_limit_s": settings.time_limit_s,
-        "rated_torque_nm": settings.rated_torque_nm, "cycle_ms": settings.cycle_ms,
-    }  # fmt: skip
+        "travel_limit": settings.travel_limit,
+        "speed_limit": settings.speed_limit,
+        "torque_limit": settings.torque_limit,
+        "time_limit_s": settings.time_limit_s,
+        "rated_torque_nm": settings.rated_torque_nm,
+        "cycle_ms": settings.cycle_ms,
+    }
 
 
 TOOL = Tool(

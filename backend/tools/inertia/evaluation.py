@@ -168,11 +168,14 @@ def reevaluate(arrays: Arrays, meta: Meta) -> InertiaAnswer:
     recording = Recording(rate, **columns, valid=valid)
     return answer_of(
         InertiaOutcome(
-            evaluate(recording, settings, facts), f"host, {settings.scheme}",
-            facts.torque_known, settings.ends_rev, recording.velocity_rad_s.size / rate,
+            evaluate(recording, settings, facts),
+            f"host, {settings.scheme}",
+            facts.torque_known,
+            settings.ends_rev,
+            recording.velocity_rad_s.size / rate,
             ratio_against(facts, settings),
         )
-    )  # fmt: skip
+    )
 
 
 def answer_of(outcome: InertiaOutcome) -> InertiaAnswer:

@@ -137,9 +137,13 @@ async def first_look(
         if cramped or 2.0 * peak > 0.8 * envelope.torque_percent / 100.0:
             raise NotAllowed(
                 "inertia.moves-too-little-cramped" if cramped else "inertia.moves-too-little",
-                drive=axis.drive.name, value=round(moved, 4), limit=f"{aim:.3g} rev",
-                moved_rev=moved, aim_rev=aim, peak_share=peak,
-            )  # fmt: skip
+                drive=axis.drive.name,
+                value=round(moved, 4),
+                limit=f"{aim:.3g} rev",
+                moved_rev=moved,
+                aim_rev=aim,
+                peak_share=peak,
+            )
         speed = 2.0 * speed
     require_right_sign(axis.drive.name, recording)
     valid = recording.valid
@@ -246,9 +250,14 @@ async def identification_moves(
         moves = planned(share * threshold.WEAKER**attempt)
         try:
             return await speed_move(
-                axis, session, moves.speed_rad_s * 60.0 / _TURN, room, facts, reported,
+                axis,
+                session,
+                moves.speed_rad_s * 60.0 / _TURN,
+                room,
+                facts,
+                reported,
                 torque_nm=moves.torque_nm if ahead else None,
-            )  # fmt: skip
+            )
         except NotAllowed as error:
             last = attempt == threshold.ATTEMPTS - 1
             if last or exceeded(error) is not HaltCause.TORQUE:
@@ -316,10 +325,14 @@ def _moves(
     wanted = friction + share * (min(0.7 * torque, friction + gentle / 0.7) - friction)
     try:
         trajectory = design_moves(
-            MoveLimits(0.8 * travel_rev * _TURN, speed, wanted), rough.inertia_kgm2, rate,
-            friction_nm=friction, repetitions=settings.repetitions, smoothing_s=shape.smoothing_s,
+            MoveLimits(0.8 * travel_rev * _TURN, speed, wanted),
+            rough.inertia_kgm2,
+            rate,
+            friction_nm=friction,
+            repetitions=settings.repetitions,
+            smoothing_s=shape.smoothing_s,
             dwell_s=0.1,
-        )  # fmt: skip
+        )
     except ValueError as error:
         raise OutOfRange(
             "inertia.envelope-not-allow-moves", axis_drive=axis.drive.name, cause=reason_of(error)

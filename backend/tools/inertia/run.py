@@ -120,9 +120,13 @@ async def inertia(
     if keep is not None:
         keep("inertia", *raw_of(recording, settings, facts))
     return InertiaOutcome(
-        result, f"host, {settings.scheme}", facts.torque_known, ends,
-        recording.velocity_rad_s.size / recording.sample_rate_hz, ratio_against(facts, settings),
-    )  # fmt: skip
+        result,
+        f"host, {settings.scheme}",
+        facts.torque_known,
+        ends,
+        recording.velocity_rad_s.size / recording.sample_rate_hz,
+        ratio_against(facts, settings),
+    )
 
 
 def _check(settings: InertiaSettings) -> None:

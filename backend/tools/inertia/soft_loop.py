@@ -40,9 +40,12 @@ class SoftLoop:
 
 
 def soft_loop_of(
-    wanted_rad_s: FloatArray, velocity_rad_s: FloatArray, torque_nm: FloatArray,
-    valid: npt.NDArray[np.bool_], rate_hz: float,
-) -> SoftLoop | None:  # fmt: skip
+    wanted_rad_s: FloatArray,
+    velocity_rad_s: FloatArray,
+    torque_nm: FloatArray,
+    valid: npt.NDArray[np.bool_],
+    rate_hz: float,
+) -> SoftLoop | None:
     """The gains that explain the torque of a move best; None where none do, as of a stiff loop."""
     error = wanted_rad_s - velocity_rad_s
     best, found = threshold.EXPLAINED, None

@@ -35,9 +35,12 @@ class Sides:
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
         """For storage."""
         return {
-            "position_rad": self.position_rad, "load_counts": self.load_counts,
-            "torque_nm": self.torque_nm, "valid": self.valid, "part": self.part,
-        }  # fmt: skip
+            "position_rad": self.position_rad,
+            "load_counts": self.load_counts,
+            "torque_nm": self.torque_nm,
+            "valid": self.valid,
+            "part": self.part,
+        }
 
 
 def evaluate(data: Sides, settings: LoadSideSettings, facts: AxisFacts) -> LoadSideResult:
@@ -50,9 +53,14 @@ def evaluate(data: Sides, settings: LoadSideSettings, facts: AxisFacts) -> LoadS
     # A loop answers each setpoint that is held within its cycle, between the samples of the torque.
     usable = inertia if facts.torque_known and facts.interpolates else None
     sides = TwoSides(
-        data.sample_rate_hz, data.position_rad, data.load_counts, data.torque_nm, data.valid,
-        data.part, settings.gear_ratio,
-    )  # fmt: skip
+        data.sample_rate_hz,
+        data.position_rad,
+        data.load_counts,
+        data.torque_nm,
+        data.valid,
+        data.part,
+        settings.gear_ratio,
+    )
     try:
         found = load_side(sides, usable)
     except LoadStands as error:
@@ -73,7 +81,8 @@ def evaluate(data: Sides, settings: LoadSideSettings, facts: AxisFacts) -> LoadS
         stiffness_nm_per_rad=load_stiffness,
         stiffness_at_least_nm_per_rad=None if least is None else least * ratio**2,
         locked_motor_hz=None if found.twist_s2 is None else _frequency(found.twist_s2),
-        load_inertia_kgm2=None if found.load_inertia_kgm2 is None
+        load_inertia_kgm2=None
+        if found.load_inertia_kgm2 is None
         else _inertia(found.load_inertia_kgm2, usable or 0.0),
         error_span_deg=_positive(_estimate(found.error_span_rad, degrees)),
         error_orders=_orders(found, degrees),
@@ -82,7 +91,7 @@ def evaluate(data: Sides, settings: LoadSideSettings, facts: AxisFacts) -> LoadS
         residual_deg=found.residual_rad * degrees,
         findings=tuple(_findings(found, stiffness, inertia, facts, degrees)),
         motion_s=data.position_rad.size / data.sample_rate_hz,
-    )  # fmt: skip
+    )
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> LoadSideResult:
@@ -98,9 +107,10 @@ def reevaluate(arrays: Arrays, meta: Meta) -> LoadSideResult:
         float(str(meta["sample_rate_hz"])),
         np.asarray(arrays["position_rad"], np.float64),
         np.asarray(arrays["load_counts"], np.float64),
-        np.asarray(arrays["torque_nm"], np.float64), np.asarray(arrays["valid"], np.bool_),
+        np.asarray(arrays["torque_nm"], np.float64),
+        np.asarray(arrays["valid"], np.bool_),
         np.asarray(arrays["part"], np.int64),
-    )  # fmt: skip
+    )
     return evaluate(data, LoadSideSettings.model_validate(given), AxisFacts(**facts))
 
 
@@ -155,19 +165,24 @@ def _orders(found: LoadSide, degrees: float) -> tuple[ErrorOrder, ...]:
     shown.sort(key=lambda each: -each[1].value)
     return tuple(
         ErrorOrder(
-            order_per_rev=order, amplitude_deg=size.value * degrees,
+            order_per_rev=order,
+            amplitude_deg=size.value * degrees,
             amplitude_ci95_deg=(
-                max(size.value - size.half, 0.0) * degrees, (size.value + size.half) * degrees,
+                max(size.value - size.half, 0.0) * degrees,
+                (size.value + size.half) * degrees,
             ),
         )
         for order, size in shown
-    )  # fmt: skip
+    )
 
 
 def _findings(
-    found: LoadSide, stiffness: Estimate | None, inertia: float | None, facts: AxisFacts,
+    found: LoadSide,
+    stiffness: Estimate | None,
+    inertia: float | None,
+    facts: AxisFacts,
     degrees: float,
-) -> list[Finding]:  # fmt: skip
+) -> list[Finding]:
     """The verdict first, then what cannot be known, and why."""
     gap, lost = found.backlash_rad, found.lost_motion_rad
     if gap is None:

@@ -69,9 +69,10 @@ def planned(settings: LoadSideSettings, room: Room, rate: float) -> Plan:
     range_rev = min(wanted_rev, 2.0 * room.travel_rev)
     if peak_rps < threshold.LEAST_RPS or range_rev < threshold.LEAST_REV:
         raise OutOfRange(
-            "load-side.no-room", value=round(2.0 * room.travel_rev, 4),
+            "load-side.no-room",
+            value=round(2.0 * room.travel_rev, 4),
             limit=f"{threshold.LEAST_REV:g} rev",
-        )  # fmt: skip
+        )
     moves_rpm, moves_part = _moves(peak_rps, quarter_s, rate)
     left_s = room.time_s - moves_rpm.size / rate - threshold.SPARE_S
     fastest_rps = threshold.SLOW_SHARE * room.speed_rps
@@ -81,9 +82,11 @@ def planned(settings: LoadSideSettings, room: Room, rate: float) -> Plan:
     if slow_rps > fastest_rps:
         longest_s = room.time_s - left_s + threshold.PASSES * range_rev / fastest_rps
         raise OutOfRange(
-            "load-side.no-time", value=round(longest_s, 1), limit=f"{room.time_s:g} s",
+            "load-side.no-time",
+            value=round(longest_s, 1),
+            limit=f"{room.time_s:g} s",
             range_rev=range_rev,
-        )  # fmt: skip
+        )
     slow_rpm, slow_part = _passes(range_rev, slow_rps, fastest_rps, rate)
     return Plan(slow_rpm, slow_part, moves_rpm, moves_part)
 
@@ -202,9 +205,11 @@ async def load_position(axis: Axis, session: CyclicSession) -> str:
         raise NotAllowed("load-side.no-second-position", drive=drive.name)
     if not session.carries(drive, key):
         raise NotAllowed(
-            "measuring.not-part-cyclic-data", drive=drive.name, parameter=key,
+            "measuring.not-part-cyclic-data",
+            drive=drive.name,
+            parameter=key,
             replace="load position",
-        )  # fmt: skip
+        )
     return key
 
 
@@ -218,10 +223,12 @@ def _sides(recordings: Sequence[Recording], parts: Sequence[IntArray]) -> Sides:
     part = np.concatenate([p[:n] for p, n in zip(parts, sizes, strict=True)])
     return Sides(
         recordings[0].sample_rate_hz,
-        np.concatenate([each.position_rad for each in recordings]), load,
+        np.concatenate([each.position_rad for each in recordings]),
+        load,
         np.concatenate([each.torque_nm for each in recordings]),
-        np.concatenate([each.valid for each in recordings]), part,
-    )  # fmt: skip
+        np.concatenate([each.valid for each in recordings]),
+        part,
+    )
 
 
 def _room(envelope: Envelope, facts: AxisFacts, rough: RoughFit) -> Room:

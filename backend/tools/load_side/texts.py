@@ -112,10 +112,15 @@ def report(result: LoadSideResult) -> Section:
         _row("error_span", result.error_span_deg, "°"),
     ]
     rows += [
-        Row("order", each.amplitude_deg, "°", each.amplitude_ci95_deg,
-            {"order": f"{each.order_per_rev:g}"})
+        Row(
+            "order",
+            each.amplitude_deg,
+            "°",
+            each.amplitude_ci95_deg,
+            {"order": f"{each.order_per_rev:g}"},
+        )
         for each in result.error_orders[:_SHOWN]
-    ]  # fmt: skip
+    ]
     rows.append(Row("counts", result.counts_per_load_rev, ""))
     line = Line("curve", result.error_angle_deg, result.error_deg)
     chart = Chart("over_angle", "angle", "error", (line,))

@@ -158,8 +158,9 @@ def torque_injection(
         return np.asarray(f / np.hypot(f, threshold.LOOP_CORNER_HZ))
 
     sequences = []
-    for e, reference in _referenced(rate, band, room, size, realisations, position, base, waveform,
-                                    integrations=0):  # fmt: skip
+    for e, reference in _referenced(
+        rate, band, room, size, realisations, position, base, waveform, integrations=0
+    ):
         sequences.append(Sequence(scaled(e, share * room.torque_nm, step_nm), reference))
     return tuple(sequences)
 
@@ -182,8 +183,9 @@ def _referenced(
             yield e, _stretched(reference, e, of.period // 8, position)
         return
     for i in range(2 * first, 2 * (first + realisations)):
-        e = periodic(of, size(of.line_hz), i, integrations=integrations,
-                     ramp_samples=of.period // 8)  # fmt: skip
+        e = periodic(
+            of, size(of.line_hz), i, integrations=integrations, ramp_samples=of.period // 8
+        )
         fade = e.samples.size - (e.first_sample + e.periods * e.period_samples)
         yield e, _stretched(reference, e, fade, position)
 

@@ -88,9 +88,12 @@ def raise_if_ended(axis: Axis, session: CyclicSession) -> None:
     if halt is not None:
         if halt.cause in _OF_THE_MOTION:
             raise motion_halted(
-                name, halt, words=halt_words(halt, axis.known_units), drive=name,
+                name,
+                halt,
+                words=halt_words(halt, axis.known_units),
+                drive=name,
                 remedy="measuring.check-then-widen",
-            )  # fmt: skip
+            )
         raise interrupted_by(axis, halt)
     if not session.running:
         raise LinkLost("measuring.cyclic-exchange-ended-during", drive=name)

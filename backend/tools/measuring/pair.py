@@ -85,9 +85,12 @@ async def both_enabled(pair: Pair) -> AsyncIterator[None]:
 
 
 async def play_pair(
-    pair: Pair, speeds_rpm: FloatArray, envelope: Envelope, skew_limit_rev: float,
+    pair: Pair,
+    speeds_rpm: FloatArray,
+    envelope: Envelope,
+    skew_limit_rev: float,
     progress: Callable[[float], None],
-) -> tuple[Recording, Recording]:  # fmt: skip
+) -> tuple[Recording, Recording]:
     """Enable both, play speeds [2, n] of each axis (turning alike is alike), and disable both.
 
     Raises:
@@ -107,10 +110,12 @@ async def play_pair(
         catches.append(Catch(tuple(channel(axis.drive, key) for key in [*keys, target])))
         trajectories.append(
             bus.Trajectory(
-                session.station(axis.drive), address_of(axis.drive.parameter(target)), values,
+                session.station(axis.drive),
+                address_of(axis.drive.parameter(target)),
+                values,
                 await bus_limits(axis, envelope, home),
             )
-        )  # fmt: skip
+        )
     coupled = await pair.coupled(skew_limit_rev)
     async with both_enabled(pair):
         for axis in pair.axes:
@@ -136,9 +141,12 @@ async def play_pair(
 
 
 async def _through(
-    pair: Pair, trajectories: tuple[bus.Trajectory, bus.Trajectory], coupled: bus.Coupled,
-    catches: list[Catch], progress: Callable[[float], None],
-) -> None:  # fmt: skip
+    pair: Pair,
+    trajectories: tuple[bus.Trajectory, bus.Trajectory],
+    coupled: bus.Coupled,
+    catches: list[Catch],
+    progress: Callable[[float], None],
+) -> None:
     """Renew both until every sample of both has come back."""
     session, (first, second) = pair.session, pair.axes
     period_s, count = cycle_s(session), len(trajectories[0].values)
@@ -160,9 +168,11 @@ async def _through(
             return
         if time.monotonic() > deadline:
             raise LinkLost(
-                "measuring.samples-came-back-bus", drive=first.drive.name, arrived=arrived,
+                "measuring.samples-came-back-bus",
+                drive=first.drive.name,
+                arrived=arrived,
                 count=count,
-            )  # fmt: skip
+            )
         await asyncio.sleep(threshold.RENEW_S)
         _raise_if_ended(pair)
         for trajectory in trajectories:

@@ -65,10 +65,13 @@ class Recording:
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
         """For storage."""
         return {
-            "position_rad": self.position_rad, "velocity_rad_s": self.velocity_rad_s,
-            "torque_nm": self.torque_nm, "sent": self.sent, "offset": self.offset,
+            "position_rad": self.position_rad,
+            "velocity_rad_s": self.velocity_rad_s,
+            "torque_nm": self.torque_nm,
+            "sent": self.sent,
+            "offset": self.offset,
             "valid": self.valid,
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True)
@@ -114,10 +117,13 @@ class Catch:
         valid = None if block.valid is None else block.valid[early:]
         return [
             replace(
-                block, samples=block.samples[early:], valid=valid, dropped=0,
+                block,
+                samples=block.samples[early:],
+                valid=valid,
+                dropped=0,
                 cycle=block.cycle + early,
             )
-        ]  # fmt: skip
+        ]
 
     @property
     def arrived(self) -> int:

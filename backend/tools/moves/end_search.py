@@ -84,9 +84,12 @@ class _Stall:
 
 
 async def _creep(
-    axis: Axis, session: CyclicSession, settings: InertiaSettings, facts: AxisFacts,
+    axis: Axis,
+    session: CyclicSession,
+    settings: InertiaSettings,
+    facts: AxisFacts,
     direction: float,
-) -> float:  # fmt: skip
+) -> float:
     """Position of one end in rev."""
     units, rate = await axis.units(), 1.0 / cycle_s(session)
     way = settings.envelope.travel_rev
@@ -99,9 +102,14 @@ async def _creep(
 
     envelope = replace(settings.envelope, travel_rev=way * 1.1)
     recording = await speed_move(
-        axis, session, direction * speed * ramp, envelope, facts, lambda _fraction: None,
+        axis,
+        session,
+        direction * speed * ramp,
+        envelope,
+        facts,
+        lambda _fraction: None,
         stall.seen,
-    )  # fmt: skip
+    )
     end = units.position(await axis.position_raw())
     if not stall.found:
         raise NotAllowed(

@@ -41,9 +41,14 @@ async def go_back(
         around = abs(rest) + envelope.travel_rev
         try:
             await _move(
-                axis, session, goal_raw, distance, slower, replace(envelope, travel_rev=around),
+                axis,
+                session,
+                goal_raw,
+                distance,
+                slower,
+                replace(envelope, travel_rev=around),
                 facts,
-            )  # fmt: skip
+            )
         except NotAllowed as error:
             if slower >= threshold.SLOWEST or exceeded(error) is not HaltCause.TORQUE:
                 raise
@@ -58,9 +63,14 @@ async def go_back(
 
 
 async def _move(
-    axis: Axis, session: CyclicSession, goal_raw: int, distance: float, slower: float,
-    envelope: Envelope, facts: AxisFacts,
-) -> None:  # fmt: skip
+    axis: Axis,
+    session: CyclicSession,
+    goal_raw: int,
+    distance: float,
+    slower: float,
+    envelope: Envelope,
+    facts: AxisFacts,
+) -> None:
     """One move by ``distance`` turns that takes ``slower`` times as long as it has to."""
     units, rate = await axis.units(), 1.0 / cycle_s(session)
     # Peak speed of a raised cosine is twice its mean.
@@ -73,9 +83,13 @@ async def _move(
     async with enabled(axis, session, Mode.CSV):
         await quiet(axis)
         await play(
-            axis, session, Play(Mode.CSV, values), limits, facts.rated_torque_nm,
+            axis,
+            session,
+            Play(Mode.CSV, values),
+            limits,
+            facts.rated_torque_nm,
             lambda _fraction: None,
-        )  # fmt: skip
+        )
         await quiet(axis)
 
 

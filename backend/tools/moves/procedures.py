@@ -104,9 +104,12 @@ async def _carry_out(
                 left = len(procedure.steps) - number - 1
                 error.text = text(
                     "moves.procedure-step-before-others" if left else "moves.procedure-step",
-                    procedure=procedure.title, number=number + 1, step=described[number],
-                    cause=error.text, left=left,
-                )  # fmt: skip
+                    procedure=procedure.title,
+                    number=number + 1,
+                    step=described[number],
+                    cause=error.text,
+                    left=left,
+                )
                 raise
             if isinstance(step, WaitStep):
                 await left_alone.aclose()

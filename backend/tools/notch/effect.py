@@ -192,9 +192,13 @@ def room_to_tremble(
 
 
 def _sequence(
-    rate: float, envelope: Envelope, facts: AxisFacts, rigid: excite.Rigid, still: bool,
+    rate: float,
+    envelope: Envelope,
+    facts: AxisFacts,
+    rigid: excite.Rigid,
+    still: bool,
     part: float = 1.0,
-) -> excite.Sequence:  # fmt: skip
+) -> excite.Sequence:
     """The excitation of a frequency response, one realisation, or ``part`` of its size."""
     rated = facts.rated_torque_nm
     room = excite.Room(
@@ -303,10 +307,13 @@ class _Free:
             raw = sign * np.round(self.sequence.excitation.samples / step).astype(np.int64)
             async with enabled(axis, self.session, Mode.CST):
                 recording = await play(
-                    axis, self.session, Play(Mode.CST, raw),
-                    await bus_limits(axis, self.envelope, self.home), facts.rated_torque_nm,
+                    axis,
+                    self.session,
+                    Play(Mode.CST, raw),
+                    await bus_limits(axis, self.envelope, self.home),
+                    facts.rated_torque_nm,
                     reported,
-                )  # fmt: skip
+                )
             torque, _ = periods_of(self.sequence, recording)
             if len(torque):
                 return np.asarray(sign * np.mean(torque, axis=0))

@@ -79,9 +79,14 @@ def _slot(spec: NotchSpec, number: int, drive: str) -> NotchSlot:
 
 def _value_keys(slot: NotchSlot) -> tuple[str, ...]:
     keys = (
-        slot.a1_key, slot.a2_key, slot.b1_key, slot.b2_key,
-        slot.frequency_key, slot.width_key, slot.depth_key,
-    )  # fmt: skip
+        slot.a1_key,
+        slot.a2_key,
+        slot.b1_key,
+        slot.b2_key,
+        slot.frequency_key,
+        slot.width_key,
+        slot.depth_key,
+    )
     return tuple(key for key in keys if key is not None)
 
 
@@ -110,9 +115,13 @@ def _coefficients(slot: NotchSlot, raw: Mapping[str, int]) -> NotchCoefficients:
 
 
 def encode(
-    profile: Profile, drive: str, number: int, notch: Notch | None, enable_now: int | None,
+    profile: Profile,
+    drive: str,
+    number: int,
+    notch: Notch | None,
+    enable_now: int | None,
     meaning: NotchMeaning | None = None,
-) -> Preview:  # fmt: skip
+) -> Preview:
     """Raw values for one slot; None switches it off. ``enable_now`` is its enable word as it is.
 
     ``meaning`` is what was measured of values that no manual explains.
@@ -143,9 +152,13 @@ def encode(
 
 
 def _require_meant(
-    profile: Profile, drive: str, number: int, notch: Notch | None, raw: Mapping[str, int],
+    profile: Profile,
+    drive: str,
+    number: int,
+    notch: Notch | None,
+    raw: Mapping[str, int],
     meaning: NotchMeaning | None,
-) -> None:  # fmt: skip
+) -> None:
     """Raise OutOfRange where these values, read back, are no notch or one elsewhere."""
     spec = spec_of(profile, drive)
     if notch is None or spec.encoding == "coefficients":
@@ -160,10 +173,13 @@ def _require_meant(
         got = None
     if got is None or abs(got.center_hz / notch.center_hz - 1.0) > threshold.ELSEWHERE:
         raise OutOfRange(
-            "notch.read-back-other", drive=drive, value=f"{notch.center_hz:g} Hz",
-            limit=text("limit.notch-there"), number=number + 1,
+            "notch.read-back-other",
+            drive=drive,
+            value=f"{notch.center_hz:g} Hz",
+            limit=text("limit.notch-there"),
+            number=number + 1,
             read_hz=0.0 if got is None else got.center_hz,
-        )  # fmt: skip
+        )
 
 
 def _enable(profile: Profile, slot: NotchSlot, on: bool, enable_now: int | None) -> dict[str, int]:

@@ -50,10 +50,15 @@ _CENTRES = np.geomspace(50.0, 400.0, 19)
 
 
 async def measure_meaning_in_loop(
-    axis: Axis, session: CyclicSession, envelope: Envelope, facts: AxisFacts,
-    mechanics: SweepResult, inertia_kgm2: float, progress: Progress,
+    axis: Axis,
+    session: CyclicSession,
+    envelope: Envelope,
+    facts: AxisFacts,
+    mechanics: SweepResult,
+    inertia_kgm2: float,
+    progress: Progress,
     repeats: Repeats | None = None,
-) -> NotchMeaning:  # fmt: skip
+) -> NotchMeaning:
     """As `notch_effect.measure_meaning`, with the speed loop closed all the time.
 
     Raises:
@@ -64,9 +69,13 @@ async def measure_meaning_in_loop(
     if mechanics.model is None:
         raise NotAllowed("notch.whether-loop-stays-stable", drive=axis.drive.name)
     settings = SweepSettings(
-        envelope, loop="speed", realisations=1, rated_torque_nm=facts.rated_torque_nm,
-        inertia_kgm2=inertia_kgm2, hold=mechanics.hold,
-    )  # fmt: skip
+        envelope,
+        loop="speed",
+        realisations=1,
+        rated_torque_nm=facts.rated_torque_nm,
+        inertia_kgm2=inertia_kgm2,
+        hold=mechanics.hold,
+    )
     setup = await setup_of(axis, session, settings, facts, "speed", None)
     if not setup.by_speed:
         # Where torque could be added, too: whether it passes the notch no manual says.
@@ -158,9 +167,14 @@ class _ClosedLoopTrial:
                 break
             tries += 1
             ((sent, recording),) = await play_fitting(
-                self.axis, self.session, self.settings, self.setup, (sequence,), self.home,
+                self.axis,
+                self.session,
+                self.settings,
+                self.setup,
+                (sequence,),
+                self.home,
                 _progress(reported),
-            )  # fmt: skip
+            )
             e = sent.excitation
             period = e.samples[e.first_sample :][: e.period_samples]
             found = periods_of(sent, recording)

@@ -51,9 +51,14 @@ _SIGNED = (
     "identity",
 )  # fmt: skip
 _ARRAYS = (
-    "position_rev", "speed_rpm", "torque_percent", "commanded_rpm",
-    "enabled", "quick_stop", "valid",
-)  # fmt: skip
+    "position_rev",
+    "speed_rpm",
+    "torque_percent",
+    "commanded_rpm",
+    "enabled",
+    "quick_stop",
+    "valid",
+)
 
 
 @dataclass(frozen=True)
@@ -86,9 +91,11 @@ class Trace:
     def facts(self) -> dict[str, object]:
         """For storage, with the arrays."""
         return {
-            "sample_rate_hz": self.sample_rate_hz, "asked_until": self.asked_until,
-            "measured_at": self.measured_at, "reports": list(self.reports),
-        }  # fmt: skip
+            "sample_rate_hz": self.sample_rate_hz,
+            "asked_until": self.asked_until,
+            "measured_at": self.measured_at,
+            "reports": list(self.reports),
+        }
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> SafetyResult:
@@ -109,14 +116,18 @@ def reevaluate(arrays: Arrays, meta: Meta) -> SafetyResult:
         return np.asarray(arrays[name], np.bool_)
 
     trace = Trace(
-        position_rev=number("position_rev"), speed_rpm=number("speed_rpm"),
-        torque_percent=number("torque_percent"), commanded_rpm=number("commanded_rpm"),
-        enabled=flag("enabled"), quick_stop=flag("quick_stop"), valid=flag("valid"),
+        position_rev=number("position_rev"),
+        speed_rpm=number("speed_rpm"),
+        torque_percent=number("torque_percent"),
+        commanded_rpm=number("commanded_rpm"),
+        enabled=flag("enabled"),
+        quick_stop=flag("quick_stop"),
+        valid=flag("valid"),
         sample_rate_hz=float(str(meta["sample_rate_hz"])),
         asked_until=int(str(meta["asked_until"])),
         measured_at=str(meta["measured_at"]),
         reports=tuple(map(str, reports)) if isinstance(reports, (list, tuple)) else (),
-    )  # fmt: skip
+    )
     found = evaluate(trace, SafetySettings.model_validate(given))
     signature = meta.get("signature")
     if not isinstance(signature, Mapping):
@@ -147,9 +158,11 @@ def signed(arrays: Arrays, meta: Meta, person: str, when: str, notes: str) -> di
     if meta.get("tool") != "safety-check" or "signature" in meta:
         raise ValueError("not the raw data of a safety check that nobody has signed")
     return {
-        "person": person, "signed": when, "notes": notes,
+        "person": person,
+        "signed": when,
+        "notes": notes,
         "sha256": digest(arrays, meta, person, when, notes),
-    }  # fmt: skip
+    }
 
 
 def evaluate(trace: Trace, settings: SafetySettings) -> SafetyResult:
@@ -235,11 +248,15 @@ class _Check:
     def result(self) -> SafetyResult:
         settings, trace = self._settings, self._trace
         known = {
-            "function": settings.function, "device": settings.device, "person": settings.person,
-            "measured_at": trace.measured_at, "torque_noise_percent": self._noise,
+            "function": settings.function,
+            "device": settings.device,
+            "person": settings.person,
+            "measured_at": trace.measured_at,
+            "torque_noise_percent": self._noise,
             "highest_rpm": float(np.max(np.abs(self._speed), initial=0.0)),
-            "limited_rpm": settings.limited_rpm, "reports": trace.reports,
-        }  # fmt: skip
+            "limited_rpm": settings.limited_rpm,
+            "reports": trace.reports,
+        }
         if self._at is None:
             verdict: Verdict = "not_triggered"
             if settings.function == "speed_limit" and self._followed():

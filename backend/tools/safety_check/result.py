@@ -61,9 +61,10 @@ class SafetyResult(ToolResult):
     person: str
     measured_at: str
     reports: tuple[str, ...] = Field(
-        default=(), description="faults of the drive at the end; one that is no sign of the "
-        "function stopped the axis instead of it"
-    )  # fmt: skip
+        default=(),
+        description="faults of the drive at the end; one that is no sign of the "
+        "function stopped the axis instead of it",
+    )
     speed_rpm: float | None = Field(default=None, description="when it was triggered")
     torque_before_percent: float | None = None
     torque_noise_percent: float = Field(description="below it no torque can be distinguished")

@@ -102,8 +102,13 @@ async def run(run: Run, settings: SafetySettings) -> SafetyResult:
     settings = settings.model_copy(update={"person": person})
     await quiet(axis)
     measured_at = datetime.now(UTC).isoformat(timespec="seconds")
-    roles = ("position_actual", "velocity_actual", "torque_actual", "velocity_target",
-             "status_word")  # fmt: skip
+    roles = (
+        "position_actual",
+        "velocity_actual",
+        "torque_actual",
+        "velocity_target",
+        "status_word",
+    )
     catch = _Catch(tuple(channel(drive, drive.require(role)) for role in roles))
     unsubscribe = session.cyclic.blocks(catch.blocks.append)
     asked_until: int | None = None
@@ -114,10 +119,14 @@ async def run(run: Run, settings: SafetySettings) -> SafetyResult:
             async with enabled(axis, session, Mode.CSV) as start:
                 raw = np.round(plan * (units.velocity_raw(1e6) / 1e6)).astype(np.int64)
                 await play(
-                    axis, session, Play(Mode.CSV, raw),
-                    await bus_limits(axis, settings.envelope, start), facts.rated_torque_nm,
-                    share(run.progress, 0.05, 0.9, _step_of(settings)), until=watch,
-                )  # fmt: skip
+                    axis,
+                    session,
+                    Play(Mode.CSV, raw),
+                    await bus_limits(axis, settings.envelope, start),
+                    facts.rated_torque_nm,
+                    share(run.progress, 0.05, 0.9, _step_of(settings)),
+                    until=watch,
+                )
                 asked_until = watch.ended_at or catch.newest
         except Interrupted as error:
             if error.halt is None or error.halt.cause is not HaltCause.LEFT_ENABLED:
@@ -199,27 +208,34 @@ def _above_limit(
     limited, speed = settings.limited_rpm, settings.speed_rpm
     if limited is None or speed < 1.2 * limited:
         raise OutOfRange(
-            "safety-check.no-limited-speed", value=speed,
+            "safety-check.no-limited-speed",
+            value=speed,
             limit=f"{1.2 * (limited or speed):g} rpm",
-        )  # fmt: skip
+        )
     low = _BELOW_LIMIT * limited
     way = (low * (settings.wait_s + _RAMP_S) + speed * (settings.watch_s + _RAMP_S)) / 60.0
     if way > _USED * settings.travel_limit:
         raise _no_room(settings, way / _USED)
     return np.concatenate(
         [
-            lead, low * ramp, np.full(round(settings.wait_s * rate), low),
-            low + (speed - low) * ramp, np.full(round(settings.watch_s * rate), speed),
-            speed * ramp[::-1], end,
+            lead,
+            low * ramp,
+            np.full(round(settings.wait_s * rate), low),
+            low + (speed - low) * ramp,
+            np.full(round(settings.watch_s * rate), speed),
+            speed * ramp[::-1],
+            end,
         ]
-    )  # fmt: skip
+    )
 
 
 def _no_room(settings: SafetySettings, needed_rev: float) -> OutOfRange:
     return OutOfRange(
-        "safety-check.no-room", value=settings.travel_limit, limit=f"{needed_rev:.3g} rev",
+        "safety-check.no-room",
+        value=settings.travel_limit,
+        limit=f"{needed_rev:.3g} rev",
         needed_rev=needed_rev,
-    )  # fmt: skip
+    )
 
 
 class _Watch:

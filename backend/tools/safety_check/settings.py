@@ -20,9 +20,10 @@ class SafetySettings(ToolSettings):
 
     function: Function = Field(default="sto", description="the function that you trigger")
     device: str = Field(
-        default="", max_length=100,
+        default="",
+        max_length=100,
         description="what you trigger it with, such as emergency stop S1 or guard switch B3",
-    )  # fmt: skip
+    )
     person: str = Field(
         default="", max_length=100, description="who triggers it and watches the axis"
     )

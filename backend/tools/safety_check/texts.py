@@ -109,7 +109,8 @@ TEXTS: dict[str, tuple[str, str]] = {
         "已起作用并已记录。未给出限值，因此不作判定。",
     ),
     "exceeded.torque_free": (
-        "The torque was gone later than permitted.", "转矩消失晚于允许时间。",
+        "The torque was gone later than permitted.",
+        "转矩消失晚于允许时间。",
     ),
     "exceeded.stop_time": ("It stopped later than permitted.", "停止晚于允许时间。"),
     "exceeded.stop_distance": ("It ran on further than permitted.", "停止行程超过允许值。"),
@@ -165,7 +166,8 @@ TEXTS: dict[str, tuple[str, str]] = {
         "{person} 签署，{at} (UTC)，SHA-256 {sha256}。{notes}",
     ),
     "signature_broken": (
-        "It is not what was signed: its checksum differs.", "与签署时不同：校验和不一致。",
+        "It is not what was signed: its checksum differs.",
+        "与签署时不同：校验和不一致。",
     ),
     "unsigned": ("Not signed.", "未签署。"),
     "signature.person": ("Signed by", "签署人"),
@@ -190,7 +192,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "line_speed": ("measured", "实测"),
     "line_commanded": ("commanded", "给定"),
     "line_torque": ("torque", "转矩"),
-}  # fmt: skip
+}
 #: A verdict names its function, in each language.
 TEXTS |= {
     f"verdict.{function}.{verdict}": (
@@ -201,8 +203,9 @@ TEXTS |= {
     for verdict in get_args(Verdict)
 }
 _TONES: dict[Verdict, Literal["good", "warn", "plain"]] = {
-    "within_limits": "good", "recorded": "plain",
-}  # fmt: skip
+    "within_limits": "good",
+    "recorded": "plain",
+}
 
 
 def report(result: SafetyResult) -> Section:
@@ -239,9 +242,11 @@ def _signature(result: SafetyResult) -> list[Note]:
     if signed is None:
         return [Note("unsigned", "warn")]
     values = {
-        "person": signed.person, "at": signed.signed[:19].replace("T", " "),
-        "sha256": signed.sha256, "notes": signed.notes,
-    }  # fmt: skip
+        "person": signed.person,
+        "at": signed.signed[:19].replace("T", " "),
+        "sha256": signed.sha256,
+        "notes": signed.notes,
+    }
     broken = [] if signed.intact else [Note("signature_broken", "warn")]
     return [Note("signed", "plain", values), *broken]
 

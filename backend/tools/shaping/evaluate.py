@@ -69,10 +69,13 @@ class Moves:
     def meta(self, settings: ShapingSettings) -> dict[str, object]:
         """For storage, beside the arrays."""
         return {
-            "tool": "shaping", "settings": settings.model_dump(mode="json"),
-            "sample_rate_hz": self.rate, "rated_torque_nm": self.rated_torque_nm,
-            "kind": self.kind, "filter": self.filter.model_dump(mode="json"),
-        }  # fmt: skip
+            "tool": "shaping",
+            "settings": settings.model_dump(mode="json"),
+            "sample_rate_hz": self.rate,
+            "rated_torque_nm": self.rated_torque_nm,
+            "kind": self.kind,
+            "filter": self.filter.model_dump(mode="json"),
+        }
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> ShapingResult:
@@ -91,9 +94,14 @@ def reevaluate(arrays: Arrays, meta: Meta) -> ShapingResult:
             return np.asarray(arrays[f"{name}_{key}"][number], np.float64)
 
         return Recording(
-            rate, column("position_rad"), column("velocity_rad_s"), column("torque_nm"),
-            column("sent"), column("offset"), np.asarray(arrays[f"{name}_valid"][number], np.bool_),
-        )  # fmt: skip
+            rate,
+            column("position_rad"),
+            column("velocity_rad_s"),
+            column("torque_nm"),
+            column("sent"),
+            column("offset"),
+            np.asarray(arrays[f"{name}_valid"][number], np.bool_),
+        )
 
     def pairs(name: str) -> tuple[Recording, ...]:
         count = len(arrays[f"{name}_valid"]) if f"{name}_valid" in arrays else 0
@@ -141,12 +149,15 @@ def see(moves: Moves, settings: ShapingSettings) -> Seen | None:
     dampings = [each.damping for each in common.fits]
     (f_low, f_high), (z_low, z_high) = mode.frequency_ci95_hz, mode.damping_ci95
     found = ShapingMode(
-        frequency_hz=mode.frequency_hz, frequency_ci95_hz=mode.frequency_ci95_hz,
-        damping=mode.damping, damping_ci95=mode.damping_ci95,
+        frequency_hz=mode.frequency_hz,
+        frequency_ci95_hz=mode.frequency_ci95_hz,
+        damping=mode.damping,
+        damping_ci95=mode.damping_ci95,
         range_hz=(min(f_low, *frequencies), max(f_high, *frequencies)),
         range_damping=(min(z_low, *dampings), max(z_high, *dampings)),
-        ring_downs=len(common.fits), explained=common.explained,
-    )  # fmt: skip
+        ring_downs=len(common.fits),
+        explained=common.explained,
+    )
     return Seen(column, found, mode)
 
 
@@ -189,9 +200,12 @@ def pair_of(demand: FloatArray, settings: ShapingSettings, rate: float) -> Float
 
 
 def _ways(
-    moves: Moves, pairs: tuple[Recording, ...], settings: ShapingSettings, demand: FloatArray,
+    moves: Moves,
+    pairs: tuple[Recording, ...],
+    settings: ShapingSettings,
+    demand: FloatArray,
     extra: int,
-) -> list[RingDown]:  # fmt: skip
+) -> list[RingDown]:
     """Signals [n, 3] from the end of the unshaped setpoints on, of each move of these pairs.
 
     Those that lost many samples are left out.
@@ -252,16 +266,15 @@ def _described(shaper: Shaper, band: Band, left: float) -> DesignedShaper:
     centre, damping = 0.5 * sum(band.frequency_hz), 0.5 * sum(band.damping)
     least, most = shapers.residual_range(shaper, band)
     return DesignedShaper(
-        kind=shaper.kind, delay_s=shaper.delay_s,
+        kind=shaper.kind,
+        delay_s=shaper.delay_s,
         impulses=tuple(
             ShaperImpulse(share=share, time_s=time)
             for share, time in zip(shaper.amplitudes, shaper.times_s, strict=True)
         ),
         residual_percent=(100.0 * least, 100.0 * most),
-        tolerated_hz=shapers.tolerated(
-            shaper, centre, damping, left * (1.0 + threshold.ROUNDING)
-        ),
-    )  # fmt: skip
+        tolerated_hz=shapers.tolerated(shaper, centre, damping, left * (1.0 + threshold.ROUNDING)),
+    )
 
 
 def _compared(
@@ -322,9 +335,7 @@ def _window(
     period = max(2, round(rate / seen.mode.frequency_hz))
     begin = round(threshold.SKIP_S * rate)
     first = np.mean([0.5 * np.ptp(each[begin : begin + period, seen.signal]) for each in before])
-    noise = np.mean([
-        np.std(np.diff(each[-2 * period :, seen.signal])) for each in before
-    ])  # fmt: skip
+    noise = np.mean([np.std(np.diff(each[-2 * period :, seen.signal])) for each in before])
     return seen.signal, float(max(threshold.SETTLED * first, threshold.NOISES * noise))
 
 
@@ -393,9 +404,11 @@ def _findings(
     elif slot is not None:
         found.append(
             ShapingFinding(
-                code="drive_filter_range", value=slot.highest_raw * slot.scale, unit=slot.unit,
+                code="drive_filter_range",
+                value=slot.highest_raw * slot.scale,
+                unit=slot.unit,
                 parameter=slot.parameter,
             )
-        )  # fmt: skip
+        )
     found.append(ShapingFinding(code="in_controller"))
     return found, values

@@ -146,9 +146,12 @@ class DriveFilter(_Part):
         if not 0 < raw <= slot.highest_raw:
             return []
         own = ShapingDriveValue(
-            parameter=slot.parameter, name=slot.name, raw=raw, value=raw * slot.scale,
+            parameter=slot.parameter,
+            name=slot.name,
+            raw=raw,
+            value=raw * slot.scale,
             unit=slot.unit,
-        )  # fmt: skip
+        )
         return [*self.also, own]
 
 

@@ -67,10 +67,11 @@ async def run(run: Run, settings: ShapingSettings) -> ShapingResult:
     facts = await read_facts(axis, settings.rated_torque_nm)
     home = await axis.position_raw()
     moves = Moves(
-        rate, facts.rated_torque_nm,
+        rate,
+        facts.rated_torque_nm,
         await _played(run, settings, facts, demand, (0.02, 0.45, text("shaping.unshaped"))),
         filter=_filter_of(drive),
-    )  # fmt: skip
+    )
     run.progress(0.45, text("shaping.evaluating"))
     seen = await asyncio.to_thread(see, moves, settings)
     made, band = designs(seen, settings)
@@ -79,9 +80,7 @@ async def run(run: Run, settings: ShapingSettings) -> ShapingResult:
         chosen = choose(made, band, settings)
         try:
             values = shaped(demand, chosen, rate)
-            pairs = await _played(
-                run, settings, facts, values, (0.5, 0.93, text("shaping.shaped"))
-            )  # fmt: skip
+            pairs = await _played(run, settings, facts, values, (0.5, 0.93, text("shaping.shaped")))
         except DriveError:
             # What was measured before stays of use.
             _keep(run, moves, settings)
@@ -99,9 +98,12 @@ def _keep(run: Run, moves: Moves, settings: ShapingSettings) -> None:
 
 
 async def _played(
-    run: Run, settings: ShapingSettings, facts: AxisFacts, demand_rev: FloatArray,
+    run: Run,
+    settings: ShapingSettings,
+    facts: AxisFacts,
+    demand_rev: FloatArray,
     where: tuple[float, float, Text],
-) -> tuple[Recording, ...]:  # fmt: skip
+) -> tuple[Recording, ...]:
     """The recordings of each move out and back, on an axis that is enabled for them."""
     axis, session = run.axis, run.session
     units, rate = await axis.units(), 1.0 / cycle_s(session)
@@ -120,10 +122,14 @@ async def _played(
             ends = (low + number * part, low + (number + 1) * part)
             found.append(
                 await play(
-                    axis, session, Play(Mode.CSP, values), limits, facts.rated_torque_nm,
+                    axis,
+                    session,
+                    Play(Mode.CSP, values),
+                    limits,
+                    facts.rated_torque_nm,
                     share(run.progress, *ends, step),
                 )
-            )  # fmt: skip
+            )
             await dwell(axis, session, threshold.BETWEEN_S)
     return tuple(found)
 
@@ -137,18 +143,24 @@ def _require_inside(settings: ShapingSettings, move_s: float) -> None:
     envelope = settings.envelope
     if settings.speed > envelope.speed_rpm or abs(settings.size) > envelope.travel_rev:
         raise OutOfRange(
-            "shaping.move-beyond-envelope", value=settings.size,
+            "shaping.move-beyond-envelope",
+            value=settings.size,
             limit=f"{envelope.speed_rpm:g} rpm, {envelope.travel_rev:g} rev",
-            needed_rpm=settings.speed, needed_rev=abs(settings.size),
-            speed_rpm=envelope.speed_rpm, travel_rev=envelope.travel_rev,
-        )  # fmt: skip
+            needed_rpm=settings.speed,
+            needed_rev=abs(settings.size),
+            speed_rpm=envelope.speed_rpm,
+            travel_rev=envelope.travel_rev,
+        )
     slowest_hz = settings.frequency_hz or settings.lowest_hz
     pair_s = 2.0 * (move_s + settings.hold_s + threshold.LONGEST_PERIODS / slowest_hz)
     if pair_s > envelope.time_s:
         raise OutOfRange(
-            "shaping.takes-too-long", value=pair_s, limit=f"{envelope.time_s:g} s",
-            needed_s=pair_s, time_s=envelope.time_s,
-        )  # fmt: skip
+            "shaping.takes-too-long",
+            value=pair_s,
+            limit=f"{envelope.time_s:g} s",
+            needed_s=pair_s,
+            time_s=envelope.time_s,
+        )
 
 
 def _filter_of(drive: Drive) -> DriveFilter:
@@ -168,21 +180,25 @@ def _filter_of(drive: Drive) -> DriveFilter:
     return DriveFilter(
         takes="frequency" if spec.frequency else "period",
         slot=FilterSlot(
-            parameter=parameter.number or parameter.key, name=parameter.name, unit=parameter.unit,
-            scale=parameter.scale, highest_raw=int(parameter.max_raw or 0),
+            parameter=parameter.number or parameter.key,
+            name=parameter.name,
+            unit=parameter.unit,
+            scale=parameter.scale,
+            highest_raw=int(parameter.max_raw or 0),
         ),
         also=also,
-        unstated=tuple(
-            drive.parameter(name).number or name for name in spec.unstated
-        ),
-    )  # fmt: skip
+        unstated=tuple(drive.parameter(name).number or name for name in spec.unstated),
+    )
 
 
 def _value(parameter: Parameter, raw: int) -> ShapingDriveValue:
     return ShapingDriveValue(
-        parameter=parameter.number or parameter.key, name=parameter.name, raw=raw,
-        value=float(raw) * parameter.scale, unit=parameter.unit,
-    )  # fmt: skip
+        parameter=parameter.number or parameter.key,
+        name=parameter.name,
+        raw=raw,
+        value=float(raw) * parameter.scale,
+        unit=parameter.unit,
+    )
 
 
 TOOL = Tool(

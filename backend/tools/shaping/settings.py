@@ -32,14 +32,18 @@ class ShapingSettings(ToolSettings):
         default=30.0, ge=3, le=60, description="highest frequency that is looked for, in Hz"
     )
     frequency_hz: float | None = Field(
-        default=None, ge=1, le=60,
+        default=None,
+        ge=1,
+        le=60,
         description="frequency of the mode in Hz where it is known, such as the anti-resonance of "
         "a response; looked for within 30 %",
-    )  # fmt: skip
+    )
     damping: float | None = Field(
-        default=None, ge=0, le=0.4,
+        default=None,
+        ge=0,
+        le=0.4,
         description="damping ratio of that mode; only where the motor does not show it",
-    )  # fmt: skip
+    )
     shaper: Choice = Field(
         default="auto", description="the shaper that is played; auto: the shortest that suffices"
     )
@@ -47,10 +51,11 @@ class ShapingSettings(ToolSettings):
         default=5.0, ge=1, le=20, description="vibration that may be left, in % of the unshaped"
     )
     window_rev: float | None = Field(
-        default=None, gt=0,
+        default=None,
+        gt=0,
         description="settling window of the position in revolutions; without it settling is when "
         "a tenth of the vibration is left",
-    )  # fmt: skip
+    )
     verify: bool = Field(default=True, description="play the shaped move, too, and compare")
 
     @model_validator(mode="after")

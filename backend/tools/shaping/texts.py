@@ -166,9 +166,13 @@ TEXTS: dict[str, tuple[str, str]] = {
     "line.shaped": ("with shaper", "有整形器"),
 }
 _TONES: dict[Verdict, Literal["good", "warn", "plain"]] = {
-    "verified": "good", "improved": "warn", "no_better": "warn", "designed": "plain",
-    "stated": "warn", "not_seen": "warn",
-}  # fmt: skip
+    "verified": "good",
+    "improved": "warn",
+    "no_better": "warn",
+    "designed": "plain",
+    "stated": "warn",
+    "not_seen": "warn",
+}
 _WARN = frozenset({"beyond_prediction", "not_settled", "samples_lost", "wide_mode"})
 
 
@@ -203,7 +207,7 @@ def notes(result: ShapingResult) -> list[Note]:
             "residual": f"{100.0 * found.ratio:.3g}",
             "before": _seconds(found.settling_unshaped_s, found),
             "after": _seconds(found.settling_shaped_s, found),
-        }  # fmt: skip
+        }
     first = Note(f"verdict.{result.verdict}", _TONES[result.verdict], places)
     return [first, *(_finding(each) for each in result.findings)]
 
@@ -227,7 +231,7 @@ def _rows(result: ShapingResult) -> list[Row]:
             Row("damping", mode.damping, "", mode.damping_ci95),
             Row("ring_downs", float(mode.ring_downs), ""),
             Row("explained", 100.0 * mode.explained, "%"),
-        ]  # fmt: skip
+        ]
     if (found := result.comparison) is not None:
         rows += _compared(found)
     return rows
@@ -259,9 +263,11 @@ def _cells(shaper: DesignedShaper, result: ShapingResult) -> tuple[Cell, ...]:
 
 def _chart(result: ShapingResult, signal: Signal) -> Chart:
     return Chart(
-        "chart", "chart.time", f"chart.{signal}",
+        "chart",
+        "chart.time",
+        f"chart.{signal}",
         (
             Line("line.unshaped", result.trace_s, result.trace_unshaped),
             Line("line.shaped", result.trace_s, result.trace_shaped),
         ),
-    )  # fmt: skip
+    )

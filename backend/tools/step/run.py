@@ -70,10 +70,13 @@ async def step_response(
         else:
             raw = start + np.round(demand * (units.position_raw(1e6) / 1e6))
         recording = await play(
-            axis, session, Play(mode, raw.astype(np.int64)),
-            await bus_limits(axis, settings.envelope, start), facts.rated_torque_nm,
+            axis,
+            session,
+            Play(mode, raw.astype(np.int64)),
+            await bus_limits(axis, settings.envelope, start),
+            facts.rated_torque_nm,
             share(progress, 0.1, 0.85, text("step.stepping")),
-        )  # fmt: skip
+        )
     await go_back(axis, session, home, settings.envelope, facts)
     if keep is not None:
         keep("step", *raw_of(recording, demand, settings, facts))

@@ -45,9 +45,12 @@ def report(result: StepAnswer) -> Section:
     settled = numbers is not None and numbers.settling_s is not None
     window = "–" if result.window is None else f"{result.window:.3g}"
     notes = [
-        Note("settled" if settled else "not_settled", "plain" if settled else "warn",
-             {"window": window, "unit": result.unit})
-    ]  # fmt: skip
+        Note(
+            "settled" if settled else "not_settled",
+            "plain" if settled else "warn",
+            {"window": window, "unit": result.unit},
+        )
+    ]
     if result.widened:
         notes.append(Note("widened"))
     rows: list[Row] = []

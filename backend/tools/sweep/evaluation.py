@@ -208,17 +208,20 @@ def _charged(found: Identification, uncertainty: ComplexArray) -> Identification
 
 
 def _mechanics(
-    found: Identification, quantity: Quantity, loop: Literal["none", "speed", "position"],
-    saturated: float, motion_s: float, facts: AxisFacts, warnings: tuple[Text, ...],
-) -> SweepResult:  # fmt: skip
+    found: Identification,
+    quantity: Quantity,
+    loop: Literal["none", "speed", "position"],
+    saturated: float,
+    motion_s: float,
+    facts: AxisFacts,
+    warnings: tuple[Text, ...],
+) -> SweepResult:
     """The answer of mechanics; without a model where none is trusted."""
     path, model = found.fit.path, found.fit.model
     resonances: tuple[Resonance, ...] = ()
     if found.trusted:
         highest_hz = found.corrected.valid_band_hz[1]
-        resonances = resonance_table(
-            model, found.corrected.frequency_hz, highest_hz, found.modes
-        )  # fmt: skip
+        resonances = resonance_table(model, found.corrected.frequency_hz, highest_hz, found.modes)
     return SweepResult(
         kind="mechanics",
         loop=loop,
@@ -256,9 +259,13 @@ def _taken(records: Records) -> tuple[Record, ...]:
 
 
 def _by_reference(
-    records: Records, path: SignalPath, integral_hz: float | None, inertia: KnownInertia | None, *,
+    records: Records,
+    path: SignalPath,
+    integral_hz: float | None,
+    inertia: KnownInertia | None,
+    *,
     hold_known: bool,
-) -> tuple[Identification, tuple[Record, ...]]:  # fmt: skip
+) -> tuple[Identification, tuple[Record, ...]]:
     """Mechanics by a speed loop's reference, and the records as if its torque had been injected.
 
     The loop's gains need the mechanics, as a light axis' own speed is sampled, too.
@@ -298,9 +305,13 @@ def completed(facts: AxisFacts, result: SweepResult) -> AxisFacts:
 
 
 def _saturated(
-    records: tuple[Record, ...], path: SignalPath, quantity: Quantity, limit_nm: float, *,
+    records: tuple[Record, ...],
+    path: SignalPath,
+    quantity: Quantity,
+    limit_nm: float,
+    *,
     as_reported: bool,
-) -> float:  # fmt: skip
+) -> float:
     """Share of samples whose torque is at the envelope's limit, or not what was commanded.
 
     ``reported``: the reported torque acts itself, so that a missing one is none of a filter.

@@ -103,9 +103,13 @@ def held_by_loop(axis: Axis, wanted: Loop, pull_nm: float) -> Literal["speed"]:
 
 
 async def setup_of(
-    axis: Axis, session: CyclicSession, settings: SweepSettings, facts: AxisFacts, loop: str,
+    axis: Axis,
+    session: CyclicSession,
+    settings: SweepSettings,
+    facts: AxisFacts,
+    loop: str,
     probed: Probed | None,
-) -> Setup:  # fmt: skip
+) -> Setup:
     """Everything the excitation needs, from the envelope and what the drive reports.
 
     Raises:
@@ -168,9 +172,14 @@ def sequences_of(setup: Setup, settings: SweepSettings) -> tuple[excite.Sequence
             )  # fmt: skip
         if setup.by_speed:
             return speed_injection.sequences(
-                setup.rate, band, setup.room, speed_injection.FIRST_RAD_S, settings.realisations,
-                settings.excitation, base=settings.base_motion,
-            )  # fmt: skip
+                setup.rate,
+                band,
+                setup.room,
+                speed_injection.FIRST_RAD_S,
+                settings.realisations,
+                settings.excitation,
+                base=settings.base_motion,
+            )
         return excite.torque_injection(
             setup.rate, band, setup.room, setup.torque_step_nm, share=settings.share,
             realisations=settings.realisations, position=setup.loop == "position",

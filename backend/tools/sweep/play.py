@@ -43,9 +43,14 @@ Records = tuple[Recorded, ...]
 
 
 async def scaled_by_speed(
-    axis: Axis, session: CyclicSession, settings: SweepSettings, setup: Setup,
-    sequences: tuple[excite.Sequence, ...], home: int, progress: Progress,
-) -> tuple[excite.Sequence, ...]:  # fmt: skip
+    axis: Axis,
+    session: CyclicSession,
+    settings: SweepSettings,
+    setup: Setup,
+    sequences: tuple[excite.Sequence, ...],
+    home: int,
+    progress: Progress,
+) -> tuple[excite.Sequence, ...]:
     """The excitation made so large that its torque has the wanted share."""
     trial = Progress(lambda: progress(0.09, text("sweep.feeling-how-much-torque")))
     ((sent, recording),) = await play_fitting(
@@ -127,9 +132,14 @@ async def _near_home(
 
 
 async def _play_one(
-    axis: Axis, session: CyclicSession, settings: SweepSettings, setup: Setup,
-    sequence: excite.Sequence, home_raw: int, reported: Callable[[float], None],
-) -> Recorded:  # fmt: skip
+    axis: Axis,
+    session: CyclicSession,
+    settings: SweepSettings,
+    setup: Setup,
+    sequence: excite.Sequence,
+    home_raw: int,
+    reported: Callable[[float], None],
+) -> Recorded:
     """One realisation: enable, play, disable."""
     limits = await bus_limits(axis, settings.envelope, home_raw)
     async with enabled(axis, session, MODE_OF[setup.loop]) as start:

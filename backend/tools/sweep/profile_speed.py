@@ -110,9 +110,13 @@ async def prepared(
 
 
 async def _prepare(
-    axis: Axis, session: CyclicSession, envelope: Envelope,
-    modes: list[str], ramps: list[str], limits: list[str],
-) -> None:  # fmt: skip
+    axis: Axis,
+    session: CyclicSession,
+    envelope: Envelope,
+    modes: list[str],
+    ramps: list[str],
+    limits: list[str],
+) -> None:
     for key in modes:
         modes_of_the_loop(axis.drive, session, key)
     await axis.limit_torque(limits, threshold.ABOVE * envelope.torque_percent)
@@ -174,9 +178,13 @@ async def _require_signed(axis: Axis, session: CyclicSession, envelope: Envelope
         async with enabled(axis, session, Mode.CSV) as start:
             await quiet(axis)
             recording = await play(
-                axis, session, Play(Mode.CSV, values), await bus_limits(axis, room, start), 1.0,
+                axis,
+                session,
+                Play(Mode.CSV, values),
+                await bus_limits(axis, room, start),
+                1.0,
                 lambda _fraction: None,
-            )  # fmt: skip
+            )
     except NotAllowed as error:
         if exceeded(error) not in (HaltCause.SPEED, HaltCause.POSITION):
             raise

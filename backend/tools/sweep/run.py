@@ -156,7 +156,7 @@ class _Sweep:
         spare = 0 if settings.excitation == "stepped" else len(sequences)
         return setup, await play_informative(
             axis, session, settings, setup, sequences, home, progress, spare, self.repeats
-        )  # fmt: skip
+        )
 
 
 async def filters_off(axis: Axis, settings: SweepSettings) -> dict[str, int]:

@@ -55,9 +55,13 @@ class Size:
 
 
 def fitting_size(
-    sequence: excite.Sequence, recording: Recording, room: excite.Room, torque_nm: float, *,
+    sequence: excite.Sequence,
+    recording: Recording,
+    room: excite.Room,
+    torque_nm: float,
+    *,
     watched: bool,
-) -> Size:  # fmt: skip
+) -> Size:
     """What makes a torque that peaks at ``torque_nm``, as far as the trial shows.
 
     A soft loop makes little speed of its reference, so that the axis' own speed counts; the
@@ -111,9 +115,13 @@ class SpeedGain:
 
 
 def speed_gain(
-    records: tuple[tuple[excite.Sequence, Recording], ...], path: SignalPath,
-    integral_hz: float | None, *, hold_known: bool, motion: SampledFit | None = None,
-) -> SpeedGain:  # fmt: skip
+    records: tuple[tuple[excite.Sequence, Recording], ...],
+    path: SignalPath,
+    integral_hz: float | None,
+    *,
+    hold_known: bool,
+    motion: SampledFit | None = None,
+) -> SpeedGain:
     """The gain that the recorded torque shows; ``integral_hz`` None: the recording shows it, too.
 
     ``motion`` is a fit of the mechanics where there is one already.
@@ -148,9 +156,12 @@ def _as_torque(
 
 def _record(sequence: excite.Sequence, recording: Recording) -> Record:
     return Record(
-        sequence.excitation, recording.velocity_rad_s, recording.torque_nm, recording.valid,
+        sequence.excitation,
+        recording.velocity_rad_s,
+        recording.torque_nm,
+        recording.valid,
         recording.position_rad,
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True)

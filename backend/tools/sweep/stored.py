@@ -42,12 +42,16 @@ def raw_of(
         e = sequence.excitation
         structure.append(
             {
-                "kind": e.kind, "first_sample": e.first_sample,
-                "period_samples": e.period_samples, "periods": e.periods,
-                "transient_periods": e.transient_periods, "base_line": e.base_line,
-                "realisation": e.realisation, "segments": [asdict(tone) for tone in e.segments],
+                "kind": e.kind,
+                "first_sample": e.first_sample,
+                "period_samples": e.period_samples,
+                "periods": e.periods,
+                "transient_periods": e.transient_periods,
+                "base_line": e.base_line,
+                "realisation": e.realisation,
+                "segments": [asdict(tone) for tone in e.segments],
             }
-        )  # fmt: skip
+        )
     return arrays, {
         "tool": "sweep",
         "sample_rate_hz": setup.rate,
@@ -137,8 +141,12 @@ def answer_of(result: SweepResult) -> SweepAnswer:
         std_deg=_numbers(frf.std_deg),
         resonances=tuple(
             ResonanceInfo(
-                kind=r.kind, frequency_hz=r.frequency_hz, damping=r.damping, height_db=r.height_db,
-                frequency_ci95_hz=r.frequency_ci95_hz, damping_ci95=r.damping_ci95,
+                kind=r.kind,
+                frequency_hz=r.frequency_hz,
+                damping=r.damping,
+                height_db=r.height_db,
+                frequency_ci95_hz=r.frequency_ci95_hz,
+                damping_ci95=r.damping_ci95,
             )
             for r in result.resonances
         ),
@@ -160,7 +168,7 @@ def answer_of(result: SweepResult) -> SweepAnswer:
         model=None if result.model is None else ModelInfo(**asdict(result.model)),
         warnings=words_of(messages, "en"),
         warning_messages=messages,
-    )  # fmt: skip
+    )
 
 
 def _direct(frf: Frf) -> DirectResponse:

@@ -97,11 +97,15 @@ def resonances_grid(result: SweepAnswer) -> Grid:
     return Grid(
         ("kind", "frequency", "damping", "height"),
         tuple(
-            (Note(each.kind), hertz(each.frequency_hz), fixed(each.damping * 100, 1, "%"),
-             fixed(each.height_db, 1, "dB"))
+            (
+                Note(each.kind),
+                hertz(each.frequency_hz),
+                fixed(each.damping * 100, 1, "%"),
+                fixed(each.height_db, 1, "dB"),
+            )
             for each in result.resonances
         ),
-    )  # fmt: skip
+    )
 
 
 def margins_grid(*results: SweepAnswer, heads: tuple[str, ...] = ("value",)) -> Grid:
@@ -143,13 +147,17 @@ def _loop_verdict(result: SweepAnswer) -> Note:
     tone, name = _judged(figures)
     phase, gain, peak = figures
     return Note(
-        f"loop.{name}", tone,
+        f"loop.{name}",
+        tone,
         {
-            "pm": fixed(phase, 0, "°"), "gm": fixed(gain, 1, "dB"), "ms": fixed(peak, 2),
-            "bw": hertz(margin(found, "bandwidth_hz")), "low": hertz(margin(found, "from_hz")),
+            "pm": fixed(phase, 0, "°"),
+            "gm": fixed(gain, 1, "dB"),
+            "ms": fixed(peak, 2),
+            "bw": hertz(margin(found, "bandwidth_hz")),
+            "low": hertz(margin(found, "from_hz")),
             "high": hertz(margin(found, "to_hz")),
         },
-    )  # fmt: skip
+    )
 
 
 def tuned_verdict(result: SweepAnswer, verdict: VerdictInfo) -> Note:
@@ -161,12 +169,15 @@ def tuned_verdict(result: SweepAnswer, verdict: VerdictInfo) -> Note:
     if verdict.coverage == "predicted" and tone == "good":
         tone, name = "warn", "incomplete"
     return Note(
-        f"bands.{name}", tone,
+        f"bands.{name}",
+        tone,
         {
-            "pm": fixed(worst.phase_margin_deg, 0, "°"), "gm": fixed(worst.gain_margin_db, 1, "dB"),
-            "ms": fixed(worst.ms, 2), "bw": hertz(margin(result.margins, "bandwidth_hz")),
+            "pm": fixed(worst.phase_margin_deg, 0, "°"),
+            "gm": fixed(worst.gain_margin_db, 1, "dB"),
+            "ms": fixed(worst.ms, 2),
+            "bw": hertz(margin(result.margins, "bandwidth_hz")),
         },
-    )  # fmt: skip
+    )
 
 
 def _judged(figures: tuple[float | None, ...]) -> tuple[Literal["good", "warn", "fault"], str]:

@@ -51,9 +51,13 @@ class Plateaus:
 
     @classmethod
     def of(
-        cls, recordings: Sequence[Recording], numbers: Sequence[FloatArray], *,
-        by_travel: bool, closer: bool,
-    ) -> Plateaus:  # fmt: skip
+        cls,
+        recordings: Sequence[Recording],
+        numbers: Sequence[FloatArray],
+        *,
+        by_travel: bool,
+        closer: bool,
+    ) -> Plateaus:
         """One recording for each speed, with the signed number of each sample's plateau."""
         plateau = [
             np.sign(n) * (100 * (index + 1) * (n != 0) + np.abs(n))
@@ -65,22 +69,26 @@ class Plateaus:
             np.concatenate([each.torque_nm for each in recordings]),
             np.concatenate([each.valid for each in recordings]),
             np.concatenate(plateau).astype(np.int64),
-            by_travel, closer,
-        )  # fmt: skip
+            by_travel,
+            closer,
+        )
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
         """For storage."""
         return {
-            "position_rad": self.position_rad, "torque_nm": self.torque_nm, "valid": self.valid,
+            "position_rad": self.position_rad,
+            "torque_nm": self.torque_nm,
+            "valid": self.valid,
             "plateau": self.plateau,
-        }  # fmt: skip
+        }
 
     def facts(self) -> dict[str, object]:
         """For storage, with the arrays."""
         return {
-            "sample_rate_hz": self.sample_rate_hz, "by_travel": self.by_travel,
+            "sample_rate_hz": self.sample_rate_hz,
+            "by_travel": self.by_travel,
             "closer": self.closer,
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True)
@@ -139,10 +147,12 @@ def levels_of(data: Plateaus, rated_nm: float) -> Levels:
     found, left = components(seen)
     segments = [each.segment for each in held]
     speed, deviation, torque = levels(segments, found, band)
-    hertz = np.array([
-        [c.value * each.speed_rps if c.kind == "order" else c.value for c in found]
-        for each in held
-    ]).reshape(len(held), len(found))  # fmt: skip
+    hertz = np.array(
+        [
+            [c.value * each.speed_rps if c.kind == "order" else c.value for c in found]
+            for each in held
+        ]
+    ).reshape(len(held), len(found))
     # A difference of two positions is a mean of the speed over the time between them.
     shown = np.sinc(np.clip(hertz / data.sample_rate_hz, 0.0, 0.5))
     return Levels(
@@ -183,18 +193,20 @@ def evaluate(data: Plateaus, facts: AxisFacts) -> VibrationResult:
     orders = [i for i, c in enumerate(found.components) if c.kind == "order"]
     fixed = [i for i, c in enumerate(found.components) if c.kind == "frequency"]
     resonances = _resonances(found, orders)
-    shown = tuple(
-        sorted((_order(found, i) for i in orders), key=lambda each: -each.largest_rpm)
-    )  # fmt: skip
+    shown = tuple(sorted((_order(found, i) for i in orders), key=lambda each: -each.largest_rpm))
     steady = tuple(
         sorted((_frequency(found, i) for i in fixed), key=lambda each: -each.largest_rpm)
     )
     return VibrationResult(
-        sample_rate_hz=data.sample_rate_hz, band_hz=found.band_hz,
-        speeds=tuple(_speeds(found)), orders=shown, frequencies=steady, resonances=resonances,
+        sample_rate_hz=data.sample_rate_hz,
+        band_hz=found.band_hz,
+        speeds=tuple(_speeds(found)),
+        orders=shown,
+        frequencies=steady,
+        resonances=resonances,
         findings=tuple(_findings(data, found, shown, steady, resonances)),
         motion_s=data.position_rad.size / data.sample_rate_hz,
-    )  # fmt: skip
+    )
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> VibrationResult:
@@ -208,10 +220,13 @@ def reevaluate(arrays: Arrays, meta: Meta) -> VibrationResult:
         raise ValueError("not the raw data of a map of vibration over speed")
     data = Plateaus(
         float(str(meta["sample_rate_hz"])),
-        np.asarray(arrays["position_rad"], np.float64), np.asarray(arrays["torque_nm"], np.float64),
-        np.asarray(arrays["valid"], np.bool_), np.asarray(arrays["plateau"], np.int64),
-        bool(meta["by_travel"]), bool(meta["closer"]),
-    )  # fmt: skip
+        np.asarray(arrays["position_rad"], np.float64),
+        np.asarray(arrays["torque_nm"], np.float64),
+        np.asarray(arrays["valid"], np.bool_),
+        np.asarray(arrays["plateau"], np.int64),
+        bool(meta["by_travel"]),
+        bool(meta["closer"]),
+    )
     return evaluate(data, AxisFacts(**facts))
 
 
@@ -264,11 +279,13 @@ def _speeds(found: Levels) -> list[VibrationSpeed]:
         most = max(same, key=lambda each: sum(one.amplitude for one in each.found))
         speeds.append(
             VibrationSpeed(
-                speed_rpm=sign * rps * 60.0, speed_rms_rpm=float(rms[0]),
-                torque_rms_percent=float(rms[1]), highest_order=found.band_hz[1] / rps,
+                speed_rpm=sign * rps * 60.0,
+                speed_rms_rpm=float(rms[0]),
+                torque_rms_percent=float(rms[1]),
+                highest_order=found.band_hz[1] / rps,
                 parts=tuple(_parts(most, found)),
             )
-        )  # fmt: skip
+        )
     return sorted(speeds, key=lambda each: (abs(each.speed_rpm), each.speed_rpm))
 
 
@@ -280,11 +297,12 @@ def _parts(held: _Held, found: Levels) -> list[VibrationPart]:
         rate = held.segment.rate_hz
         parts.append(
             VibrationPart(
-                frequency_hz=one.frequency_hz, order_per_rev=one.frequency_hz / held.speed_rps,
+                frequency_hz=one.frequency_hz,
+                order_per_rev=one.frequency_hz / held.speed_rps,
                 speed_rpm=one.amplitude / float(np.sinc(one.frequency_hz / rate)),
                 torque_percent=float(np.nan_to_num(torque[0, 0])),
             )
-        )  # fmt: skip
+        )
     return parts
 
 
@@ -379,10 +397,11 @@ def _resonance(found: Levels, peak: LevelPeak, orders: Sequence[int]) -> Vibrati
     largest = max((level for level, _ in ranges), default=0.0)
     kept = [pair for pair in ranges if pair[0] >= threshold.EXCITES * largest]
     return VibrationResonance(
-        frequency_hz=peak.frequency_hz, frequency_ci95_hz=peak.frequency_ci95_hz,
+        frequency_hz=peak.frequency_hz,
+        frequency_ci95_hz=peak.frequency_ci95_hz,
         height=peak.height,
         avoid=tuple(each for _, each in sorted(kept, key=lambda pair: -pair[0])),
-    )  # fmt: skip
+    )
 
 
 def _findings(

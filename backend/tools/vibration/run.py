@@ -55,18 +55,24 @@ def planned(settings: VibrationSettings, room: Room, units: AxisUnits) -> Plan:
     slowest = (settings.slowest_rpm or 60.0 * fastest / threshold.RANGE) / 60.0
     if slowest >= threshold.LEAST_RANGE * fastest:
         raise OutOfRange(
-            "vibration.no-room-for-speeds", value=round(slowest * 60.0, 4),
-            limit=f"{fastest * 60.0:.3g} rpm", slowest_rpm=slowest * 60.0,
+            "vibration.no-room-for-speeds",
+            value=round(slowest * 60.0, 4),
+            limit=f"{fastest * 60.0:.3g} rpm",
+            slowest_rpm=slowest * 60.0,
             fastest_rpm=fastest * 60.0,
-        )  # fmt: skip
+        )
     speeds = representable(np.geomspace(slowest, fastest, settings.speeds), units)
     strokes = [one for v in speeds if (one := stroke_of(room, v)) is not None]
     takes_s = sum(one.duration_s for one in strokes)
     if takes_s > room.time_s:
         raise OutOfRange(
-            "vibration.takes-too-long", value=round(takes_s, 1), limit=f"{room.time_s:g} s",
-            speeds=len(strokes), takes_s=takes_s, time_s=room.time_s,
-        )  # fmt: skip
+            "vibration.takes-too-long",
+            value=round(takes_s, 1),
+            limit=f"{room.time_s:g} s",
+            speeds=len(strokes),
+            takes_s=takes_s,
+            time_s=room.time_s,
+        )
     return Plan(tuple(strokes), fastest < 0.95 * room.speed_rps)
 
 
@@ -117,9 +123,12 @@ async def run(run: Run, settings: VibrationSettings) -> VibrationResult:
 
 
 def _closer(
-    settings: VibrationSettings, room: Room, about: tuple[float, float], units: AxisUnits,
+    settings: VibrationSettings,
+    room: Room,
+    about: tuple[float, float],
+    units: AxisUnits,
     left_s: float,
-) -> tuple[Stroke, ...]:  # fmt: skip
+) -> tuple[Stroke, ...]:
     """Further speeds inside these, as many as the time that is left allows."""
     for count in range(settings.closer, 2, -1):
         inside = np.geomspace(*about, count + 2)[1:-1]
@@ -152,18 +161,24 @@ class _Measured:
             ends = [low + (high - low) * s / total_s for s in (done_s, done_s + stroke.duration_s)]
             step = text("vibration.speed-both-directions", speed_rpm=stroke.speed_rps * 60.0)
             recording = await speed_move(
-                run.axis, run.session, speed_rpm, envelope, self.facts,
+                run.axis,
+                run.session,
+                speed_rpm,
+                envelope,
+                self.facts,
                 share(run.progress, ends[0], ends[1], step),
-            )  # fmt: skip
+            )
             self.taken.append((recording, numbers[: recording.velocity_rad_s.size]))
             done_s += stroke.duration_s
 
     def plateaus(self, plan: Plan, *, closer: bool = True) -> Plateaus:
         """All of it."""
         return Plateaus.of(
-            [recording for recording, _ in self.taken], [numbers for _, numbers in self.taken],
-            by_travel=plan.by_travel, closer=closer,
-        )  # fmt: skip
+            [recording for recording, _ in self.taken],
+            [numbers for _, numbers in self.taken],
+            by_travel=plan.by_travel,
+            closer=closer,
+        )
 
 
 TOOL = Tool(

@@ -15,9 +15,11 @@ class VibrationSettings(ToolSettings):
     )
     speeds: int = Field(default=10, ge=5, le=40, description="speeds in each direction")
     closer: int = Field(
-        default=8, ge=0, le=20,
+        default=8,
+        ge=0,
+        le=20,
         description="further speeds about the one at which an order has its highest level",
-    )  # fmt: skip
+    )
     slowest_rpm: float | None = Field(
         default=None, gt=0, description="lowest speed; a twelfth of the highest one without it"
     )

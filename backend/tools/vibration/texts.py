@@ -166,12 +166,14 @@ def _resonances(result: VibrationResult) -> Grid:
     heads = ("head.resonance", "head.excited_by", "head.speed", "head.avoid")
     rows = tuple(
         (
-            f"{each.frequency_hz:.4g}", f"{one.order_per_rev:.4g}", f"{one.speed_rpm:.4g}",
+            f"{each.frequency_hz:.4g}",
+            f"{one.order_per_rev:.4g}",
+            f"{one.speed_rpm:.4g}",
             f"{one.low_rpm:.4g}–{one.high_rpm:.4g}",
         )
         for each in result.resonances
         for one in each.avoid
-    )  # fmt: skip
+    )
     return Grid(heads, rows)
 
 
@@ -179,12 +181,15 @@ def _orders(result: VibrationResult) -> Grid:
     heads = ("order", "interval", "level", "torque", "at", "place")
     rows = tuple(
         (
-            f"{each.order_per_rev:.5g}", "–".join(f"{end:.5g}" for end in each.order_ci95),
-            f"{each.largest_rpm:.3g}", f"{each.torque_percent:.3g}", f"{each.at_rpm:.4g}",
+            f"{each.order_per_rev:.5g}",
+            "–".join(f"{end:.5g}" for end in each.order_ci95),
+            f"{each.largest_rpm:.3g}",
+            f"{each.torque_percent:.3g}",
+            f"{each.at_rpm:.4g}",
             Note(f"place.{each.place}"),
         )
         for each in result.orders[:_SHOWN]
-    )  # fmt: skip
+    )
     return Grid(tuple(f"head.{name}" for name in heads), rows)
 
 
@@ -195,10 +200,14 @@ def _speeds(result: VibrationResult) -> Grid:
         main: Cell = Note("none")
         if each.parts:
             largest = each.parts[0]
-            main = Note("main", values={
-                "frequency": f"{largest.frequency_hz:.4g}",
-                "order": f"{largest.order_per_rev:.4g}", "level": f"{largest.speed_rpm:.3g}",
-            })  # fmt: skip
+            main = Note(
+                "main",
+                values={
+                    "frequency": f"{largest.frequency_hz:.4g}",
+                    "order": f"{largest.order_per_rev:.4g}",
+                    "level": f"{largest.speed_rpm:.3g}",
+                },
+            )
         rms = f"{each.speed_rms_rpm:.3g}", f"{each.torque_rms_percent:.3g}"
         rows.append((f"{each.speed_rpm:.4g}", *rms, main))
     return Grid(heads, tuple(rows))

@@ -25,8 +25,11 @@ _WATCHDOG_BIT = 0x40
 _PLAIN_ACTIVATE = 0x0300
 _MODE_OF_OPERATION = 0x6060
 _MAPPING = (
-    range(0x1600, 0x1800), range(0x1A00, 0x1C00), range(0x1C12, 0x1C13), range(0x1C13, 0x1C14),
-)  # fmt: skip
+    range(0x1600, 0x1800),
+    range(0x1A00, 0x1C00),
+    range(0x1C12, 0x1C13),
+    range(0x1C13, 0x1C14),
+)
 #: Transitions that this master makes on the way up, in their order.
 BEFORE_MAPPING, BEFORE_OP = ("IP", "PS"), ("SO",)
 
@@ -129,16 +132,22 @@ def _commands(rules: BringUp) -> tuple[tuple[Command, ...], tuple[Text, ...]]:
             notes.append(
                 text(
                     "ethercat.note-command-not-written",
-                    transition=each.transition, parameter=key, reason=reason,
+                    transition=each.transition,
+                    parameter=key,
+                    reason=reason,
                 )
-            )  # fmt: skip
+            )
             continue
         sent.append(
             Command(
-                each.transition, each.index, each.subindex, each.raw,
-                each.complete_access, each.comment,
+                each.transition,
+                each.index,
+                each.subindex,
+                each.raw,
+                each.complete_access,
+                each.comment,
             )
-        )  # fmt: skip
+        )
     return tuple(sent), tuple(notes)
 
 
@@ -172,9 +181,12 @@ def send_commands(
                 continue
             try:
                 yield from coe.download(
-                    station.box, command.index, command.subindex, command.data,
+                    station.box,
+                    command.index,
+                    command.subindex,
+                    command.data,
                     complete=command.complete,
-                )  # fmt: skip
+                )
             except Rejected as error:
                 raise NotAllowed(
                     "ethercat.station-refuses-command-maker",

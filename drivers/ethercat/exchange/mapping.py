@@ -192,9 +192,14 @@ def _direction(
         return _fixed(station, wish[:needed], wish, profile, rules), {}
     kept = _set_entries(rules.kept, profile)
     room = _Room(
-        rules.free.index, profile.pdo.max_entries, rules.room_bytes, rules.kept, kept,
-        rules.assignable, profile,
-    )  # fmt: skip
+        rules.free.index,
+        profile.pdo.max_entries,
+        rules.room_bytes,
+        rules.kept,
+        kept,
+        rules.assignable,
+        profile,
+    )
     return _filled(station, direction, wish, needed, profile, room)
 
 

@@ -43,9 +43,14 @@ def lost_flag(place: int) -> int:
 
 
 _HEADER_FIELDS = {
-    "cycle": ("<u8", 0), "time_ns": ("<i8", 8), "dc_ns": ("<i8", 16), "wkc": ("<i4", 24),
-    "expected": ("<i4", 28), "flags": ("<u4", 32), "late_us": ("<u4", 36),
-}  # fmt: skip
+    "cycle": ("<u8", 0),
+    "time_ns": ("<i8", 8),
+    "dc_ns": ("<i8", 16),
+    "wkc": ("<i4", 24),
+    "expected": ("<i4", 28),
+    "flags": ("<u4", 32),
+    "late_us": ("<u4", 36),
+}
 
 
 class Ring:

@@ -20,9 +20,12 @@ _SYNC_MANAGERS, _NO_MAILBOXES = 0x800, 0x0016
 
 #: ETG.1020 clause 5.3.7.2: how long a slave may take for each state.
 STATE_TIMEOUT_S = {
-    AlState.INIT: 5.0, AlState.PREOP: 3.0, AlState.BOOT: 3.0, AlState.SAFEOP: 10.0,
+    AlState.INIT: 5.0,
+    AlState.PREOP: 3.0,
+    AlState.BOOT: 3.0,
+    AlState.SAFEOP: 10.0,
     AlState.OP: 10.0,
-}  # fmt: skip
+}
 
 
 @dataclass

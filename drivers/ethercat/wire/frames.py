@@ -48,10 +48,15 @@ def build(requests: Sequence[Request], index: int) -> bytes:
         data = bytes(access.size) if isinstance(access, Read) else access.data
         parts.append(
             struct.pack(
-                "<BBHHHH", _FPRD if reads else _FPWR, index, _STATION_BASE + station,
-                access.register, len(data) | (_MORE if number < last else 0), 0,
+                "<BBHHHH",
+                _FPRD if reads else _FPWR,
+                index,
+                _STATION_BASE + station,
+                access.register,
+                len(data) | (_MORE if number < last else 0),
+                0,
             )
-        )  # fmt: skip
+        )
         parts += (data, b"\0\0")
     body = b"".join(parts)
     header = _BROADCAST + _SOURCE + ETHERTYPE + struct.pack("<H", len(body) | 0x1000)

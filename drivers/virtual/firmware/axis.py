@@ -309,8 +309,12 @@ class VirtualAxis:
     def clear_faults(self) -> None:
         """Forget latched faults and their timers."""
         for name in (
-            k.S_FAULTS, k.S_OVERLOAD_T, k.S_SPEED_ERROR_T, k.S_LOCK_T, k.S_FOLLOWING_T,
-        ):  # fmt: skip
+            k.S_FAULTS,
+            k.S_OVERLOAD_T,
+            k.S_SPEED_ERROR_T,
+            k.S_LOCK_T,
+            k.S_FOLLOWING_T,
+        ):
             self.s[name] = 0.0
 
     def live_faults(self) -> int:

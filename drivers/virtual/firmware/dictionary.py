@@ -294,10 +294,15 @@ class ObjectDictionary:
 def _constant(index: int, subindex: int, name: str, kind: str, value: Raw) -> Parameter:
     return Parameter.model_validate(
         {
-            "key": f"{index:04X}:{subindex:02X}", "name": name, "group": "Standard",
-            "type": kind, "access": "ro", "default_raw": value, "source": "CiA 301",
+            "key": f"{index:04X}:{subindex:02X}",
+            "name": name,
+            "group": "Standard",
+            "type": kind,
+            "access": "ro",
+            "default_raw": value,
+            "source": "CiA 301",
         }
-    )  # fmt: skip
+    )
 
 
 def _revision(profile: Profile) -> int:

@@ -90,9 +90,12 @@ class Identification:
             (INDUCTANCE_D, "200C:07", motor.inductance_h * 1e6),
             (INDUCTANCE_Q, "200C:08", motor.inductance_h * 1e6),
             (THETA_BIAS, None, 0.0),
-            (TORQUE_CONSTANT_LIMITED if limited else TORQUE_CONSTANT, "200C:09",
-             motor.torque_constant * 1e3),
-        ):  # fmt: skip
+            (
+                TORQUE_CONSTANT_LIMITED if limited else TORQUE_CONSTANT,
+                "200C:09",
+                motor.torque_constant * 1e3,
+            ),
+        ):
             self._status(state)
             yield 0.1
             if key is not None:
@@ -146,9 +149,13 @@ class Identification:
         self._put("200C:0B", viscous * 1e3)
         self._put("200C:0C", coulomb * 1e3)
         for target, source in (
-            ("2001:01", "200C:06"), ("2001:02", "200C:07"), ("2001:03", "200C:08"),
-            ("2001:05", "200C:09"), ("2001:06", "200C:0A"), ("2001:0B", "200C:0C"),
-        ):  # fmt: skip
+            ("2001:01", "200C:06"),
+            ("2001:02", "200C:07"),
+            ("2001:03", "200C:08"),
+            ("2001:05", "200C:09"),
+            ("2001:06", "200C:0A"),
+            ("2001:0B", "200C:0C"),
+        ):
             core.od.put(target, core.number(source))
         core.od.put("2001:0A", min(65535, max(0, round(viscous * 1e6))))
         self._status(COMPLETE)

@@ -12,8 +12,11 @@ from drivers.virtual.firmware.settings import ImpedanceSettings
 PP, PV, PT, HM, CSP, CSV, CST = 1, 3, 4, 6, 8, 9, 10
 IMPEDANCE = -4
 _CYCLIC_LOOP = {
-    CSP: k.LOOP_POSITION, CSV: k.LOOP_SPEED, CST: k.LOOP_TORQUE, IMPEDANCE: k.LOOP_IMPEDANCE,
-}  # fmt: skip
+    CSP: k.LOOP_POSITION,
+    CSV: k.LOOP_SPEED,
+    CST: k.LOOP_TORQUE,
+    IMPEDANCE: k.LOOP_IMPEDANCE,
+}
 _NEW_SET_POINT, _AT_ONCE, _RELATIVE = 1 << 4, 1 << 5, 1 << 6
 
 
@@ -167,10 +170,13 @@ class Modes:
             largest = 3.0 * core.motor.rated_torque_nm
             self._axis.apply_impedance(
                 ImpedanceSettings(
-                    core.number("2080:01"), core.number("2080:02"), core.number("2080:03"),
-                    core.number("2080:04", 1000) or 1000, min(limit or largest, largest),
+                    core.number("2080:01"),
+                    core.number("2080:02"),
+                    core.number("2080:03"),
+                    core.number("2080:04", 1000) or 1000,
+                    min(limit or largest, largest),
                 )
-            )  # fmt: skip
+            )
 
     def on_cycle(self) -> None:
         """One cycle of process data arrived.

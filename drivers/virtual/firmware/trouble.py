@@ -21,9 +21,12 @@ _FAULTS: Final = {
     "following_error": k.F_FOLLOWING,
 }  # fmt: skip
 _PHYSICS: Final = {
-    "supply_v": k.P_SUPPLY_V, "ambient_c": k.P_AMBIENT, "load_nm": k.P_GRAVITY,
-    "coulomb_nm": k.P_COULOMB, "encoder_loss": k.P_ENCODER_DEAD,
-}  # fmt: skip
+    "supply_v": k.P_SUPPLY_V,
+    "ambient_c": k.P_AMBIENT,
+    "load_nm": k.P_GRAVITY,
+    "coulomb_nm": k.P_COULOMB,
+    "encoder_loss": k.P_ENCODER_DEAD,
+}
 
 
 def make_trouble(

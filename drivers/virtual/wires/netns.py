@@ -81,8 +81,11 @@ class Namespace:
         names = [name for pair in pairs for name in pair]
         holder = subprocess.Popen(
             [*_python(), "--hold", *names],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=child_environment(),
-        )  # fmt: skip
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=child_environment(),
+        )
         assert holder.stdout is not None
         answer = holder.stdout.readline().strip()
         if answer != "ready":

@@ -67,8 +67,13 @@ class Rig:
             now = values(device, settings(profile))
             different = {w.key for w in axis.writes if now[w.key] != w.raw}
             # What is mapped takes the controller's cyclic values, and the hand-over says so.
-            named = {key for note in axis.notes if note.code == OVERWRITTEN for key in different
-                     if key in str(note.params["keys"])}  # fmt: skip
+            named = {
+                key
+                for note in axis.notes
+                if note.code == OVERWRITTEN
+                for key in different
+                if key in str(note.params["keys"])
+            }
             assert different == named
 
 

@@ -85,9 +85,13 @@ def measure(
             run = simulate(mechanics, drive, sample_rate_hz, torque=e.samples)
         elif position:
             run = simulate(
-                mechanics, drive, sample_rate_hz, torque=e.samples, velocity=moving,
+                mechanics,
+                drive,
+                sample_rate_hz,
+                torque=e.samples,
+                velocity=moving,
                 position=place - place[0],
-            )  # fmt: skip
+            )
         else:
             run = simulate(mechanics, drive, sample_rate_hz, torque=e.samples, velocity=moving)
         travel = max(travel, float(np.ptp(run.position)))

@@ -144,11 +144,15 @@ def played(case: Case) -> tuple[tuple[excite.Sequence, Recording], ...] | None:
 def facts_of(case: Case) -> AxisFacts:
     drive = case.drive
     return AxisFacts(
-        drive.rated_nm, True, 3000.0,
+        drive.rated_nm,
+        True,
+        3000.0,
         drive.current_hz if case.known_lag else None,
         drive.speed_filter_hz if case.known_lag else None,
-        case.mechanics.motor_kgm2, None, drive.interpolates,
-    )  # fmt: skip
+        case.mechanics.motor_kgm2,
+        None,
+        drive.interpolates,
+    )
 
 
 def result_of(case: Case, records: tuple[tuple[excite.Sequence, Recording], ...]) -> SweepResult:

@@ -157,14 +157,21 @@ def test_odd_lines_tell_even_and_odd_distortion_and_noise_apart() -> None:
     rng = np.random.default_rng(11)
     found = {}
     for name, (square, cube, noise) in {
-        "even": (0.3, 0.0, 1e-4), "odd": (0.0, 0.3, 1e-4), "noise": (0.0, 0.0, 0.05),
-    }.items():  # fmt: skip
+        "even": (0.3, 0.0, 1e-4),
+        "odd": (0.0, 0.3, 1e-4),
+        "noise": (0.0, 0.0, 0.05),
+    }.items():
         records = []
         for number in range(4):
             e = multisine(
-                sample_rate_hz=RATE, period_samples=PERIOD, lines=odd, realisation=number // 2,
-                invert=bool(number % 2), iterations=20, periods=4,
-            )  # fmt: skip
+                sample_rate_hz=RATE,
+                period_samples=PERIOD,
+                lines=odd,
+                realisation=number // 2,
+                invert=bool(number % 2),
+                iterations=20,
+                periods=4,
+            )
             one = e.one_period / np.std(e.one_period)
             moved = one + square * one**2 + cube * one**3
             whole = np.resize(np.roll(moved, e.first_sample % PERIOD), e.samples.size)

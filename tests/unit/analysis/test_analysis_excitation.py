@@ -54,9 +54,12 @@ def test_realisations_differ_and_repeat():
 
 def test_inverted_pair_keeps_the_base_motion():
     args = {
-        "sample_rate_hz": 1000.0, "period_samples": 1000, "lines": LINES, "realisation": 1,
+        "sample_rate_hz": 1000.0,
+        "period_samples": 1000,
+        "lines": LINES,
+        "realisation": 1,
         "base": BaseMotion(0.5, 1.2),
-    }  # fmt: skip
+    }
     plus, minus = multisine(**args), multisine(**args, invert=True)
     assert plus.base_line == 1
     half = (plus.one_period + minus.one_period) / 2
@@ -66,9 +69,13 @@ def test_inverted_pair_keeps_the_base_motion():
 @pytest.mark.parametrize("integrations", [1, 2])
 def test_axis_ends_at_rest_where_it_began_and_does_not_drift(integrations):
     e = multisine(
-        sample_rate_hz=1000.0, period_samples=1000, lines=LINES, periods=3,
-        integrations=integrations, base=BaseMotion(0.3),
-    )  # fmt: skip
+        sample_rate_hz=1000.0,
+        period_samples=1000,
+        lines=LINES,
+        periods=3,
+        integrations=integrations,
+        base=BaseMotion(0.3),
+    )
     path = e.samples
     for _ in range(integrations):
         path = np.cumsum(path)
@@ -83,9 +90,11 @@ def test_amplitude_falls_by_20_db_per_decade():
     a = 20 * np.log10(falling_amplitude(f, 100.0))
     assert a == pytest.approx([0.0, -3.0103, -20.04, -40.0], abs=0.01)
     e = multisine(
-        sample_rate_hz=1000.0, period_samples=1000, lines=LINES,
+        sample_rate_hz=1000.0,
+        period_samples=1000,
+        lines=LINES,
         amplitude=falling_amplitude(LINES * 1.0, 50.0),
-    )  # fmt: skip
+    )
     got = np.abs(spectrum(e))[LINES]
     assert np.allclose(
         got / got[0],

@@ -64,9 +64,14 @@ def test_torque_mode_at_1_khz_direct_and_model(mechanics):
 
 @pytest.mark.parametrize(
     ("mechanics", "loop_hz", "position"),
-    [(RIGID, 150.0, False), (ONE, 40.0, False), (TWO, 40.0, True), (VERTICAL, 40.0, True),
-     (HEAVY, 4.0, False)],
-)  # fmt: skip
+    [
+        (RIGID, 150.0, False),
+        (ONE, 40.0, False),
+        (TWO, 40.0, True),
+        (VERTICAL, 40.0, True),
+        (HEAVY, 4.0, False),
+    ],
+)
 def test_closed_loops_at_1_khz(mechanics, loop_hz, position):
     m = measure(mechanics, 1000.0, loop_hz, position=position)
     found = identify_mechanics(m.records, m.path, m.quantity)
@@ -202,9 +207,14 @@ def test_friction_is_taken_out_of_a_closed_speed_loop(reported_nm):
     for number in range(4):
         sign = 1.0 - 2.0 * (number % 2)
         e = multisine(
-            sample_rate_hz=fs, period_samples=n, lines=lines, periods=5, transient_periods=1,
-            realisation=number // 2, invert=sign < 0,
-        )  # fmt: skip
+            sample_rate_hz=fs,
+            period_samples=n,
+            lines=lines,
+            periods=5,
+            transient_periods=1,
+            realisation=number // 2,
+            invert=sign < 0,
+        )
         e = scaled(e, 12.0)
         played = base + e.samples
         run = simulate(mechanics, Drive(kp_nms=kp, ki_nm=ki), fs, velocity=played)

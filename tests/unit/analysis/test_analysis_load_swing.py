@@ -30,9 +30,14 @@ def moved(mechanics, drive):
     gentle = max(mechanics.total_kgm2 * speed / 0.15, 4 * mechanics.coulomb_nm)
     limits = MoveLimits(3.2 * TURN, speed, min(0.7 * RATED_NM, friction + gentle / 0.7))
     path = design_moves(
-        limits, mechanics.total_kgm2, RATE, friction_nm=friction, repetitions=4, smoothing_s=0.03,
+        limits,
+        mechanics.total_kgm2,
+        RATE,
+        friction_nm=friction,
+        repetitions=4,
+        smoothing_s=0.03,
         dwell_s=0.1,
-    )  # fmt: skip
+    )
     reference = np.concatenate([path.velocity_rad_s, np.zeros(200)])
     return simulate(mechanics, drive, RATE, velocity=reference)
 
@@ -52,9 +57,12 @@ def soft_axis(seed):
         zeta = float(np.exp(rng.uniform(np.log(0.006), np.log(0.05))))
         loads.append((load, w * w * load, 2 * zeta * w * load))
     mechanics = Mechanics(
-        motor, tuple(loads), float(rng.uniform(5e-5, 5e-4)), float(rng.uniform(0.02, 0.1)),
+        motor,
+        tuple(loads),
+        float(rng.uniform(5e-5, 5e-4)),
+        float(rng.uniform(0.02, 0.1)),
         float(rng.uniform(0.05, 0.3)) if seed % 5 == 4 else 0.0,
-    )  # fmt: skip
+    )
     loop = float(np.exp(rng.uniform(np.log(3.0), np.log(15.0))))
     kp = TURN * loop * min(mechanics.total_kgm2, 4 * motor)
     drive = Drive(

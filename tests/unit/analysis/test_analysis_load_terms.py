@@ -21,9 +21,14 @@ def moved(inertia, torque_of=lambda angle, speed: 0.0 * angle, noise_nm=0.002, s
     speed = 960.0 / 60.0 * TURN
     gentle = max(inertia * speed / 0.15, 4 * COULOMB)
     path = design_moves(
-        MoveLimits(WAY, speed, min(0.7, COULOMB + gentle / 0.7)), inertia, RATE,
-        friction_nm=COULOMB, repetitions=4, smoothing_s=0.03, dwell_s=0.1,
-    )  # fmt: skip
+        MoveLimits(WAY, speed, min(0.7, COULOMB + gentle / 0.7)),
+        inertia,
+        RATE,
+        friction_nm=COULOMB,
+        repetitions=4,
+        smoothing_s=0.03,
+        dwell_s=0.1,
+    )
     velocity, angle = path.velocity_rad_s, path.position_rad
     torque = inertia * path.acceleration_rad_s2 + VISCOUS * velocity
     torque = torque + COULOMB * np.tanh(velocity / 0.05) + torque_of(angle, velocity)

@@ -20,9 +20,14 @@ from backend.analysis.signals.line_spectra import Record, collect
 from backend.tools.sweep.evaluation import SweepSettings, evaluate
 
 DRIVE = Drive(
-    rated_nm=RATED_NM, limit_nm=3 * RATED_NM, current_hz=1000.0, counts_per_rev=2**20,
-    speed_filter_hz=1000.0, interpolates=True, seed=3,
-)  # fmt: skip
+    rated_nm=RATED_NM,
+    limit_nm=3 * RATED_NM,
+    current_hz=1000.0,
+    counts_per_rev=2**20,
+    speed_filter_hz=1000.0,
+    interpolates=True,
+    seed=3,
+)
 
 
 def _case(mechanics, loop_hz=0.0):

@@ -45,9 +45,14 @@ def records(
 ):  # fmt: skip
     """Both axes within their loops, in the steady state; noise of speed (fed back) and torque."""
     made = orthogonal_multisines(
-        sample_rate_hz=RATE, period_samples=N, lines=lines, periods=periods + 1,
-        transient_periods=1, realisations=realisations, ramp_samples=0,
-    )  # fmt: skip
+        sample_rate_hz=RATE,
+        period_samples=N,
+        lines=lines,
+        periods=periods + 1,
+        transient_periods=1,
+        realisations=realisations,
+        ramp_samples=0,
+    )
     found = []
     size = N * (periods + 1)
     f = np.fft.rfftfreq(size, 1 / RATE)
@@ -108,9 +113,13 @@ def test_two_machines_show_no_coupling_and_one_does_through_any_noise():
 
 def test_both_experiments_excite_every_line_at_full_amplitude_and_are_orthogonal():
     made = orthogonal_multisines(
-        sample_rate_hz=RATE, period_samples=N, lines=LINES, periods=3, transient_periods=1,
+        sample_rate_hz=RATE,
+        period_samples=N,
+        lines=LINES,
+        periods=3,
+        transient_periods=1,
         realisations=2,
-    )  # fmt: skip
+    )
     assert [each.signs for each in made] == [*SIGNS, *SIGNS]
     signs = np.array(SIGNS)
     assert np.array_equal(signs.T @ signs, 2 * np.eye(2))

@@ -25,9 +25,14 @@ CASES = ((120.0, 40.0), (170.0, 40.0), (200.0, 40.0), (230.0, 25.0), (300.0, 40.
 
 
 def machine(
-    seconds: float, rate_hz: float, *, peak: float = 200.0, jitter: float = 0.0, hold: float = 10.0,
+    seconds: float,
+    rate_hz: float,
+    *,
+    peak: float = 200.0,
+    jitter: float = 0.0,
+    hold: float = 10.0,
     seed: int = 1,
-) -> Signals:  # fmt: skip
+) -> Signals:
     """Trapezoids: 0.2 s up, 0.4 s at 1500 rpm, 0.2 s down, 0.8 s standing; sampled unevenly."""
     random = np.random.default_rng(seed)
     time = np.arange(0.0, seconds, 1.0 / rate_hz)
@@ -85,8 +90,10 @@ def test_what_does_not_repeat_has_no_period(kind: str) -> None:
     time = np.arange(0.0, 20.0, 0.01)
     random = np.random.default_rng(3)
     torque = {
-        "noise": random.normal(size=time.size), "ramp": time, "still": np.full(time.size, 7.0),
-    }[kind]  # fmt: skip
+        "noise": random.normal(size=time.size),
+        "ramp": time,
+        "still": np.full(time.size, 7.0),
+    }[kind]
     assert period_of(Signals(time, torque, np.zeros(time.size))) is None
 
 

@@ -187,14 +187,16 @@ EXCITED = {
     ),
     "ramped in": (multisine(RATE, LINES, 1.0, 10, 1) * np.minimum(TIMES, 1.0), "periodic"),
     "chirp beside a slow motion": (
-        chirp(TIMES, 5.0, 10.0, 400.0) + 2.0 * np.sin(np.pi * TIMES), "chirp",
+        chirp(TIMES, 5.0, 10.0, 400.0) + 2.0 * np.sin(np.pi * TIMES),
+        "chirp",
     ),
     "chirp up and down": (
-        np.concatenate([(c := chirp(TIMES[:12500], 5.0, 5.0, 400.0)), c[::-1]]), "chirp",
+        np.concatenate([(c := chirp(TIMES[:12500], 5.0, 5.0, 400.0)), c[::-1]]),
+        "chirp",
     ),
     "noise": (DRAWN.normal(size=TIMES.size), "noise"),
     "filtered noise": (np.convolve(DRAWN.normal(size=TIMES.size), np.ones(40), "same"), "noise"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", EXCITED)

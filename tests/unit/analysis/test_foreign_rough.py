@@ -25,12 +25,14 @@ Array = np.ndarray
 
 def axis() -> tuple[Array, Array]:
     """States: turn of the motor, its speed, turn of the load, its speed."""
-    a = np.array([
-        [0, 1, 0, 0],
-        [-STIFF / MOTOR, -(DAMP + VISCOUS) / MOTOR, STIFF / MOTOR, DAMP / MOTOR],
-        [0, 0, 0, 1],
-        [STIFF / LOAD, DAMP / LOAD, -STIFF / LOAD, -DAMP / LOAD],
-    ])  # fmt: skip
+    a = np.array(
+        [
+            [0, 1, 0, 0],
+            [-STIFF / MOTOR, -(DAMP + VISCOUS) / MOTOR, STIFF / MOTOR, DAMP / MOTOR],
+            [0, 0, 0, 1],
+            [STIFF / LOAD, DAMP / LOAD, -STIFF / LOAD, -DAMP / LOAD],
+        ]
+    )
     return a, np.array([[0.0], [1 / MOTOR], [0.0], [0.0]])
 
 

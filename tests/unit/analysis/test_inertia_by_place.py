@@ -38,9 +38,13 @@ def found(by_place: float, noise: float = 1e-3) -> InertiaByPlace | None:
     records = []
     for n in range(4):
         e = multisine(
-            sample_rate_hz=RATE_HZ, period_samples=650, lines=np.arange(4, 160), realisation=n // 2,
-            base=BaseMotion(0.5, 1.6), invert=bool(n % 2),
-        )  # fmt: skip
+            sample_rate_hz=RATE_HZ,
+            period_samples=650,
+            lines=np.arange(4, 160),
+            realisation=n // 2,
+            base=BaseMotion(0.5, 1.6),
+            invert=bool(n % 2),
+        )
         e = replace(e, samples=0.4 * e.samples)
         place, speed = moved(e.samples, by_place, 0.8 + 0.3 * n)
         speed = speed + noise * rng.normal(size=speed.size)

@@ -77,9 +77,13 @@ def test_the_error_of_an_eccentric_encoder_is_seen_once_per_revolution() -> None
 def test_friction_that_keeps_the_load_on_its_flank_hides_the_gap() -> None:
     case = drawn(3)
     heavy = replace(
-        case.axis, gap_rad=5e-3, load_coulomb=0.25 * case.rated_nm, gear=1.0, counts=2**18,
+        case.axis,
+        gap_rad=5e-3,
+        load_coulomb=0.25 * case.rated_nm,
+        gear=1.0,
+        counts=2**18,
         pull=0.0,
-    )  # fmt: skip
+    )
     found = load_side(sides_of(Case(heavy, case.rated_nm), 3), heavy.motor_kgm2)
     truth = 5e-3 + 2.0 * heavy.load_coulomb / heavy.stiffness
     assert found.backlash_rad is None

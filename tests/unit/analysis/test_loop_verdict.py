@@ -24,18 +24,28 @@ def loop_of(f: np.ndarray, crossover_hz: float, delay_s: float) -> np.ndarray:
 
 
 def verdict_of(
-    crossover_hz: float, delay_s: float, top_hz: float, *, predicted_s: float | None = None,
-    shown_db: float | None = None, deviation: float = 0.01,
-) -> LoopVerdict:  # fmt: skip
+    crossover_hz: float,
+    delay_s: float,
+    top_hz: float,
+    *,
+    predicted_s: float | None = None,
+    shown_db: float | None = None,
+    deviation: float = 0.01,
+) -> LoopVerdict:
     f = np.linspace(5.0, top_hz, 100)
     loop = loop_of(f, crossover_hz, delay_s)
     lines = Lines(f, loop / (1 + loop), np.full(f.size, deviation))
     nominal = loop_of(DENSE, crossover_hz, delay_s if predicted_s is None else predicted_s)
     late = None if predicted_s is None else (delay_s - predicted_s, 5e-6)
     return judge(
-        lines, DENSE, nominal[None, :], nominal, shown_gain_db=shown_db,
-        late_s=late or (0.0, 5e-6), size=(0.0, 0.01),
-    )  # fmt: skip
+        lines,
+        DENSE,
+        nominal[None, :],
+        nominal,
+        shown_gain_db=shown_db,
+        late_s=late or (0.0, 5e-6),
+        size=(0.0, 0.01),
+    )
 
 
 def test_margins_within_the_band_are_those_of_the_loop() -> None:

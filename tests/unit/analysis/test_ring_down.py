@@ -52,8 +52,10 @@ def test_the_interval_contains_the_truth() -> None:
     inside = np.zeros(2)
     runs = 20
     for run in range(runs):
-        fits = [fit_mode(ring(8.0, 0.03, 100 * run + seed, noise=0.1, creep=0.0), 5.0, 12.0)
-                for seed in range(4)]  # fmt: skip
+        fits = [
+            fit_mode(ring(8.0, 0.03, 100 * run + seed, noise=0.1, creep=0.0), 5.0, 12.0)
+            for seed in range(4)
+        ]
         mode = mode_of([each for each in fits if each is not None])
         low, high = mode.frequency_ci95_hz
         inside[0] += low <= 8.0 <= high

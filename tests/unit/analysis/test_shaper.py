@@ -29,9 +29,11 @@ def after(setpoints: FloatArray, rate: float, frequency_hz: float, damping: floa
     omega = 2 * math.pi * frequency_hz
     # Of the deviation e = x - u: e'' + 2 zeta omega e' + omega^2 e = -u''.
     system = (
-        np.array([[0.0, 1.0], [-(omega**2), -2 * damping * omega]]), np.array([[0.0], [-1.0]]),
-        np.array([[1.0, 0.0]]), np.array([[0.0]]),
-    )  # fmt: skip
+        np.array([[0.0, 1.0], [-(omega**2), -2 * damping * omega]]),
+        np.array([[0.0], [-1.0]]),
+        np.array([[1.0, 0.0]]),
+        np.array([[0.0]]),
+    )
     pull = np.asarray(np.gradient(np.gradient(setpoints, 1 / rate), 1 / rate), np.float64)
     _, _, states = lsim(system, pull, np.arange(setpoints.size) / rate)
     about, speed = states.T

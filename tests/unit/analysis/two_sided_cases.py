@@ -62,15 +62,19 @@ def plan_of(case: Case, travel_rev: float = TRAVEL_REV) -> Plan:
     axis = case.axis
     free = TORQUE * case.rated_nm - axis.motor_coulomb - axis.load_coulomb - abs(axis.pull)
     room = Room(
-        0.8 * travel_rev, 0.85 * SPEED_RPM / 60.0, 90.0,
+        0.8 * travel_rev,
+        0.85 * SPEED_RPM / 60.0,
+        90.0,
         0.5 * free / (axis.motor_kgm2 + axis.load_kgm2),
         (axis.motor_coulomb + axis.load_coulomb + abs(axis.pull))
         / (axis.motor_kgm2 + axis.load_kgm2),
-    )  # fmt: skip
+    )
     asked = LoadSideSettings(
-        travel_limit=travel_rev, speed_limit=SPEED_RPM, torque_limit=100 * TORQUE,
+        travel_limit=travel_rev,
+        speed_limit=SPEED_RPM,
+        torque_limit=100 * TORQUE,
         gear_ratio=axis.gear,
-    )  # fmt: skip
+    )
     return planned(asked, room, RATE_HZ)
 
 

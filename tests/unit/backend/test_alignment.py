@@ -103,8 +103,13 @@ def test_a_step_is_found_by_its_edges() -> None:
 
 def test_what_stands_still_begins_with_the_recording() -> None:
     sent = np.full((300, 1), 3.0)
-    runs: list[Run] = [(0, np.hstack([np.arange(320.0)[:, None], np.full((320, 1), 3.0)]),
-                        np.ones(320, dtype=np.bool_))]  # fmt: skip
+    runs: list[Run] = [
+        (
+            0,
+            np.hstack([np.arange(320.0)[:, None], np.full((320, 1), 3.0)]),
+            np.ones(320, dtype=np.bool_),
+        )
+    ]
     assert len(places(sent, runs)) == 300
 
 

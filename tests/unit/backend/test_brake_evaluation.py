@@ -22,9 +22,12 @@ ASKED = BrakeSettings(nothing_hangs=True)
 
 
 def trial(
-    direction: Literal[1, -1], slips_at: float | None = None, creep_rev: float = 0.0,
-    speed_rev_s: float = 1.0, noise_rev: float = 0.0,
-) -> Trial:  # fmt: skip
+    direction: Literal[1, -1],
+    slips_at: float | None = None,
+    creep_rev: float = 0.0,
+    speed_rev_s: float = 1.0,
+    noise_rev: float = 0.0,
+) -> Trial:
     """An elastic hub; beyond ``slips_at`` % it turns until 0.02 rev, and the torque is gone 3 ms
     after that. ``creep_rev`` is gained at the top of the ramp and stays."""
     sent, phase = sequence(TEST, 1.0, 0.3, RATE)
@@ -45,9 +48,14 @@ def trial(
     turned = turned + noise_rev * np.random.default_rng(5).normal(size=turned.size)
     nm = RATED_NM / 100.0 * direction
     return Trial(
-        direction, 2 * np.pi * direction * turned + 7.0, nm * torque, nm * sent, phase,
-        np.ones(torque.size, np.bool_), halted,
-    )  # fmt: skip
+        direction,
+        2 * np.pi * direction * turned + 7.0,
+        nm * torque,
+        nm * sent,
+        phase,
+        np.ones(torque.size, np.bool_),
+        halted,
+    )
 
 
 def trials(*parts: Trial) -> Trials:

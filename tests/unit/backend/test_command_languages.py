@@ -19,9 +19,12 @@ _WORDS = re.compile(r"[A-Za-z]{2,} [A-Za-z]{2,}")
 def servodeck(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "backend", *arguments],
-        cwd=ROOT, capture_output=True, text=True, check=False,
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
         env={"PATH": "/usr/bin:/bin", "PYTHONWARNINGS": "error", **environment},
-    )  # fmt: skip
+    )
 
 
 def test_version() -> None:

@@ -47,8 +47,9 @@ def test_the_verdict(peak: float, verdict: str, words: str) -> None:
     if peak == 0.0:
         still = Samples(
             Signals(np.arange(0.0, 9.0, 0.1), np.zeros(90), np.zeros(90)),
-            np.empty(0), np.empty(0),
-        )  # fmt: skip
+            np.empty(0),
+            np.empty(0),
+        )
         idle = evaluate(still, CycleSettings(), FACTS)
         assert idle.verdict == "idle"
         assert idle.heat is None
@@ -131,9 +132,11 @@ def test_every_note_and_row_has_words(language: str) -> None:
     }
     asked: dict[str, object] = {"overload_percent": 300.0, "overload_s": 3.0}
     for result in (
-        found(200.0, thermal_time_min=20.0, **asked), found(103.0, thermal_time_min=20.0),
-        found(60.0), evaluate(samples(50.0), CycleSettings(), CycleFacts(None, None, None)),
-    ):  # fmt: skip
+        found(200.0, thermal_time_min=20.0, **asked),
+        found(103.0, thermal_time_min=20.0),
+        found(60.0),
+        evaluate(samples(50.0), CycleSettings(), CycleFacts(None, None, None)),
+    ):
         section = TOOL.report(result)
         words = [TOOL.text(each.name, language, each.values) for each in section.notes]  # type: ignore[arg-type]
         words += [TOOL.text(each.name, language, each.values) for each in section.rows]  # type: ignore[arg-type]

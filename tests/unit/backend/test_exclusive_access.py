@@ -51,8 +51,9 @@ def procedure(wait_s: float) -> Procedure:
         WriteStep(do="write", key="200D:01", raw=0x65766173),
         WaitStep(do="wait", seconds=wait_s),
     )
-    return Procedure(name="save", title="Save", help="", source="t", requires_stop=False,
-                     steps=steps)  # fmt: skip
+    return Procedure(
+        name="save", title="Save", help="", source="t", requires_stop=False, steps=steps
+    )
 
 
 @pytest.fixture

@@ -44,12 +44,15 @@ def _axis(profile: Profile, link: MemoryLink, history: FaultHistory | None) -> A
 
 def _slots() -> FaultHistory:
     return FaultHistory(
-        kind="slots", size=2, code_format="Er.{:03d}", source="t",
+        kind="slots",
+        size=2,
+        code_format="Er.{:03d}",
+        source="t",
         slots=(
             HistorySlot(name="last fault", code_key="200A:13", fields=("200A:16",)),
             HistorySlot(name="second fault", code_key="200A:14"),
         ),
-    )  # fmt: skip
+    )
 
 
 async def test_slots_with_snapshots(profile: Profile, link: MemoryLink) -> None:
@@ -96,9 +99,14 @@ class Recorder(MemoryLink):
 
 def _selected(size: int = 3) -> FaultHistory:
     return FaultHistory(
-        kind="selected", size=size, select_key="200D:24", code_key="200D:25",
-        fields=("200D:2A",), code_format="Er.{:03d}", source="t",
-    )  # fmt: skip
+        kind="selected",
+        size=size,
+        select_key="200D:24",
+        code_key="200D:25",
+        fields=("200D:2A",),
+        code_format="Er.{:03d}",
+        source="t",
+    )
 
 
 async def test_a_selector_brings_every_record_and_is_put_back(

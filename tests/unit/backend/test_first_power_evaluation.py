@@ -102,10 +102,13 @@ def test_counts_against_a_marked_turn(turned: float, expected: str) -> None:
 @pytest.mark.parametrize(
     ("switches", "expected"),
     [
-        ((True, True), "ok"), ((True, False), "only_negative"), ((False, True), "only_positive"),
-        ((False, False), "none_seen"), (None, "not_done"),
+        ((True, True), "ok"),
+        ((True, False), "only_negative"),
+        ((False, True), "only_positive"),
+        ((False, False), "none_seen"),
+        (None, "not_done"),
     ],
-)  # fmt: skip
+)
 def test_limit_switches(switches: tuple[bool, bool] | None, expected: str) -> None:
     asked = ASKED.model_copy(update={"hand_switches": True})
     seen = Seen(SEEN.measured_at, switches=switches)

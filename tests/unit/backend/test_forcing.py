@@ -62,16 +62,24 @@ def io_profile(profile: Profile) -> Profile:
         IoTerminal(name="DI3", direction="in", function_key="2003:03", functions=_DI1, source="t"),
     )
     outputs = Forcing(
-        name="outputs", title="Force outputs", help="", warning="it acts at once", source="t",
+        name="outputs",
+        title="Force outputs",
+        help="",
+        warning="it acts at once",
+        source="t",
         enable=TerminalBits(key="60FE:02", bits={"DO1": 16, "DO2": 17, "DO3": 18}),
         value=TerminalBits(key="60FE:01", bits={"DO1": 16, "DO2": 17, "DO3": 18}),
         needs_function=31,
-    )  # fmt: skip
+    )
     simulation = Forcing(
-        name="simulation", title="Simulate inputs", help="", warning="it hides", source="t",
+        name="simulation",
+        title="Simulate inputs",
+        help="",
+        warning="it hides",
+        source="t",
         enable=TerminalBits(key="2031:02", bits={"DI1": 0, "DI2": 1}),
         value=TerminalBits(key="2031:03", bits={"DI1": 0, "DI2": 1}),
-    )  # fmt: skip
+    )
     keys = ["60FE:01", "60FE:02", "60FD:00", "60B8:00"]
     small = [f"2002:0{n}" for n in (1, 2, 3)] + [f"2003:0{n}" for n in (1, 2, 3)]
     parameters = [_parameter(key) for key in keys] + [_parameter(key, "UINT16") for key in small]

@@ -60,9 +60,12 @@ class Held:
 
     def sign(self, sign: Sign) -> None:
         self.hold.renew(
-            1, sign.number, sent_s=self.began + sign.at_s - 93.25, silent_s=sign.silent_s,
+            1,
+            sign.number,
+            sent_s=self.began + sign.at_s - 93.25,
+            silent_s=sign.silent_s,
             pressed=sign.pressed,
-        )  # fmt: skip
+        )
 
     def play(self, signs: Iterable[Sign], until_s: float, release_at_s: float = 1e9) -> None:
         """Everything in the order of its arrival, with a look at the hold every millisecond."""

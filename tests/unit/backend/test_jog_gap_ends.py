@@ -113,10 +113,13 @@ def test_a_gap_in_which_nothing_happens_is_gone_over() -> None:
 @pytest.mark.parametrize(
     "happens",
     [
-        Jogged.stop, Jogged.lose_the_right, Jogged.trip, Jogged.release,
+        Jogged.stop,
+        Jogged.lose_the_right,
+        Jogged.trip,
+        Jogged.release,
         Jogged.lose_power_elsewhere,
     ],
-)  # fmt: skip
+)
 def test_what_happens_in_a_gap_is_final(happens: Callable[[Jogged], Awaitable[None]]) -> None:
     words, targets, _job = after_gap(happens)
     assert not targets, "a new target would move it on"

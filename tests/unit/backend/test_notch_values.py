@@ -167,8 +167,9 @@ def test_widths_become_what_was_measured() -> None:
 
 
 @pytest.mark.parametrize("hold", ["zero", "linear"])
-@pytest.mark.parametrize("truth", [Notch(120.0, 60.0, -40.0), Notch(122.0, 6.0, -9.0),
-                                   Notch(118.0, 240.0, -3.0)])  # fmt: skip
+@pytest.mark.parametrize(
+    "truth", [Notch(120.0, 60.0, -40.0), Notch(122.0, 6.0, -9.0), Notch(118.0, 240.0, -3.0)]
+)
 def test_a_notch_is_read_from_the_sampled_torque(hold: str, truth: Notch) -> None:
     """The sampled torque is made in the time domain, 20 steps per cycle, not from the formula."""
     from scipy.signal import cont2discrete, lfilter

@@ -66,9 +66,13 @@ async def test_a_load_that_the_link_ends_says_how_far_it_came_and_how_to_take_it
     library = SetLibrary(tmp_path)
     with pytest.raises(LinkLost, match="1 of 2 rows were written before 2005:10") as reported:
         await parameters.load_set(
-            drive, content, ["2005:03", "2005:10"], silent, library=library,
+            drive,
+            content,
+            ["2005:03", "2005:10"],
+            silent,
+            library=library,
             accept_other_identity=False,
-        )  # fmt: skip
+        )
     name = reported.value.message.split("“")[1].removesuffix("”")
     undo = library.load(name)
     assert {row.key: row.raw for row in undo.rows} == {"2005:03": 400, "2005:10": 0}
@@ -174,9 +178,13 @@ async def test_one_bad_choice_and_nothing_is_written(drive: Drive, link, tmp_pat
     content = parameter_set.parse((await written(drive)).replace(b"raw = 400", b"raw = 9999"))
     with pytest.raises(OutOfRange):
         await parameters.load_set(
-            drive, content, ["2005:10", "2005:03"], silent,
-            library=SetLibrary(tmp_path), accept_other_identity=False,
-        )  # fmt: skip
+            drive,
+            content,
+            ["2005:10", "2005:03"],
+            silent,
+            library=SetLibrary(tmp_path),
+            accept_other_identity=False,
+        )
     assert not link.written
 
 

@@ -339,9 +339,13 @@ async def test_set_points_leave_no_trace_of_themselves(x: ConnectedDrive) -> Non
 
 @pytest.mark.parametrize(("age_s", "stops"), [(0.0, True), (3600.0, False)])
 async def test_the_next_server_stops_what_a_killed_one_left_moving(
-    x: ConnectedDrive, servo: Servo, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory,
-    age_s: float, stops: bool,
-) -> None:  # fmt: skip
+    x: ConnectedDrive,
+    servo: Servo,
+    tmp_path: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    age_s: float,
+    stops: bool,
+) -> None:
     """A homing that looks for a switch goes on in the drive; later it may be somebody else's."""
     state = tmp_path_factory.mktemp("killed") / "state"
     await killed(x, servo, tmp_path, state)

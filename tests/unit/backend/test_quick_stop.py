@@ -56,9 +56,13 @@ async def test_an_axis_without_a_loop_is_brought_to_rest_near_its_envelope() -> 
             with pytest.raises(NotAllowed, match="speed"):
                 async with enabled(b.axis, b.session, Mode.CST):
                     await play(
-                        b.axis, b.session, Play(Mode.CST, values), limits, rated_nm,
+                        b.axis,
+                        b.session,
+                        Play(Mode.CST, values),
+                        limits,
+                        rated_nm,
                         lambda _part: None,
-                    )  # fmt: skip
+                    )
         went_rev = units.position(b.link.highest["high"] - home)
         fastest_rev_s = units.velocity(b.link.highest["speed"]) / 60.0
         assert await b.axis.drive.raw("6085:00") == shipped

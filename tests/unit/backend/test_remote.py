@@ -70,6 +70,8 @@ def test_samples_of_one_moment_make_one_row_whatever_comes_first() -> None:
     recorded.end()
     assert file.getvalue().splitlines() == [
         'time [s],"X 6064:00 Position [inc]","Y 6064:00 Position"',
-        "0.000000,1,", "0.001000,2,8", "0.002000,,9",
-    ]  # fmt: skip
+        "0.000000,1,",
+        "0.001000,2,8",
+        "0.002000,,9",
+    ]
     assert (recorded.rows, recorded.dropped) == (3, 4)

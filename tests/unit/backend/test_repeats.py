@@ -97,9 +97,13 @@ async def played(
     ],
 )
 async def test_realisations_that_lost_samples(
-    monkeypatch: pytest.MonkeyPatch, clock: Clock, whole: list[int], left_s: float, count: int,
+    monkeypatch: pytest.MonkeyPatch,
+    clock: Clock,
+    whole: list[int],
+    left_s: float,
+    count: int,
     left_out: int,
-) -> None:  # fmt: skip
+) -> None:
     again = Repeats(clock.now_s + left_s)
     assert await played(monkeypatch, clock, whole, again) == count
     assert again.left_out == left_out
@@ -128,9 +132,12 @@ NAMED: Any = SimpleNamespace(drive=SimpleNamespace(name="X"))
 
 
 async def tried(
-    monkeypatch: pytest.MonkeyPatch, clock: Clock, family: str, left_s: float,
+    monkeypatch: pytest.MonkeyPatch,
+    clock: Clock,
+    family: str,
+    left_s: float,
     lost: set[int] | None = None,
-) -> tuple[int, int]:  # fmt: skip
+) -> tuple[int, int]:
     """How many values of a family's notch are tried in this time; the others are named."""
 
     @asynccontextmanager
@@ -165,14 +172,21 @@ async def tried(
 @pytest.mark.parametrize(
     ("family", "left_s", "count", "left_out"),
     [
-        ("r6l", 20.0, 7, 0), ("r6l", 16.0, 5, 2), ("r6l", 8.0, 4, 3),
-        ("m6l", 7.5, 2, 0), ("m6l", 4.0, 1, 1),
+        ("r6l", 20.0, 7, 0),
+        ("r6l", 16.0, 5, 2),
+        ("r6l", 8.0, 4, 3),
+        ("m6l", 7.5, 2, 0),
+        ("m6l", 4.0, 1, 1),
     ],
-)  # fmt: skip
+)
 async def test_fewer_values_of_a_notch_are_tried_where_time_is_short(
-    monkeypatch: pytest.MonkeyPatch, clock: Clock, family: str, left_s: float, count: int,
+    monkeypatch: pytest.MonkeyPatch,
+    clock: Clock,
+    family: str,
+    left_s: float,
+    count: int,
     left_out: int,
-) -> None:  # fmt: skip
+) -> None:
     assert await tried(monkeypatch, clock, family, left_s) == (count, left_out)
 
 

@@ -228,21 +228,31 @@ def test_steps_with_other_read_outs_are_compared(facts: Facts, widened: str) -> 
 def test_what_is_not_in_order_is_reported(facts: Facts) -> None:
     change = replace(facts.changes[0], now="77 Hz")
     changed = replace(
-        facts, changes=(change,), unsaved=("2005:03 Speed bandwidth",),
-        pending=("2005:10 Gain mode",), trouble=(prose("0x7500 EtherCAT communication"),),
+        facts,
+        changes=(change,),
+        unsaved=("2005:03 Speed bandwidth",),
+        pending=("2005:10 Gain mode",),
+        trouble=(prose("0x7500 EtherCAT communication"),),
         unusable=(prose("5.sdmeas is damaged"),),
-    )  # fmt: skip
+    )
     text = "\n".join(texts_of(compose(changed, "en")))
-    for part in ("is 77 Hz now, not 142.6 Hz", "not saved in its memory", "without effect until",
-                 "0x7500", "5.sdmeas is damaged"):  # fmt: skip
+    for part in (
+        "is 77 Hz now, not 142.6 Hz",
+        "not saved in its memory",
+        "without effect until",
+        "0x7500",
+        "5.sdmeas is damaged",
+    ):
         assert part in text
 
 
 def test_the_newest_of_each_kind_is_compared_with_the_one_before(store: MeasurementStore) -> None:
     heads = {name: store.head(name) for name in store.names()}
     assert choose(heads, at(5)) == [
-        ("2-inertia.sdmeas", ""), ("3-loop.sdmeas", ""), ("4-step.sdmeas", "1-step.sdmeas"),
-    ]  # fmt: skip
+        ("2-inertia.sdmeas", ""),
+        ("3-loop.sdmeas", ""),
+        ("4-step.sdmeas", "1-step.sdmeas"),
+    ]
     assert [earlier for _, earlier in choose(heads, None)] == ["", "", ""]
 
 
@@ -282,9 +292,10 @@ def test_every_text_of_the_report_is_used() -> None:
     source = "".join(file.read_text("utf-8") for file in folder.glob("*.py"))
     put_together = ("kind.", "tone.", "verdict.")
     unused = [
-        name for name in TEXTS
+        name
+        for name in TEXTS
         if not name.startswith(put_together) and len(re.findall(rf"['\"]{name}['\"]", source)) < 2
-    ]  # fmt: skip
+    ]
     assert not unused
 
 
@@ -294,11 +305,15 @@ def test_every_text_of_the_report_is_used() -> None:
 @pytest.mark.parametrize("language", ["en", "zh"])
 def test_html_runs_nothing_and_asks_for_nothing(facts: Facts, language: Language) -> None:
     nasty = replace(
-        facts, person=NASTY, machine=NASTY, notes=NASTY, trouble=(prose(NASTY),),
+        facts,
+        person=NASTY,
+        machine=NASTY,
+        notes=NASTY,
+        trouble=(prose(NASTY),),
         unusable=(prose(NASTY),),
         identity=replace(facts.identity, axis=NASTY, firmware=NASTY),
         changes=(ChangedSetting(NASTY, NASTY, NASTY, NASTY, at(1), NASTY),),
-    )  # fmt: skip
+    )
     data = render_html(compose(nasty, language))
     page = Page(data)
     assert {"script", "link", "img", "iframe", "object", "a", "form"}.isdisjoint(
@@ -367,9 +382,12 @@ def test_pdf_brings_its_fonts_along(facts: Facts) -> None:
 def test_pdf_takes_any_text(facts: Facts) -> None:
     long = "word " * 4000 + "a" * 3000 + "很长" * 2000
     changed = replace(
-        facts, notes=f"{long}\n{NASTY}\n</para><b>", machine=NASTY, unusable=(prose(long),),
+        facts,
+        notes=f"{long}\n{NASTY}\n</para><b>",
+        machine=NASTY,
+        unusable=(prose(long),),
         changes=tuple(replace(facts.changes[0], key=f"{i:04X}:00", name=NASTY) for i in range(200)),
-    )  # fmt: skip
+    )
     text = pdf_text(render_pdf(compose(changed, "en")))
     assert "<script>alert(1)</script>" in text
     assert "</para><b>" in text

@@ -31,13 +31,19 @@ def interval(value: float, low: float, high: float) -> dict[str, float]:
 
 def verdict(**changes: object) -> dict[str, object]:
     band = {
-        "low_hz": 5.0, "high_hz": 246.0, "phase_margin_deg": interval(58.0, 55.0, 61.0),
-        "gain_margin_db": None, "peak_sensitivity": interval(1.3, 1.2, 1.4),
-    }  # fmt: skip
+        "low_hz": 5.0,
+        "high_hz": 246.0,
+        "phase_margin_deg": interval(58.0, 55.0, 61.0),
+        "gain_margin_db": None,
+        "peak_sensitivity": interval(1.3, 1.2, 1.4),
+    }
     above = {
-        "low_hz": 246.0, "high_hz": 4000.0, "phase_margin_deg": interval(46.0, 41.0, 46.0),
-        "gain_margin_db": interval(9.5, 7.1, 9.5), "peak_sensitivity": interval(1.7, 1.7, 1.9),
-    }  # fmt: skip
+        "low_hz": 246.0,
+        "high_hz": 4000.0,
+        "phase_margin_deg": interval(46.0, 41.0, 46.0),
+        "gain_margin_db": interval(9.5, 7.1, 9.5),
+        "peak_sensitivity": interval(1.7, 1.7, 1.9),
+    }
     return {
         "measured": band, "predicted": above, "last_crossover_hz": 474.0,
         "coverage": "gain_steps", "shown_gain_db": 7.0, "stated": GOALS,

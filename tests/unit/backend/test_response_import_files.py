@@ -40,9 +40,13 @@ def text(
 def read(data: bytes | str, time: str | None = "1", one: str = "2", two: str = "3", **more: object):  # type: ignore[no-untyped-def]
     raw = data.encode() if isinstance(data, str) else data
     return signals_of(
-        read_table(raw, "trace.csv"), "trace.csv", time=time, signal_in=one, signal_out=two,
+        read_table(raw, "trace.csv"),
+        "trace.csv",
+        time=time,
+        signal_in=one,
+        signal_out=two,
         **more,  # type: ignore[arg-type]
-    )  # fmt: skip
+    )
 
 
 def check(found) -> None:  # type: ignore[no-untyped-def]
@@ -74,14 +78,15 @@ TWINCAT = (
         pytest.param("\ufeff" + text(), id="BOM"),
         pytest.param(text(";").encode("utf-16"), id="UTF-16"),
         pytest.param(text(";").encode("utf-16-le"), id="UTF-16 without BOM"),
-        pytest.param(text(head="Zeit [s],Drehmoment [%],Drehzahl [°/s]\n").encode("latin-1"),
-                     id="Latin-1"),
+        pytest.param(
+            text(head="Zeit [s],Drehmoment [%],Drehzahl [°/s]\n").encode("latin-1"), id="Latin-1"
+        ),
         pytest.param(gzip.compress(text().encode()), id="gzip"),
         pytest.param("Recorder 3\nDate: 2024-01-02\nRate = 1000 Hz\n\n" + text(), id="head lines"),
         pytest.param(text(head="time;in;out\n[s];[A];[rpm]\n".replace(";", ",")), id="units line"),
         pytest.param(text().replace("\n", ",\n"), id="separator at the end"),
     ],
-)  # fmt: skip
+)
 def test_text_in_many_forms_is_one_recording(data: str | bytes) -> None:
     check(read(data))
 

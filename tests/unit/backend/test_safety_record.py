@@ -75,7 +75,7 @@ def test_times_and_ways_of_a_torque_that_goes() -> None:
         (trace(torque=0.4), "not_shown", "torque_in_noise"),
         (trace(state_at=None), "not_shown", "stayed_enabled"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_torque_off(made: Trace, verdict: str, obstacle: str | None) -> None:
     found = of("sto", made)
     assert found.verdict == verdict
@@ -89,8 +89,12 @@ def test_a_controlled_stop_keeps_its_torque_until_it_stands() -> None:
     made = trace()
     quick = np.zeros(4000, np.bool_)
     quick[AT : AT + 5] = True
-    cut = Trace(*[quick if name == "quick_stop" else getattr(made, name)
-                  for name in Trace.__dataclass_fields__])  # fmt: skip
+    cut = Trace(
+        *[
+            quick if name == "quick_stop" else getattr(made, name)
+            for name in Trace.__dataclass_fields__
+        ]
+    )
     found = of("ss1", cut)
     assert (found.verdict, found.obstacle) == ("not_shown", "quick_stop_cut")
 
@@ -112,8 +116,12 @@ def test_lost_samples_are_no_proof() -> None:
 def test_what_the_tool_does_at_its_end_is_none_of_the_function() -> None:
     made = trace(state_at=None, stops_in=50)
     made.torque_percent[3500:] = 60.0
-    cut = Trace(*[3400 if name == "asked_until" else getattr(made, name)
-                  for name in Trace.__dataclass_fields__])  # fmt: skip
+    cut = Trace(
+        *[
+            3400 if name == "asked_until" else getattr(made, name)
+            for name in Trace.__dataclass_fields__
+        ]
+    )
     found = of("limit_positive", cut)
     assert found.watched_ms == pytest.approx(3400 - AT, abs=60)
     assert max(found.trace_torque_percent) < 20.0
@@ -130,8 +138,10 @@ def test_every_report_says_that_it_is_no_certificate() -> None:
 def test_a_signature_holds_what_was_signed() -> None:
     made = trace()
     meta: dict[str, Any] = {
-        "tool": "safety-check", "settings": ASKED.model_dump(mode="json"), **made.facts(),
-    }  # fmt: skip
+        "tool": "safety-check",
+        "settings": ASKED.model_dump(mode="json"),
+        **made.facts(),
+    }
     when = "2026-11-25T11:00:00+00:00"
     signature = signed(made.arrays(), meta, "Ben", when, "guard 3")
     kept = {**meta, "signature": signature}
@@ -147,9 +157,10 @@ def test_a_signature_holds_what_was_signed() -> None:
     arrays["torque_percent"] = np.zeros(4000)
     other = {**ASKED.model_dump(mode="json"), "stop_limit_ms": 9000.0}
     for changed in (
-        reevaluate(arrays, kept), reevaluate(made.arrays(), {**kept, "settings": other}),
+        reevaluate(arrays, kept),
+        reevaluate(made.arrays(), {**kept, "settings": other}),
         reevaluate(made.arrays(), {**kept, "signature": {**signature, "person": "Eve"}}),
-    ):  # fmt: skip
+    ):
         assert changed.signature is not None
         assert not changed.signature.intact
         assert "signature_broken" in [note.name for note in TOOL.report(changed).notes]
@@ -159,11 +170,12 @@ def test_the_report_takes_the_newest_record_of_each_function() -> None:
     begun = datetime(2026, 11, 25, tzinfo=UTC)
     heads: dict[str, Any] = {
         f"{function}{hour}": SimpleNamespace(
-            kind="safety-check", saved=begun + timedelta(hours=hour),
+            kind="safety-check",
+            saved=begun + timedelta(hours=hour),
             meta={"settings": {"function": function}},
         )
         for function, hour in (("sto", 1), ("sto", 3), ("ss1", 2))
-    }  # fmt: skip
+    }
     assert choose(heads, begun + timedelta(hours=2, minutes=30)) == [("ss12", ""), ("sto3", "")]
 
 

@@ -65,6 +65,9 @@ def test_what_came_together_goes_together() -> None:
             stream.put(np.full((10, 1), float(number)), start, 0.001, None)
     found = decode(streams._waiting())
     assert [(float(b.times_s[0]), float(b.values[0, 0])) for b in found] == [
-        (0.0, 1.0), (0.01, 1.0), (0.0, 2.0), (0.01, 2.0),
-    ]  # fmt: skip
+        (0.0, 1.0),
+        (0.01, 1.0),
+        (0.0, 2.0),
+        (0.01, 2.0),
+    ]
     assert streams._waiting() == b""

@@ -29,9 +29,12 @@ MODE = ShapingMode(
     range_hz=(7.8, 8.2), range_damping=(0.01, 0.03), ring_downs=4, explained=0.9,
 )  # fmt: skip
 ZV = DesignedShaper(
-    kind="zv", delay_s=0.0625, residual_percent=(0.0, 3.25), tolerated_hz=(7.75, 8.25),
+    kind="zv",
+    delay_s=0.0625,
+    residual_percent=(0.0, 3.25),
+    tolerated_hz=(7.75, 8.25),
     impulses=(ShaperImpulse(share=0.52, time_s=0.0), ShaperImpulse(share=0.48, time_s=0.0625)),
-)  # fmt: skip
+)
 COMPARED = ShapingComparison(
     unit="%", moves=4, unshaped=10.0, unshaped_ci95=(9.0, 11.0), shaped=1.0,
     shaped_ci95=(0.5, 1.5), ratio=0.1, watched_s=2.0, settling_window=1.0, settling_unit="%",
@@ -80,9 +83,10 @@ def test_a_filter_takes_the_frequency_or_the_period_within_its_range() -> None:
     assert average.values_for(0.2) == []
     also = ShapingDriveValue(parameter="P09.25", name="Mode", raw=0, value=0.0, unit="")
     suppression = DriveFilter(
-        takes="frequency", also=(also,),
+        takes="frequency",
+        also=(also,),
         slot=FilterSlot(parameter="P09.26", name="Hz", unit="Hz", scale=0.1, highest_raw=1000),
-    )  # fmt: skip
+    )
     assert [each.raw for each in suppression.values_for(0.125)] == [0, 80]
     assert DriveFilter().values_for(0.125) == []
 

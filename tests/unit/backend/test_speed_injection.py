@@ -36,9 +36,12 @@ def sequences(peak: float, realisations: int = 1) -> tuple[excite.Sequence, ...]
 
 
 def played(
-    sequence: excite.Sequence, inertia: float, gain: float = GAIN, corner_hz: float = 0.0,
+    sequence: excite.Sequence,
+    inertia: float,
+    gain: float = GAIN,
+    corner_hz: float = 0.0,
     noise_rad_s: float = 0.0,
-) -> Recording:  # fmt: skip
+) -> Recording:
     """A rigid axis under a PI speed loop, its speed taken from the steps of the encoder."""
     reference = sequence.excitation.samples
     n = reference.size
@@ -61,9 +64,13 @@ def played(
 
 
 def sized(
-    inertia: float, gain: float = GAIN, corner_hz: float = 0.0, noise_rad_s: float = 0.0, *,
+    inertia: float,
+    gain: float = GAIN,
+    corner_hz: float = 0.0,
+    noise_rad_s: float = 0.0,
+    *,
     watched: bool = False,
-) -> speed_injection.Size:  # fmt: skip
+) -> speed_injection.Size:
     trial = sequences(speed_injection.FIRST_RAD_S)[0]
     recording = played(trial, inertia, gain, corner_hz, noise_rad_s)
     return speed_injection.fitting_size(trial, recording, ROOM, WANTED_NM, watched=watched)

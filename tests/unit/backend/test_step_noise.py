@@ -39,9 +39,14 @@ def stepped(
     speed = rpm * 2 * np.pi / 60
     torque = np.zeros(t.size) if torque_nm is None else torque_nm
     recording = Recording(
-        RATE, np.cumsum(speed) / RATE, speed, torque, demand, np.zeros(t.size),
+        RATE,
+        np.cumsum(speed) / RATE,
+        speed,
+        torque,
+        demand,
+        np.zeros(t.size),
         np.ones(t.size, dtype=bool),
-    )  # fmt: skip
+    )
     return evaluate(recording, demand, settings, 1.0)
 
 
@@ -78,9 +83,14 @@ def test_the_window_of_a_move_is_ten_times_its_noise(noise_rev: float, widened: 
     actual = way + np.random.default_rng(4).normal(size=way.size) * noise_rev
     turn = 2 * np.pi
     recording = Recording(
-        RATE, turn * actual, turn * RATE * np.gradient(way), np.zeros(way.size), turn * way,
-        np.zeros(way.size), np.ones(way.size, dtype=bool),
-    )  # fmt: skip
+        RATE,
+        turn * actual,
+        turn * RATE * np.gradient(way),
+        np.zeros(way.size),
+        turn * way,
+        np.zeros(way.size),
+        np.ones(way.size, dtype=bool),
+    )
     found = evaluate(recording, way, settings, 1.0)
     assert found.widened is widened
     assert found.window == pytest.approx(max(0.01, 10 * noise_rev), rel=0.25)

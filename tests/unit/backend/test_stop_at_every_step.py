@@ -33,7 +33,7 @@ from tests.support.servo import (
     VELOCITY_TARGET,
     Servo,
     bench_with,
-)  # fmt: skip
+)
 
 ENABLE_BIT, QUICK_STOP, ENABLED = 0x08, 0x02, 0x237
 ENVELOPE = Envelope(5.0, 100.0, 50.0, 0.3)

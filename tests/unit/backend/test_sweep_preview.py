@@ -23,9 +23,14 @@ def made(kind: Kind, loop: Loop = "auto", room: excite.Room = ROOM) -> tuple[exc
 
 @pytest.mark.parametrize(
     ("kind", "loop"),
-    [("mechanics", "auto"), ("mechanics", "speed"), ("mechanics", "position"),
-     ("speed_loop", "auto"), ("position_loop", "auto")],
-)  # fmt: skip
+    [
+        ("mechanics", "auto"),
+        ("mechanics", "speed"),
+        ("mechanics", "position"),
+        ("speed_loop", "auto"),
+        ("position_loop", "auto"),
+    ],
+)
 def test_every_kind_has_a_preview(kind: Kind, loop: Loop) -> None:
     shown = _seen(made(kind, loop), "x", 1.0, INERTIA)
     # Realisations come in pairs of opposite sign; lines up to 0.4 of the sample rate.

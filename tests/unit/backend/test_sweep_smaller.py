@@ -21,9 +21,13 @@ from drivers.halt import HaltCause, Halted, Quantity
 RATED_NM, COULOMB_NM = 1.27, 0.08
 SETTINGS = SweepSettings(Envelope(4.0, 1500.0, 100.0, 60.0), realisations=1)
 FREE = Setup(
-    1000.0, AxisFacts(RATED_NM, True, 3000.0, None, None, None, None, True), "none",
-    excite.Room(RATED_NM, 157.0, 25.0), excite.Rigid(3e-4, COULOMB_NM), 1e-3 * RATED_NM,
-)  # fmt: skip
+    1000.0,
+    AxisFacts(RATED_NM, True, 3000.0, None, None, None, None, True),
+    "none",
+    excite.Room(RATED_NM, 157.0, 25.0),
+    excite.Rigid(3e-4, COULOMB_NM),
+    1e-3 * RATED_NM,
+)
 
 
 def base_nm(sequence: excite.Sequence) -> float:

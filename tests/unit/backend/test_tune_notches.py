@@ -26,9 +26,7 @@ def measured(*modes: tuple[float, float, float]) -> SweepResult:
     same = np.ones(f.size)
     model = MechanicalModel(1.0, 0.0, tuple(Mode(*each, 0.0) for each in modes))
     frf = Frf(f, model.response(f), same, same, same, same, same, 1000.0, (5.0, 400.0), 4, 0)
-    return SweepResult(
-        "mechanics", "none", frf, frf, model, True, "1", (), {}, 0.0, 1.0, 0.0
-    )  # fmt: skip
+    return SweepResult("mechanics", "none", frf, frf, model, True, "1", (), {}, 0.0, 1.0, 0.0)
 
 
 def test_a_resonance_above_the_lines_is_named_with_what_helps() -> None:
@@ -82,9 +80,11 @@ async def test_notches_are_tried_beside_a_loop_where_the_mechanics_were(
 
 
 async def said_of(
-    loop: str = "none", scheme: str = "free", gravity_nm: float = 0.0,
+    loop: str = "none",
+    scheme: str = "free",
+    gravity_nm: float = 0.0,
     time_left: TimeLeft | None = None,
-) -> Text | None:  # fmt: skip
+) -> Text | None:
     """What learning says, of an axis with a resonance."""
 
     async def stands() -> int:
@@ -103,10 +103,15 @@ async def said_of(
     )
 
 
-@pytest.mark.parametrize(("left_s", "before", "fits"), [
-    (20.5, None, True), (20.0, None, False), (20.0, NotchMeaning(120.0, left_out=3), False),
-    (20.5, NotchMeaning(120.0, left_out=3), True),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("left_s", "before", "fits"),
+    [
+        (20.5, None, True),
+        (20.0, None, False),
+        (20.0, NotchMeaning(120.0, left_out=3), False),
+        (20.5, NotchMeaning(120.0, left_out=3), True),
+    ],
+)
 async def test_notches_are_learned_only_where_a_design_can_be_verified_after_it(
     left_s: float, before: NotchMeaning | None, fits: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -21,9 +21,13 @@ WAS, NEW = {"2005:03": 700}, {"2005:03": 200}
 
 
 async def outcome(
-    monkeypatch: pytest.MonkeyPatch, *, measured_hz: float, as_it_was_keeps: bool,
-    held: dict[str, int] | None = None, cancelled: bool = False,
-) -> tuple[Applied, dict[str, int], list[Text], Text | None]:  # fmt: skip
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    measured_hz: float,
+    as_it_was_keeps: bool,
+    held: dict[str, int] | None = None,
+    cancelled: bool = False,
+) -> tuple[Applied, dict[str, int], list[Text], Text | None]:
     """What stays, what the drive holds then, what was tried, and what the result says.
 
     ``cancelled``: while the design is read, before it is undone.

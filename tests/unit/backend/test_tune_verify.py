@@ -126,9 +126,14 @@ def test_lines_above_the_crossover_tell_the_loop_but_not_its_margins() -> None:
 
 @pytest.mark.parametrize(
     ("predicted_hz", "measured_hz", "reported"),
-    [(152.0, 135.0, True), (100.0, 112.0, True), (152.0, 140.0, False), (None, 140.0, False),
-     (152.0, None, False)],
-)  # fmt: skip
+    [
+        (152.0, 135.0, True),
+        (100.0, 112.0, True),
+        (152.0, 140.0, False),
+        (None, 140.0, False),
+        (152.0, None, False),
+    ],
+)
 def test_a_bandwidth_that_is_not_as_predicted_is_reported(
     predicted_hz: float | None, measured_hz: float | None, reported: bool
 ) -> None:
@@ -166,9 +171,12 @@ class Kept(TimeLeft):
 
 
 async def verified_of(
-    monkeypatch: pytest.MonkeyPatch, predicted_hz: float, answers: list[SweepResult],
-    time_left: TimeLeft | None = None, pairs_before: int = 0,
-) -> tuple[Verified, list[int]]:  # fmt: skip
+    monkeypatch: pytest.MonkeyPatch,
+    predicted_hz: float,
+    answers: list[SweepResult],
+    time_left: TimeLeft | None = None,
+    pairs_before: int = 0,
+) -> tuple[Verified, list[int]]:
     """What a verification makes of these answers, and how many pairs were played for each."""
     pairs: list[int] = []
 
@@ -191,9 +199,14 @@ async def verified_of(
     candidate = Candidate((), gains, predicted_hz, None, nominal, GUARANTEED, 0.0, 5.0, 0.1)
     facts = AxisFacts(1.27, True, 3000.0, 1000.0, None, None, None, False)
     check = Check(
-        Envelope(4.0, 1500.0, 100.0, 60.0), facts, 1e-4, None, None, None,
+        Envelope(4.0, 1500.0, 100.0, 60.0),
+        facts,
+        1e-4,
+        None,
+        None,
+        None,
         pairs_before=pairs_before,
-    )  # fmt: skip
+    )
     reported = (Progress(lambda: None), Progress(lambda: None), Progress(lambda: None))
     found = await verify(None, None, check, candidate, GUARANTEED, reported, None, time_left)
     return found, pairs

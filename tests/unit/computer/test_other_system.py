@@ -14,8 +14,12 @@ ROOT = Path(__file__).resolve().parents[3]
 def other(*arguments: str) -> str:
     done = subprocess.run(
         [sys.executable, "-m", "tests.support.other_system", *arguments],
-        cwd=ROOT, capture_output=True, text=True, timeout=110, check=False,
-    )  # fmt: skip
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=110,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

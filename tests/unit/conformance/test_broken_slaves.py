@@ -19,8 +19,12 @@ from drivers.sdo_abort import rejected
 from drivers.texts.message import language, speaking
 
 NO_OBJECT, NO_SUBINDEX, READ_ONLY, TOO_LONG, TOO_SHORT = (
-    0x06020000, 0x06090011, 0x06010002, 0x06070012, 0x06070013,
-)  # fmt: skip
+    0x06020000,
+    0x06090011,
+    0x06010002,
+    0x06070012,
+    0x06070013,
+)
 VENDOR, PRODUCT = 0xA2B, 0x190
 
 
@@ -256,5 +260,8 @@ def test_titles_and_verdicts_have_words_in_both_languages() -> None:
     with speaking("zh"):
         assert all(rule.title.words(language()) not in english for rule in RULES)
     assert {each.text.words("en") for each in Verdict} == {
-        "passed", "failed", "not applicable", "could not be tested",
-    }  # fmt: skip
+        "passed",
+        "failed",
+        "not applicable",
+        "could not be tested",
+    }

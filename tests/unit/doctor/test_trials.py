@@ -69,8 +69,11 @@ def test_one_setting_differs_in_each_trial() -> None:
     known = profile(watchdog=WatchdogRegisters(divider=100, process_data=5))
     pdo = PdoSpec(
         sets=(PdoSet(index=0x1600, direction="rx", entries=("6040:00",), source="x"),),
-        default_rx=0x1600, default_tx=0x1A00, max_entries=8, source="x",
-    )  # fmt: skip
+        default_rx=0x1600,
+        default_tx=0x1A00,
+        max_entries=8,
+        source="x",
+    )
     known = known.model_copy(update={"pdo": pdo})
     assert of("watchdog_refused", known) == [("bring_up.watchdog", "20400 ns", "-")]
     assert of("assignment_locked", known) == [("bring_up.coe.pdo_assign", "-", "false")]
@@ -78,8 +81,10 @@ def test_one_setting_differs_in_each_trial() -> None:
     assert of("sync0_unsteady", known) == [("cycle", "1", "2"), ("cycle", "1", "4")]
     fixed = ClockMode(name="A", assign_activate=0x300, sync0=SyncSignal(cycle_ns=40_000_000))
     assert of("cycle_refused", profile(clock_modes=(fixed,)))[0] == (
-        "bring_up.clock_modes.sync0.cycle_ns", "40000000", "0",
-    )  # fmt: skip
+        "bring_up.clock_modes.sync0.cycle_ns",
+        "40000000",
+        "0",
+    )
 
 
 @pytest.mark.parametrize("code", ["supply_low", "cable", "drive_fault", "station_silent"])
@@ -93,8 +98,11 @@ def test_a_code_of_the_maker_tells_nothing_so_clocks_and_contents_are_tried() ->
 
 
 def test_no_more_than_some_trials_and_none_twice() -> None:
-    causes = [Cause("clock_mode_wrong", 3, ()), Cause("clock_needed", 2, ()),
-              Cause("sync0_unsteady", 1, ())]  # fmt: skip
+    causes = [
+        Cause("clock_mode_wrong", 3, ()),
+        Cause("clock_needed", 2, ()),
+        Cause("sync0_unsteady", 1, ()),
+    ]
     found = trials(causes, profile(clock_modes=MODES))
     assert len({(t.setting, t.after) for t in found}) == len(found) == MOST
 
@@ -139,7 +147,8 @@ async def test_trials_end_with_the_one_that_works_and_leave_the_profile_as_it_wa
     bus.attach(1, known)
     found = await tried(bus, 1, known, [Cause("clock_mode_wrong", 3, ())])  # type: ignore[arg-type]
     assert [(each["after"], each["reached"]) for each in found] == [
-        ("0300h", False), ("0700h", True),
-    ]  # fmt: skip
+        ("0300h", False),
+        ("0700h", True),
+    ]
     assert bus.attached[-1] is known
     assert not bus.running

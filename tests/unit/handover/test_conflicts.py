@@ -148,8 +148,9 @@ def test_complete_access_is_taken_apart() -> None:
     data = struct.pack("<BxII", 2, 7, 3)
     listed = twincat(init_command("6091:00", data, complete=True))
     assert [(w.key, w.data) for w in listed.writes] == [
-        ("6091:01", little(7, 4)), ("6091:02", little(3, 4)),
-    ]  # fmt: skip
+        ("6091:01", little(7, 4)),
+        ("6091:02", little(3, 4)),
+    ]
     assert found(compare(PROFILE, listed, {"6091:01": 3, "6091:02": 3}, None)) == {"6091:01": 7}
     from_one = twincat(init_command("6091:01", data[2:], complete=True))
     assert from_one.writes[0].data == little(7, 4)
@@ -166,8 +167,11 @@ def test_what_the_drive_holds_counts_where_the_set_has_nothing() -> None:
     verdict = compare(PROFILE, listed, {"6072:00": 900}, {"6060:00": 8, "6072:00": 300})
     (conflict,) = verdict.conflicts
     assert (conflict.key, conflict.controller, conflict.ours, conflict.drive) == (
-        "6060:00", 1, None, 8,
-    )  # fmt: skip
+        "6060:00",
+        1,
+        None,
+        8,
+    )
     assert conflict.consequence == "motion"
     # The controller writes what our set says: that undoes nothing, and is said all the same.
     assert verdict.restored == ("6072:00",)
@@ -197,10 +201,15 @@ def test_defects_of_a_foreign_list() -> None:
     )
     kinds = {(f.key, f.kind) for f in diagnose(PROFILE, listed)}
     assert kinds == {
-        ("6041:00", "read_only"), ("6072:00", "range"), ("6072:00", "size"), ("6072:00", "twice"),
-        ("5555:01", "unknown"), ("6040:00", "energises"), ("2005:01", "state"),
+        ("6041:00", "read_only"),
+        ("6072:00", "range"),
+        ("6072:00", "size"),
+        ("6072:00", "twice"),
+        ("5555:01", "unknown"),
+        ("6040:00", "energises"),
+        ("2005:01", "state"),
         ("6091:01", "order"),
-    }  # fmt: skip
+    }
     assert resolved(PROFILE, listed)[0].key == "6041:00"
 
 

@@ -68,19 +68,24 @@ def test_the_only_drive_of_an_eni_needs_no_number() -> None:
 def test_lists_of_pdos_are_taken_apart_without_a_profile_of_them() -> None:
     """ETG.1000.6 clause 5.6.7: numbers of PDOs on 16 bits, objects on 32; the count on 16."""
     text = mailbox(
-        command(0x1C13, "0000", "1"), command(0x1C12, "020000160116", "1"),
+        command(0x1C13, "0000", "1"),
+        command(0x1C12, "020000160116", "1"),
         command(0x1601, "010020007a60", "1"),
-    )  # fmt: skip
+    )
     assert writes(f"<EtherCATMailbox>{text}</EtherCATMailbox>") == [
-        ("1C13:00", "00"), ("1C12:01", "0016"), ("1C12:02", "0116"), ("1601:01", "20007a60"),
-    ]  # fmt: skip
+        ("1C13:00", "00"),
+        ("1C12:01", "0016"),
+        ("1C12:02", "0116"),
+        ("1601:01", "20007a60"),
+    ]
 
 
 def test_a_list_of_pdos_that_is_emptied_filled_and_counted_is_no_defect() -> None:
     text = mailbox(
-        command(0x1C12, "00"), command(0x1C12, "0016").replace("<SubIndex>0", "<SubIndex>1"),
+        command(0x1C12, "00"),
+        command(0x1C12, "0016").replace("<SubIndex>0", "<SubIndex>1"),
         command(0x1C12, "01"),
-    )  # fmt: skip
+    )
     listed = read_list(f"<EtherCATMailbox>{text}</EtherCATMailbox>".encode(), MMS7)
     assert [f.kind for f in diagnose(MMS7, listed) if f.kind in ("twice", "unknown")] == []
 
@@ -212,12 +217,17 @@ def parameter(title: str, kind: str, value: str) -> str:
 
 def test_a_dcf_with_its_node_and_with_objects_that_nobody_knows_here() -> None:
     text = (
-        DCF + parameter("1400sub1", "0x0007", "$NODEID+0x200") + parameter("3001", "3", "-5")
-        + parameter("3002", "9", "some text") + parameter("6081", "7", "1000 ; speed")
-    )  # fmt: skip
+        DCF
+        + parameter("1400sub1", "0x0007", "$NODEID+0x200")
+        + parameter("3001", "3", "-5")
+        + parameter("3002", "9", "some text")
+        + parameter("6081", "7", "1000 ; speed")
+    )
     assert writes(text, canopen=True) == [
-        ("1400:01", "05020000"), ("3001:00", "fbff"), ("6081:00", "e8030000"),
-    ]  # fmt: skip
+        ("1400:01", "05020000"),
+        ("3001:00", "fbff"),
+        ("6081:00", "e8030000"),
+    ]
 
 
 def test_a_concise_dcf() -> None:

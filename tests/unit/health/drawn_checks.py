@@ -16,8 +16,11 @@ Noise = Callable[[np.random.Generator, int], np.ndarray]
 SPREAD: dict[Quantity, float] = {"resonance": 0.004, "friction": 0.015, "inertia": 0.01}
 
 TRUE: dict[tuple[Quantity, int], float] = {
-    ("resonance", 1): 62.0, ("resonance", 2): 210.0, ("friction", 1): 8.0, ("inertia", 1): 1.5e-4,
-}  # fmt: skip
+    ("resonance", 1): 62.0,
+    ("resonance", 2): 210.0,
+    ("friction", 1): 8.0,
+    ("inertia", 1): 1.5e-4,
+}
 
 
 def normal(rng: np.random.Generator, n: int) -> np.ndarray:
@@ -65,10 +68,13 @@ def drawn(
             wide = 0.5 * 1.96 * SPREAD[quantity] * value
             columns[index].append(
                 HealthValue(
-                    quantity=quantity, number=number, value=value, low=value - wide,
+                    quantity=quantity,
+                    number=number,
+                    value=value,
+                    low=value - wide,
                     high=value + wide,
                 )
-            )  # fmt: skip
+            )
     rounds = [HealthRound(values=tuple(column)) for column in columns]
     return rounds[:repeats], rounds[repeats:]
 

@@ -45,10 +45,13 @@ def test_at_most_one_false_alarm_in_a_hundred(
 @pytest.mark.parametrize(
     ("what", "factor"),
     [
-        (("resonance", 1), 1.05), (("resonance", 2), 0.95), (("friction", 1), 1.20),
-        (("friction", 1), 0.80), (("inertia", 1), 1.20),
+        (("resonance", 1), 1.05),
+        (("resonance", 2), 0.95),
+        (("friction", 1), 1.20),
+        (("friction", 1), 0.80),
+        (("inertia", 1), 1.20),
     ],
-)  # fmt: skip
+)
 def test_the_change_that_is_looked_for_is_found(
     noise: Noise, what: tuple[Quantity, int], factor: float
 ) -> None:

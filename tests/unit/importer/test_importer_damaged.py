@@ -185,10 +185,12 @@ def pdo_of(number: int, entries: list[int], cob: str, count: int, access: str = 
     communication, mapping = 0x1400 + number, 0x1600 + number
     return (
         f"[{communication:04X}]\nParameterName=c\nSubNumber=3\n"
-        + sub(communication, 0, "5", "2") + sub(communication, 1, "7", cob, access)
-        + f"[{mapping:04X}]\nParameterName=m\nSubNumber=9\n" + sub(mapping, 0, "5", f"{count}")
+        + sub(communication, 0, "5", "2")
+        + sub(communication, 1, "7", cob, access)
+        + f"[{mapping:04X}]\nParameterName=m\nSubNumber=9\n"
+        + sub(mapping, 0, "5", f"{count}")
         + "".join(sub(mapping, n, "7", f"0x{e:08X}") for n, e in enumerate(entries, 1))
-    )  # fmt: skip
+    )
 
 
 OBJECTS = "".join(
@@ -224,9 +226,11 @@ def test_line_ends_within_a_name_and_headings_with_h() -> None:
 
 def test_a_pdo_holds_as_many_entries_as_its_count_says() -> None:
     imported = taken(
-        eds(OBJECTS, pdo_of(0, [0x60400010, 0x00050008, 0x607A0020, 0x60400010],
-                            "$NODEID+0x200", 3)), "a.eds",
-    )  # fmt: skip
+        eds(
+            OBJECTS, pdo_of(0, [0x60400010, 0x00050008, 0x607A0020, 0x60400010], "$NODEID+0x200", 3)
+        ),
+        "a.eds",
+    )
     assert imported.profile.pdo is None  # there is no other direction
     with_inputs = eds(
         OBJECTS,
@@ -237,8 +241,10 @@ def test_a_pdo_holds_as_many_entries_as_its_count_says() -> None:
     assert pdo is not None
     rx, tx = pdo.sets
     assert [(part.key, part.bits) for part in rx.layout] == [
-        ("6040:00", 16), (None, 8), ("607A:00", 32),
-    ]  # fmt: skip
+        ("6040:00", 16),
+        (None, 8),
+        ("607A:00", 32),
+    ]
     assert rx.identifier == PdoIdentifier(cob_id=0x200, of_node=True)
     assert rx.identifier.at(5) == 0x205
     assert tx.identifier == PdoIdentifier(cob_id=0x181, of_node=False, fixed=True)

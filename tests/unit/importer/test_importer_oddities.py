@@ -51,9 +51,14 @@ POSITIONS = scalar(0x607A, "Target position", "DINT", 32, mapping="R") + scalar(
 
 
 def device(
-    objects: str, pdos: str = "", *, name: str = "ES4", code: int = 0x190, revision: int = 1,
+    objects: str,
+    pdos: str = "",
+    *,
+    name: str = "ES4",
+    code: int = 0x190,
+    revision: int = 1,
     types: str = "",
-) -> str:  # fmt: skip
+) -> str:
     return (
         f'<Device><Type ProductCode="#x{code:08X}" RevisionNo="#x{revision:08X}">{name}</Type>'
         f"<Name>{name}</Name><Profile><Dictionary><DataTypes>{types}</DataTypes>"
@@ -89,9 +94,13 @@ def test_speed_in_rpm_by_60a9h() -> None:
 
 def test_speed_in_tenths_of_rpm_and_position_in_tenths_of_a_degree() -> None:
     profile = imported(
-        CONTROL + STATUS + SPEEDS + POSITIONS
-        + unit_object(0x60A9, 0xFFB44700) + unit_object(0x60A8, 0xFF410000)
-    )  # fmt: skip
+        CONTROL
+        + STATUS
+        + SPEEDS
+        + POSITIONS
+        + unit_object(0x60A9, 0xFFB44700)
+        + unit_object(0x60A8, 0xFF410000)
+    )
     assert (profile.units.velocity, profile.units.position) == ("0.1 rpm", "0.1 °")
     target = profile.by_key["60FF:00"]
     # 60 rpm is 600 tenths; 90 degrees are 900 tenths.
@@ -187,8 +196,13 @@ def test_padding_and_bits_keep_their_places() -> None:
     assert places[0x6064] == 4
     assert plan.rx.mapping_words == (0x60400010, 0x60600008, 0x00000008, 0x60FF0020)
     assert plan.tx.mapping_words == (
-        0x60410010, 0x21000101, 0x21000201, 0x00000006, 0x00000008, 0x60640020,
-    )  # fmt: skip
+        0x60410010,
+        0x21000101,
+        0x21000201,
+        0x00000006,
+        0x00000008,
+        0x60640020,
+    )
 
 
 def test_a_free_pdo_without_contents_is_one_to_be_filled() -> None:

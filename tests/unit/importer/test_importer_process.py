@@ -32,9 +32,12 @@ def run(task: Work, limit_s: float = 60.0, limit_mib: int = 768) -> dict[str, An
 
 def greedy(elements: int = 400_000) -> bytes:
     """An ESI file of 3.6 MB whose elements take more than 150 MiB."""
-    device = b"".join([
-        b'<Type ProductCode="#x1" RevisionNo="#x1">A</Type>', b'<a b=""/>' * elements,
-    ])  # fmt: skip
+    device = b"".join(
+        [
+            b'<Type ProductCode="#x1" RevisionNo="#x1">A</Type>',
+            b'<a b=""/>' * elements,
+        ]
+    )
     return (
         b"<EtherCATInfo><Vendor><Id>1</Id></Vendor><Descriptions><Devices><Device>"
         + device

@@ -20,23 +20,29 @@ from tests.unit.analysis.gantry_plant import Gantry
 
 TRUTH = Gantry(off_centre=0.2, motors=(5e-5, 6e-5))
 SPEC = GantrySpec(
-    axes=("L", "R"), inertia_kgm2=TRUTH.beam, yaw_inertia_kgm2=TRUTH.yaw,
-    off_centre=TRUTH.off_centre, joint_stiffness_nm_per_rad=TRUTH.joints[0],
-    joint_damping_nms_per_rad=TRUTH.joint_damping, yaw_stiffness_nm_per_rad=TRUTH.yaw_stiffness,
+    axes=("L", "R"),
+    inertia_kgm2=TRUTH.beam,
+    yaw_inertia_kgm2=TRUTH.yaw,
+    off_centre=TRUTH.off_centre,
+    joint_stiffness_nm_per_rad=TRUTH.joints[0],
+    joint_damping_nms_per_rad=TRUTH.joint_damping,
+    yaw_stiffness_nm_per_rad=TRUTH.yaw_stiffness,
     yaw_damping_nms_per_rad=TRUTH.yaw_damping,
-)  # fmt: skip
+)
 
 
 def motor(inertia: float, coulomb: float = 0.0, *, brake: bool = False) -> MechanicsSpec:
     return MechanicsSpec.model_validate(
         {
             "motor": {
-                "inertia_kgm2": inertia, "rated_torque_nm": 1.27, "rated_speed_rpm": 3000,
+                "inertia_kgm2": inertia,
+                "rated_torque_nm": 1.27,
+                "rated_speed_rpm": 3000,
                 "brake": brake,
             },
             "friction": {"viscous_nms": 2e-4, "coulomb_nm": coulomb},
         }
-    )  # fmt: skip
+    )
 
 
 def pair(

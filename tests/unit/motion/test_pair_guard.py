@@ -51,7 +51,7 @@ def cycle(
     guard: PairGuard,
     places: tuple[int, int],
     status: int = ENABLED,
-) -> None:  # fmt: skip
+) -> None:
     both[0].step([ENABLED, places[0], int(Mode.CSV)])
     both[1].step([status, places[1], int(Mode.CSV)])
     guard.look()

@@ -71,9 +71,12 @@ def test_from_installing_to_purging(tmp_path: Path, site: Path) -> None:
     assert (root.folder / debian.UNIT).read_text() == systemd_unit()
     launched = subprocess.run(
         [root.folder / "opt/servodeck/bin/servodeck", "station", "unit"],
-        capture_output=True, text=True, check=False, cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
         env={"PATH": f"{Path(sys.executable).parent}:/usr/bin:/bin"},
-    )  # fmt: skip
+    )
     assert launched.stdout == systemd_unit(), launched.stderr
 
     (state / "bench.json").write_text("{}")

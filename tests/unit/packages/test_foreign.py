@@ -75,8 +75,11 @@ def test_a_package_that_is_missing_older_or_of_another_system_is_found(
 
 def test_a_library_of_linux_is_read_as_the_loader_reads_it() -> None:
     binaries = importlib.import_module("binaries")
-    files = [Path(line.split()[-1]) for line in Path("/proc/self/maps").read_text().splitlines()
-             if line.endswith(".so") or ".so." in line]  # fmt: skip
+    files = [
+        Path(line.split()[-1])
+        for line in Path("/proc/self/maps").read_text().splitlines()
+        if line.endswith(".so") or ".so." in line
+    ]
     loaded = {file.name for file in files}
     # gABI: EM_X86_64 is 62, EM_AARCH64 183.
     processor = {"x86_64": 62, "aarch64": 183}[os.uname().machine]

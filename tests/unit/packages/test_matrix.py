@@ -54,8 +54,13 @@ def test_windows_is_imported_only_where_that_ran_and_lacks_what_it_refuses(tmp_p
 
 def test_a_table_that_says_more_than_ran_is_found(tmp_path: Path) -> None:
     ran = reported(tmp_path, first=REPORT)
-    said = {(row("a"), HERE): TESTED, (row("b"), HERE): TESTED, (row("never"), HERE): TESTED,
-            (row("c"), HERE): TESTED, (Row("all", "none"), HERE): TESTED}  # fmt: skip
+    said = {
+        (row("a"), HERE): TESTED,
+        (row("b"), HERE): TESTED,
+        (row("never"), HERE): TESTED,
+        (row("c"), HERE): TESTED,
+        (Row("all", "none"), HERE): TESTED,
+    }
     assert [each.rpartition(": ")[2] for each in matrix.overstated(said, ran)] == [
         "tests/unit/test_b.py",
         "tests/unit/test_never.py",

@@ -44,9 +44,12 @@ def folder(portable: object, tmp_path: Path) -> Path:
 
 def started(launcher: Path, *arguments: str) -> list[str]:
     done = subprocess.run(
-        [launcher, *arguments], capture_output=True, text=True, check=True,
+        [launcher, *arguments],
+        capture_output=True,
+        text=True,
+        check=True,
         env={"PATH": "/usr/bin:/bin", "PYTHONPATH": "/elsewhere", "PYTHONHOME": "/elsewhere"},
-    )  # fmt: skip
+    )
     return done.stdout.split("|")[:-1]
 
 

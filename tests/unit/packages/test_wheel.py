@@ -38,8 +38,11 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "PKG-INFO").write_text(metadata, "utf-8")
     subprocess.run(
         [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder / "built")],
-        cwd=folder, check=True, capture_output=True, env={"PATH": "/nowhere"},
-    )  # fmt: skip
+        cwd=folder,
+        check=True,
+        capture_output=True,
+        env={"PATH": "/nowhere"},
+    )
     (built,) = (folder / "built").glob("servodeck-*.whl")
     return built
 
@@ -69,8 +72,12 @@ def test_a_fresh_environment_serves_the_page_without_node_and_checkout(
     plain = plain_environment(tmp_path / "home", environment / "bin")
     where = subprocess.run(
         [python, "-c", "import backend; print(backend.__file__)"],
-        cwd=tmp_path, env=plain, capture_output=True, text=True, check=True,
-    ).stdout  # fmt: skip
+        cwd=tmp_path,
+        env=plain,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
     assert Path(where.strip()).is_relative_to(environment)
     command = [environment / "bin/servodeck", "serve", "--port", "0", "--config", "state"]
     with served(command, tmp_path, plain) as answer:

@@ -126,8 +126,11 @@ def test_load_does_not_matter_to_who_goes_first(tmp_path: Path) -> None:
 def test_an_rtprio_limit_grants_real_time_as_well(tmp_path: Path) -> None:
     fake = FakeComputer(tmp_path)
     fake.capabilities(ALL & ~(1 << 23) & ~(1 << 14))
-    fake.write("proc/self/limits", "Max realtime priority     80     80\n"
-               "Max locked memory         unlimited      unlimited     bytes\n")  # fmt: skip
+    fake.write(
+        "proc/self/limits",
+        "Max realtime priority     80     80\n"
+        "Max locked memory         unlimited      unlimited     bytes\n",
+    )
     assert found(fake) == []
 
 

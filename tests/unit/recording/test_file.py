@@ -56,10 +56,15 @@ def test_every_bit_comes_back(tmp_path: Path) -> None:
     values = rng.standard_normal((5, 2)) * 10.0 ** rng.integers(-300, 300, (5, 2)).astype(float)
     values[1, 0], values[2, 1], values[3, 0] = np.nan, np.inf, -0.0
     polled = ScopeBlock(
-        sequence=9, t0_s=100.0, dt_s=0.01, channels=("a", "b"), samples=values, dropped=3,
+        sequence=9,
+        t0_s=100.0,
+        dt_s=0.01,
+        channels=("a", "b"),
+        samples=values,
+        dropped=3,
         times_s=np.array([100.0, 100.011, 100.019, 100.5, 100.7]),
         valid=np.array([True, False, True, True, False]),
-    )  # fmt: skip
+    )
     writer = RecordingWriter(tmp_path / "a.sdrec", header(), unexpected)
     writer.put(0, block(0))
     writer.put(0, polled)
@@ -222,8 +227,13 @@ def test_of_a_batch_that_the_disk_took_in_part_the_whole_chunks_count(
 def test_reserve_of_the_disk_is_kept(tmp_path: Path) -> None:
     failures: list[StorageFailed] = []
     left = [10_000_000]
-    writer = RecordingWriter(tmp_path / "a.sdrec", header(), failures.append,
-                             reserve_bytes=1_000_000, free=lambda _path: left[0])  # fmt: skip
+    writer = RecordingWriter(
+        tmp_path / "a.sdrec",
+        header(),
+        failures.append,
+        reserve_bytes=1_000_000,
+        free=lambda _path: left[0],
+    )
     writer.put(0, block(0))
     left[0] = 900_000
     wait_for(lambda: failures, "the guard sees the full disk")
@@ -237,8 +247,13 @@ def test_reserve_of_the_disk_is_kept(tmp_path: Path) -> None:
     with contextlib.suppress(StorageFailed):
         writer.close({})
     with pytest.raises(StorageFailed, match="nearly full"):
-        RecordingWriter(tmp_path / "b.sdrec", header(), failures.append,
-                        reserve_bytes=1_000_000, free=lambda _path: left[0])  # fmt: skip
+        RecordingWriter(
+            tmp_path / "b.sdrec",
+            header(),
+            failures.append,
+            reserve_bytes=1_000_000,
+            free=lambda _path: left[0],
+        )
     assert not (tmp_path / "b.sdrec").exists()
 
 

@@ -20,9 +20,14 @@ from profiles.schema import Profile
 from tests.wire.ethercat_slave.frames import IN, LWR, OUT, SAFEOP, Wire, fmmu
 
 _FORM = {
-    "BOOL": "<B", "INT8": "<b", "UINT8": "<B", "INT16": "<h", "UINT16": "<H",
-    "INT32": "<i", "UINT32": "<I",
-}  # fmt: skip
+    "BOOL": "<B",
+    "INT8": "<b",
+    "UINT8": "<B",
+    "INT16": "<h",
+    "UINT16": "<H",
+    "INT32": "<i",
+    "UINT32": "<I",
+}
 ETHERCAT = ("mms7", "m6l", "r6l", "ep3e", "generic402")
 EVERY = (*ETHERCAT, "ds_c")
 NODE = 5

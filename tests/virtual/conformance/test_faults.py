@@ -123,8 +123,12 @@ def test_over_speed_by_a_pulling_load(name: str, code: str) -> None:
 
 
 OVER_VOLTAGE = [
-    ("mms7", "0x3210"), ("m6l", "Er.002"), ("r6l", "AL.210"), ("ep3e", "Err2"), ("ds_c", "1001"),
-]  # fmt: skip
+    ("mms7", "0x3210"),
+    ("m6l", "Er.002"),
+    ("r6l", "AL.210"),
+    ("ep3e", "Err2"),
+    ("ds_c", "1001"),
+]
 
 
 @pytest.mark.parametrize(("name", "code"), OVER_VOLTAGE)
@@ -190,8 +194,12 @@ def test_a_braking_resistor_keeps_the_r6l_below_its_limit() -> None:
 
 
 UNDER_VOLTAGE = [
-    ("mms7", "0x3220"), ("m6l", "Er.020"), ("r6l", "AL.211"), ("ep3e", "Err27"), ("ds_c", "1002"),
-]  # fmt: skip
+    ("mms7", "0x3220"),
+    ("m6l", "Er.020"),
+    ("r6l", "AL.211"),
+    ("ep3e", "Err27"),
+    ("ds_c", "1002"),
+]
 
 
 @pytest.mark.parametrize(("name", "code"), UNDER_VOLTAGE)
@@ -239,9 +247,12 @@ def test_following_error_of_a_jammed_axis(name: str, code: str) -> None:
 
 
 ENCODER = [
-    ("mms7", "SENSOR_ERR"), ("m6l", "Er.019"), ("r6l", "AL.121"), ("ep3e", "Err40"),
+    ("mms7", "SENSOR_ERR"),
+    ("m6l", "Er.019"),
+    ("r6l", "AL.121"),
+    ("ep3e", "Err40"),
     ("ds_c", "1003"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("name", "code"), ENCODER)
@@ -474,8 +485,12 @@ def test_m6l_over_travel_as_a_fault() -> None:
 
 
 LIMITED = [
-    ("mms7", {}), ("m6l", {}), ("r6l", {"2001:36": 1}), ("ep3e", {}), ("generic402", {}),
-]  # fmt: skip
+    ("mms7", {}),
+    ("m6l", {}),
+    ("r6l", {"2001:36": 1}),
+    ("ep3e", {}),
+    ("generic402", {}),
+]
 
 
 @pytest.mark.parametrize(("name", "settings"), LIMITED)

@@ -184,11 +184,15 @@ def test_the_edge_is_exact(name: str) -> None:
 #: Position at home per revolution of offset: the zero lies the offset beyond home, or the offset
 #: is shown at home (002:4344, 001:687, P12.11 of the M6-L: 000:2213).
 OFFSETS = [
-    ("mms7", {}, -0.5, 1.0), ("ds_c", {}, -0.5, 1.0), ("r6l", {}, 0.5, 1.0),
-    ("ep3e", {}, 0.5, 1.0), ("m6l", {"200C:0C": 0}, 0.5, 1.0),
-    ("m6l", {"200C:0C": 1}, 1.0 + 0.5, 1.0), ("m6l", {"200C:0C": 2}, 0.0, 1.5),
+    ("mms7", {}, -0.5, 1.0),
+    ("ds_c", {}, -0.5, 1.0),
+    ("r6l", {}, 0.5, 1.0),
+    ("ep3e", {}, 0.5, 1.0),
+    ("m6l", {"200C:0C": 0}, 0.5, 1.0),
+    ("m6l", {"200C:0C": 1}, 1.0 + 0.5, 1.0),
+    ("m6l", {"200C:0C": 2}, 0.0, 1.5),
     ("m6l", {"200C:0C": 3}, 0.5, 1.5),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("name", "settings", "shown_rev", "rests_rev"), OFFSETS)

@@ -103,11 +103,16 @@ def test_ep3e_changes_state_when_a_coasting_axis_stands() -> None:
 @pytest.mark.parametrize(
     ("name", "key", "refused"),
     [
-        ("m6l", "605A:00", (3, 4)), ("m6l", "605D:00", (0, 3)), ("m6l", "605B:00", (2,)),
-        ("ep3e", "605A:00", (4,)), ("ep3e", "605C:00", (2,)),
-        ("mms7", "605A:00", (9,)), ("r6l", "605A:00", (8,)), ("r6l", "605D:00", (0, 4)),
+        ("m6l", "605A:00", (3, 4)),
+        ("m6l", "605D:00", (0, 3)),
+        ("m6l", "605B:00", (2,)),
+        ("ep3e", "605A:00", (4,)),
+        ("ep3e", "605C:00", (2,)),
+        ("mms7", "605A:00", (9,)),
+        ("r6l", "605A:00", (8,)),
+        ("r6l", "605D:00", (0, 4)),
     ],
-)  # fmt: skip
+)
 def test_options_that_are_not_listed_are_refused(name: str, key: str, refused: Any) -> None:
     d = OnWire(name, None)
     before = d.get(key)
@@ -200,9 +205,12 @@ def test_halt_option_0_of_the_mms7_coasts_under_power() -> None:
 
 
 REACTIONS = [
-    (0, None), (1, SPEED / 50), (2, SPEED / 100), (3, at_torque(0.2 * RATED)),
+    (0, None),
+    (1, SPEED / 50),
+    (2, SPEED / 100),
+    (3, at_torque(0.2 * RATED)),
     (4, at_torque(3 * RATED)),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("option", "seconds"), REACTIONS)
@@ -278,12 +286,15 @@ def test_r6l_servo_off(option: int) -> None:
 @pytest.mark.parametrize(
     ("code", "key", "option", "way"),
     [
-        ("AL.247", "2001:0A", 0, "coast"), ("AL.247", "2001:0A", 2, "dynamic"),
-        ("AL.301", "2001:09", 0, "coast"), ("AL.301", "2001:09", 2, "dynamic"),
-        ("AL.301", "2001:09", 3, "ramp"), ("AL.301", "2001:09", 4, "ramp"),
+        ("AL.247", "2001:0A", 0, "coast"),
+        ("AL.247", "2001:0A", 2, "dynamic"),
+        ("AL.301", "2001:09", 0, "coast"),
+        ("AL.301", "2001:09", 2, "dynamic"),
+        ("AL.301", "2001:09", 3, "ramp"),
+        ("AL.301", "2001:09", 4, "ramp"),
         ("AL.301", "2001:09", 5, "dynamic"),
     ],
-)  # fmt: skip
+)
 def test_r6l_stops_by_the_kind_of_fault(code: str, key: str, option: int, way: str) -> None:
     d = turning("r6l")
     d.set(key, option)

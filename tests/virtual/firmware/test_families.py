@@ -53,9 +53,14 @@ def family_profile(drive: str, *extra: Parameter, **fields: Any) -> Profile:
         **fields,
     }
     return Profile(
-        drive=drive, title=drive, manual="000", identity=Identity(maker="m", model=drive), links=(),
-        parameters=(*standard, *extra), **fields,
-    )  # fmt: skip
+        drive=drive,
+        title=drive,
+        manual="000",
+        identity=Identity(maker="m", model=drive),
+        links=(),
+        parameters=(*standard, *extra),
+        **fields,
+    )
 
 
 @pytest.fixture
@@ -254,13 +259,17 @@ DS_C = family_profile(
     parameter("2300:00", "UINT16", 1),
     parameter("2301:00", "UINT16", 1),
     units=UnitSpec(
-        counts_per_rev=REV, velocity="rpm", acceleration="ms", ramp_reference_rpm=1000,
-        gear_numerator="2300:00", gear_denominator="2301:00",
+        counts_per_rev=REV,
+        velocity="rpm",
+        acceleration="ms",
+        ramp_reference_rpm=1000,
+        gear_numerator="2300:00",
+        gear_denominator="2301:00",
     ),
     supported_modes=(1, 3, 4, 6),
     signals=(Signal(role="error_code", key="2102:00"),),
     faults=(Fault(code="1007", name="Overload", code_raw=1007, source="003:1"),),
-)  # fmt: skip
+)
 
 
 def test_ds_c_status_word_speeds_and_ramps(family) -> None:

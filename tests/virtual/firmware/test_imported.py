@@ -17,15 +17,19 @@ from .servo_bench import Bench, rigid
 TURN = 10_000
 
 OBJECTS = (
-    (0x6040, "Controlword", "UINT", 16, "rw"), (0x6041, "Statusword", "UINT", 16, "ro"),
-    (0x6060, "Modes of operation", "SINT", 8, "rw"), (0x6061, "Mode display", "SINT", 8, "ro"),
+    (0x6040, "Controlword", "UINT", 16, "rw"),
+    (0x6041, "Statusword", "UINT", 16, "ro"),
+    (0x6060, "Modes of operation", "SINT", 8, "rw"),
+    (0x6061, "Mode display", "SINT", 8, "ro"),
     (0x6064, "Position actual value", "DINT", 32, "ro"),
     (0x606C, "Velocity actual value", "DINT", 32, "ro"),
-    (0x607A, "Target position", "DINT", 32, "rw"), (0x6081, "Profile velocity", "UDINT", 32, "rw"),
+    (0x607A, "Target position", "DINT", 32, "rw"),
+    (0x6081, "Profile velocity", "UDINT", 32, "rw"),
     (0x6083, "Profile acceleration", "UDINT", 32, "rw"),
     (0x6084, "Profile deceleration", "UDINT", 32, "rw"),
-    (0x60FF, "Target velocity", "DINT", 32, "rw"), (0x2000, "Maker's own", "UINT", 16, "rw"),
-)  # fmt: skip
+    (0x60FF, "Target velocity", "DINT", 32, "rw"),
+    (0x2000, "Maker's own", "UINT", 16, "rw"),
+)
 
 
 def profile(**units: int) -> Profile:
@@ -90,9 +94,13 @@ def test_units_that_the_firmware_has_not_are_refused() -> None:
 def test_single_bits_in_process_data_are_refused() -> None:
     known = profile()
     one = PdoSet(
-        index=0x1A00, direction="tx", entries=("6041:00",), fixed=True, source="drive.xml",
+        index=0x1A00,
+        direction="tx",
+        entries=("6041:00",),
+        fixed=True,
+        source="drive.xml",
         layout=(PdoPart(key="6041:00", bits=16), PdoPart(bits=1), PdoPart(bits=7)),
-    )  # fmt: skip
+    )
     spec = PdoSpec(
         sets=(one,), default_rx=0x1600, default_tx=0x1A00, max_entries=8, source="drive.xml"
     )

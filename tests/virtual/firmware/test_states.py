@@ -26,11 +26,16 @@ def run_at(bench: Bench, rev_per_s: float = 20.0) -> None:
 @pytest.mark.parametrize(
     ("word", "command"),
     [
-        (0x06, Command.SHUTDOWN), (0x0E, Command.SHUTDOWN), (0x07, Command.SWITCH_ON),
-        (0x0F, Command.ENABLE), (0x00, Command.DISABLE_VOLTAGE), (0x0D, Command.DISABLE_VOLTAGE),
-        (0x02, Command.QUICK_STOP), (0x0B, Command.QUICK_STOP),
+        (0x06, Command.SHUTDOWN),
+        (0x0E, Command.SHUTDOWN),
+        (0x07, Command.SWITCH_ON),
+        (0x0F, Command.ENABLE),
+        (0x00, Command.DISABLE_VOLTAGE),
+        (0x0D, Command.DISABLE_VOLTAGE),
+        (0x02, Command.QUICK_STOP),
+        (0x0B, Command.QUICK_STOP),
     ],
-)  # fmt: skip
+)
 def test_command_coding_of_table_45(word: int, command: Command) -> None:
     assert decode(word) is command
 

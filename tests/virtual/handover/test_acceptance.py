@@ -71,8 +71,11 @@ def broken(form: Format, old: bytes, new: bytes) -> bytes:
 )
 def test_these_readers_can_refuse(form: Format, old: bytes, new: bytes) -> None:
     read = {
-        "twincat": xml_files.twincat, "lcec": xml_files.lcec, "codesys": text_files.codesys,
-        "igh": text_files.igh, "ros2": text_files.ros2_ethercat,
-    }[form]  # fmt: skip
+        "twincat": xml_files.twincat,
+        "lcec": xml_files.lcec,
+        "codesys": text_files.codesys,
+        "igh": text_files.igh,
+        "ros2": text_files.ros2_ethercat,
+    }[form]
     with pytest.raises(Refused):
         read(broken(form, old, new))

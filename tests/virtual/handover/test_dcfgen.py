@@ -33,8 +33,12 @@ def test_dcfgen_makes_the_writes_of_the_bus_yml(family: str, tmp_path: Path) -> 
     (tmp_path / "expanded.yml").write_text(yaml.safe_dump(content))
     made = subprocess.run(
         [program, "-r", "-S", "-d", str(tmp_path), "expanded.yml"],
-        cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False,
-    )  # fmt: skip
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
     assert made.returncode == 0, made.stderr
     written = [(i, s, d) for i, s, d, _ in concise((tmp_path / "drive.bin").read_bytes()).writes]
     axis = fitting(axis_of(family), "ros2")

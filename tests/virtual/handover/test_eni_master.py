@@ -196,13 +196,16 @@ def test_mailboxes_come_from_the_esi_file_and_process_data_lie_in_the_frame() ->
 @pytest.mark.parametrize(
     "data",
     [
-        b"", b"no xml", b"<EtherCATConfig/>", b"<EtherCATInfo/>",
+        b"",
+        b"no xml",
+        b"<EtherCATConfig/>",
+        b"<EtherCATInfo/>",
         b'<!DOCTYPE a [<!ENTITY b "c">]><EtherCATInfo>&b;</EtherCATInfo>',
         (MAKERS / "maker_a.xml").read_bytes()[:3000],
         (MAKERS / "maker_a.xml").read_bytes().replace(b"#x1000", b"#x0010"),
         (MAKERS / "maker_a.xml").read_bytes().replace(b'DefaultSize="256"', b'DefaultSize="1"'),
     ],
-)  # fmt: skip
+)
 def test_a_file_that_is_no_esi_gets_one_error(data: bytes) -> None:
     with pytest.raises(BadSet, match=r"e\.xml") as refused:
         controller_of(data, "e.xml", 0x0B95, 0xA001, None)

@@ -132,9 +132,14 @@ def incremental(spec: MechanicsSpec) -> MechanicsSpec:
 
 @asynccontextmanager
 async def can_bench(
-    spec: MechanicsSpec, cycle_s: float = 1e-3, *, drive: str = "ds_c", pace: float = 4.0,
-    bitrate: int = 1_000_000, patient: bool = True,
-) -> AsyncIterator[CanBench]:  # fmt: skip
+    spec: MechanicsSpec,
+    cycle_s: float = 1e-3,
+    *,
+    drive: str = "ds_c",
+    pace: float = 4.0,
+    bitrate: int = 1_000_000,
+    patient: bool = True,
+) -> AsyncIterator[CanBench]:
     """``patient``: setpoints outlive that simulated time passes faster than the tools' clock."""
     profile = load_profile(drive)
     bus = LockstepBus(make_device(drive, spec, station=STATION), pace)

@@ -286,9 +286,13 @@ class DirectLink:
         known = [e for e in plan.rx.entries if e.code != "x"]
         self._written = places(plan.rx.entries)
         self._loop = AxisLoop(
-            STATION, inputs=places(plan.tx.entries), outputs=self._written,
-            output_count=len(known), cycle_s=cycle_s, report=lambda _n, _t: None,
-        )  # fmt: skip
+            STATION,
+            inputs=places(plan.tx.entries),
+            outputs=self._written,
+            output_count=len(known),
+            cycle_s=cycle_s,
+            report=lambda _n, _t: None,
+        )
         if _MODE in self._written:
             mode = self.device.read(_MODE, 0)
             self._loop.outputs[self._written[_MODE]] = int.from_bytes(mode, "little", signed=True)
@@ -380,12 +384,15 @@ class DirectLink:
             offset = t.offset_values
             self._loop.play(
                 Motion(
-                    t.target.index or 0, array.array("q", t.values.tolist()),
-                    limits_of(asdict(t.envelope)), _PATIENCE * 1000, step,
+                    t.target.index or 0,
+                    array.array("q", t.values.tolist()),
+                    limits_of(asdict(t.envelope)),
+                    _PATIENCE * 1000,
+                    step,
                     None if t.offset_target is None else t.offset_target.index,
                     None if offset is None else array.array("q", offset.tolist()),
                 )
-            )  # fmt: skip
+            )
         return self._count
 
     async def renew(self, station: int) -> None:
@@ -444,9 +451,12 @@ def _columns(pdo: Pdo, names: Mapping[tuple[int | None, int], str]) -> list[tupl
 
 @asynccontextmanager
 async def direct(
-    spec: MechanicsSpec, cycle_s: float = 1e-3, *, drive: str = "mms7",
+    spec: MechanicsSpec,
+    cycle_s: float = 1e-3,
+    *,
+    drive: str = "mms7",
     settings: Mapping[str, int] | None = None,
-) -> AsyncIterator[DirectBench]:  # fmt: skip
+) -> AsyncIterator[DirectBench]:
     profile = load_profile(drive)
     link = DirectLink(make_device(drive, spec), profile)
     await link.open()

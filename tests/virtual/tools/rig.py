@@ -105,15 +105,23 @@ class At:
 
 @asynccontextmanager
 async def bench(
-    namespace: Namespace, spec: MechanicsSpec, cycle_s: float = 1e-3, *, lockstep: bool = True,
-    settings: Mapping[str, int] | None = None, drive: str = "mms7",
-) -> AsyncIterator[Bench]:  # fmt: skip
+    namespace: Namespace,
+    spec: MechanicsSpec,
+    cycle_s: float = 1e-3,
+    *,
+    lockstep: bool = True,
+    settings: Mapping[str, int] | None = None,
+    drive: str = "mms7",
+) -> AsyncIterator[Bench]:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "bench.json"
         axis_of = {
-            "name": "X", "drive": drive, "on": URL, "station": 1,
+            "name": "X",
+            "drive": drive,
+            "on": URL,
+            "station": 1,
             "mechanics": spec.model_dump(exclude_defaults=True),
-        }  # fmt: skip
+        }
         file.write_text(json.dumps({"axis": [axis_of]}), "utf-8")
         arguments = ["--bench", str(file), "--on", URL, "--sdo-ms", "0.2", "--eeprom-us", "5"]
         if lockstep:

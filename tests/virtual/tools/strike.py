@@ -54,9 +54,13 @@ class Strike:
     """Does something once, in the middle of the ``number``-th motion whose step has ``words``."""
 
     def __init__(
-        self, b: DirectBench, words: str, number: int, act: Callable[[], object],
+        self,
+        b: DirectBench,
+        words: str,
+        number: int,
+        act: Callable[[], object],
         after: float = 0.5,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.progress = Progress(lambda: None)
         self.done_at: float | None = None
         self.step = ""

@@ -67,8 +67,9 @@ async def test_autotune_keeps_its_promise_and_can_be_undone(namespace: Namespace
         assert result.applied is not None
         assert result.verified is not None
         predicted, measured = (
-            result.verified.predicted_bandwidth_hz, result.verified.measured_bandwidth_hz,
-        )  # fmt: skip
+            result.verified.predicted_bandwidth_hz,
+            result.verified.measured_bandwidth_hz,
+        )
         assert predicted is not None
         assert measured == pytest.approx(predicted, rel=0.1)
         nominal, found = result.applied.nominal, result.verified.sweep.margins

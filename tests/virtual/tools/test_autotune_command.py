@@ -138,13 +138,18 @@ NOTHING = MarginsInfo(
     gain_margin_hz=None, ms=None, ms_hz=None, stable=True,
 )  # fmt: skip
 DESIGN = CandidateInfo(
-    marks=("balanced",), notches=(NotchInfo(center_hz=156.0, width_hz=30.0, depth_db=-12.0),),
+    marks=("balanced",),
+    notches=(NotchInfo(center_hz=156.0, width_hz=30.0, depth_db=-12.0),),
     gains=GainsInfo(speed_nms=0.2, integral_hz=22.0, position_1_s=140.0, speed_bandwidth_hz=220.0),
-    bandwidth_hz=92.0, position_bandwidth_hz=None, nominal=NOTHING,
+    bandwidth_hz=92.0,
+    position_bandwidth_hz=None,
+    nominal=NOTHING,
     promised=GoalsInfo(phase_margin_deg=48.0, gain_margin_db=9.0, ms=1.8),
-    phase_cost_deg=4.0, settling_s=0.02, overshoot_percent=25.0,
+    phase_cost_deg=4.0,
+    settling_s=0.02,
+    overshoot_percent=25.0,
     filters=FiltersInfo(speed_hz=None, torque_hz=None),
-)  # fmt: skip
+)
 
 
 def answer(
@@ -157,12 +162,18 @@ def answer(
     )
     sweep = SweepAnswer.model_validate(loop)
     margins: dict[str, float | bool | None] = {
-        "phase_margin_deg": 56.6, "gain_margin_db": None, "ms": 1.12,
-    }  # fmt: skip
+        "phase_margin_deg": 56.6,
+        "gain_margin_db": None,
+        "ms": 1.12,
+    }
     verified = VerifiedInfo(
-        verdict=None, gain_steps=None, sweep=sweep.model_copy(update={"margins": margins}),
-        predicted_bandwidth_hz=92.0, measured_bandwidth_hz=91.5, expected=None,
-    )  # fmt: skip
+        verdict=None,
+        gain_steps=None,
+        sweep=sweep.model_copy(update={"margins": margins}),
+        predicted_bandwidth_hz=92.0,
+        measured_bandwidth_hz=91.5,
+        expected=None,
+    )
     return AutotuneAnswer(
         inertia=InertiaAnswer.model_validate(moves), mechanics=sweep, load="stiff",
         candidates=(DESIGN,), applied=DESIGN, verified=verified, again=None, step=None,

@@ -51,10 +51,14 @@ async def test_the_output_of_a_killed_brake_test_is_on_the_list_and_offered(
     tmp_path: Path,
 ) -> None:
     process = await asyncio.to_thread(
-        subprocess.run, [sys.executable, "-m", "tests.virtual.tools.test_brake_test_killed"],
-        env=os.environ | {STATE_FOLDER_VARIABLE: str(tmp_path)}, capture_output=True, text=True,
-        timeout=KILLED_S, check=False,
-    )  # fmt: skip
+        subprocess.run,
+        [sys.executable, "-m", "tests.virtual.tools.test_brake_test_killed"],
+        env=os.environ | {STATE_FOLDER_VARIABLE: str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=KILLED_S,
+        check=False,
+    )
     assert process.returncode == -signal.SIGKILL, process.stderr
     assert int(process.stdout) == BUS, "the drive is left with it"
     (file,) = (tmp_path / "restore").glob("*.json")

@@ -27,9 +27,12 @@ async def test_mechanics(waveform: Waveform, loop: Loop, drive: str) -> None:
     kept: list[tuple] = []
     async with direct(ONE, drive=drive) as b:
         found = await sweep(
-            b.axis, b.session, SweepSettings(WIDE, loop=loop, excitation=waveform), silent(),
+            b.axis,
+            b.session,
+            SweepSettings(WIDE, loop=loop, excitation=waveform),
+            silent(),
             lambda *raw: kept.append(raw),
-        )  # fmt: skip
+        )
         file = pack(*[kept[0][0], b.axis.drive, *kept[0][1:]], datetime.now(UTC))
     near = errors(found.direct, ONE, 5, 250)
     assert near.magnitude_db < 0.3
@@ -47,9 +50,11 @@ async def test_a_loop_from_its_reference() -> None:
     async with direct(ONE) as b:
         for waveform in ("multisine", "stepped"):
             found = await sweep(
-                b.axis, b.session,
-                SweepSettings(WIDE, kind="position_loop", excitation=waveform), silent(),
-            )  # fmt: skip
+                b.axis,
+                b.session,
+                SweepSettings(WIDE, kind="position_loop", excitation=waveform),
+                silent(),
+            )
             widths.append(found.margins["bandwidth_90deg_hz"])
     assert widths[1] == pytest.approx(widths[0], rel=0.05)
 

@@ -128,9 +128,12 @@ def _moving_s(result: AutotuneResult) -> float:
     assert result.verified is not None
     trials = 8 * 2.2
     return (
-        result.inertia.motion_s + result.mechanics.motion_s + trials
-        + result.verified.sweep.motion_s + 1.0
-    )  # fmt: skip
+        result.inertia.motion_s
+        + result.mechanics.motion_s
+        + trials
+        + result.verified.sweep.motion_s
+        + 1.0
+    )
 
 
 async def _raws(b: DirectBench) -> dict[str, int]:

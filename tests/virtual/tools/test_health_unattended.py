@@ -152,8 +152,9 @@ async def test_a_controller_asks_and_only_what_was_permitted_runs(station: Stati
     assert job["motion"]
     await station.ends()
     assert [(each.speed_limit, each.rounds, each.consent) for each in station.asked] == [
-        (800.0, 2, False), (800.0, 2, False),
-    ]  # fmt: skip
+        (800.0, 2, False),
+        (800.0, 2, False),
+    ]
     (attempt,) = (await station.permission())["attempts"]
     assert (attempt["cause"], attempt["outcome"]) == ("trigger", "done")
     found = await station.ok("GET", "/drives/x/health")
@@ -238,14 +239,19 @@ async def nobody(station: Station) -> None:
 @pytest.mark.parametrize(
     ("way", "code"),
     [
-        (controlled, "people.control-axis"), (stopped, "health.run-after-stop"),
-        (enabled, "health.run-enabled"), (turning, "health.run-turning"),
-        (faulty, "health.run-fault"), (away, "health.run-not-connected"),
-        (pending, "health.run-pending"), (other_drive, "health.run-other-drive"),
-        (newer_baseline, "health.run-other-baseline"), (expired, "health.permission-ended"),
+        (controlled, "people.control-axis"),
+        (stopped, "health.run-after-stop"),
+        (enabled, "health.run-enabled"),
+        (turning, "health.run-turning"),
+        (faulty, "health.run-fault"),
+        (away, "health.run-not-connected"),
+        (pending, "health.run-pending"),
+        (other_drive, "health.run-other-drive"),
+        (newer_baseline, "health.run-other-baseline"),
+        (expired, "health.permission-ended"),
         (nobody, "health.permission-person"),
     ],
-)  # fmt: skip
+)
 async def test_what_is_in_the_way_is_told_and_nothing_moves(
     station: Station, monkeypatch: pytest.MonkeyPatch, way: Way, code: str
 ) -> None:
@@ -254,9 +260,13 @@ async def test_what_is_in_the_way_is_told_and_nothing_moves(
     await way(station)
     station.granted.clear()
     station.schedule.permissions.skip(
-        station.known().model_copy(update={"handled": station.now() - timedelta(days=2),
-                                           "at": station.now().astimezone().time()})
-    )  # fmt: skip
+        station.known().model_copy(
+            update={
+                "handled": station.now() - timedelta(days=2),
+                "at": station.now().astimezone().time(),
+            }
+        )
+    )
     await station.schedule._look_after(station.known())
     if way is not expired:
         attempt = station.known().attempts[-1]
@@ -317,9 +327,13 @@ async def test_taken_back_during_a_run_the_run_ends(station: Station) -> None:
 async def test_stop_before_an_announced_run_prevents_it(station: Station) -> None:
     await station.permit(days=EVERY_DAY)
     station.schedule.permissions.skip(
-        station.known().model_copy(update={"handled": station.now() - timedelta(days=2),
-                                           "at": station.now().astimezone().time()})
-    )  # fmt: skip
+        station.known().model_copy(
+            update={
+                "handled": station.now() - timedelta(days=2),
+                "at": station.now().astimezone().time(),
+            }
+        )
+    )
     station.schedule._notice_s = 0.5
     run = asyncio.create_task(station.schedule._look_after(station.known()))
     entries = station.bench.journal.entries
@@ -337,9 +351,13 @@ async def test_nothing_is_repeated_where_it_cannot_be_stored(
     """Else a full disk would have the axis run again every second."""
     await station.permit(days=EVERY_DAY)
     station.schedule.permissions.skip(
-        station.known().model_copy(update={"handled": station.now() - timedelta(days=2),
-                                           "at": station.now().astimezone().time()})
-    )  # fmt: skip
+        station.known().model_copy(
+            update={
+                "handled": station.now() - timedelta(days=2),
+                "at": station.now().astimezone().time(),
+            }
+        )
+    )
     monkeypatch.setattr(station.schedule.permissions, "_file", Path("/proc/none/x.json"))
     await station.schedule._look_after(station.known())
     await station.schedule._look_after(station.known())

@@ -16,9 +16,13 @@ from tests.virtual.tools.rig import WIDE, mechanics, silent
 
 #: A light chain that swings at 82, 238 and 386 Hz: the motor moves more than a rigid axis would.
 SWINGING = mechanics(
-    (1.09e-5, 15.2, 4.43e-4), (6.13e-6, 8.16, 6.26e-4), (2.34e-5, 22.1, 3.09e-4),
-    motor=4.11e-5, viscous=5.6e-5, coulomb=0.029,
-)  # fmt: skip
+    (1.09e-5, 15.2, 4.43e-4),
+    (6.13e-6, 8.16, 6.26e-4),
+    (2.34e-5, 22.1, 3.09e-4),
+    motor=4.11e-5,
+    viscous=5.6e-5,
+    coulomb=0.029,
+)
 
 
 async def test_the_second_excitation_is_smaller(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,10 +24,15 @@ async def test_gains_that_are_sound_and_faster_than_every_design_stay() -> None:
     found = await found_of(MMS7)
     best = next(c for c in found.candidates if "balanced" in c.marks)
     slow = replace(
-        found.candidates[-1], marks=("balanced",), bandwidth_hz=0.5 * (best.bandwidth_hz or 0.0),
-        gains=replace(best.gains, speed_nms=0.5 * best.gains.speed_nms,
-                      speed_bandwidth_hz=0.5 * best.gains.speed_bandwidth_hz),
-    )  # fmt: skip
+        found.candidates[-1],
+        marks=("balanced",),
+        bandwidth_hz=0.5 * (best.bandwidth_hz or 0.0),
+        gains=replace(
+            best.gains,
+            speed_nms=0.5 * best.gains.speed_nms,
+            speed_bandwidth_hz=0.5 * best.gains.speed_bandwidth_hz,
+        ),
+    )
     inertia = found.inertia.result.inertia_kgm2.value
     async with unharmed(ONE, MMS7) as b:
         raw = await plan(b.axis, best, inertia)

@@ -113,10 +113,11 @@ async def test_a_speed_limit_that_does_not_act_is_found() -> None:
 async def test_nothing_moves_without_a_statement_or_without_room() -> None:
     async with direct(stiff(), drive="r6l") as bench:
         for changed, error in (
-            ({"nothing_hangs": False}, NotAllowed), ({"speed_rpm": 950.0}, OutOfRange),
+            ({"nothing_hangs": False}, NotAllowed),
+            ({"speed_rpm": 950.0}, OutOfRange),
             ({"function": "limit_positive", "travel_limit": 5.0}, OutOfRange),
             ({"function": "speed_limit"}, OutOfRange),
-        ):  # fmt: skip
+        ):
             with pytest.raises(error):
                 await recorded(bench, off, ASKED.model_copy(update=changed))
         units = await bench.axis.units()

@@ -119,10 +119,12 @@ async def test_a_606c_that_contradicts_the_position_ends_the_motion(
 @pytest.mark.parametrize(
     "options",
     [
-        {"speed_late_s": 1e-3}, {"speed_mean_s": 3e-3}, {"speed_step_rpm": 10.0},
+        {"speed_late_s": 1e-3},
+        {"speed_mean_s": 3e-3},
+        {"speed_step_rpm": 10.0},
         {"speed_late_s": 1e-3, "speed_mean_s": 2e-3, "speed_step_rpm": 1.0},
     ],
-)  # fmt: skip
+)
 async def test_a_606c_that_lags_averages_or_rounds_goes_on(
     bus: str, options: dict[str, Any]
 ) -> None:
@@ -192,7 +194,7 @@ TOOLS: dict[str, Any] = {
     "generate CST": lambda b: generate(
         b.axis, b.session, GeneratorSettings("CST", "sine", 5.0, 1.0, ENVELOPE), silent()
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("little", SAYS_LITTLE)
@@ -222,11 +224,13 @@ async def test_608f_alone_gives_the_resolution() -> None:
         units = await b.axis.units()
         assert units.counts_per_rev == 2**17
         assert (units.scales.position.origin, units.scales.position.source) == (
-            Origin.DRIVE, "608Fh, 6091h",
-        )  # fmt: skip
+            Origin.DRIVE,
+            "608Fh, 6091h",
+        )
         before = b.link.device.axis.angle_rad
-        turn = GeneratorSettings("CSP", "ramp", 1.0, 4.0, Envelope(2.0, 200.0, 100.0, 10.0),
-                                 acceleration=1.0)  # fmt: skip
+        turn = GeneratorSettings(
+            "CSP", "ramp", 1.0, 4.0, Envelope(2.0, 200.0, 100.0, 10.0), acceleration=1.0
+        )
         seen: list[float] = []
         play = b.session.cyclic.play
 

@@ -55,17 +55,21 @@ def spec_of(**options: Any) -> MechanicsSpec:
     motor = spec.motor.model_copy(update={"brake": True})
     return spec.model_copy(
         update={
-            "rough_feedback": RoughFeedbackSpec(**options), "motor": motor,
+            "rough_feedback": RoughFeedbackSpec(**options),
+            "motor": motor,
             "load_encoder": LoadEncoderSpec(counts_per_rev=131_072),
         }
-    )  # fmt: skip
+    )
 
 
 def begun(tool: AnyTool, b: Any) -> Any:
     asked = {
-        "travel_limit": TRAVEL_REV, "speed_limit": SPEED_RPM, "torque_limit": 80.0,
-        "rated_torque_nm": 1.27, **MORE.get(tool.kind, {}),
-    }  # fmt: skip
+        "travel_limit": TRAVEL_REV,
+        "speed_limit": SPEED_RPM,
+        "torque_limit": 80.0,
+        "rated_torque_nm": 1.27,
+        **MORE.get(tool.kind, {}),
+    }
     run = Run(b.axis, b.session, silent(), partner=b.axis if tool.pair else None)
     return tool.run(run, tool.settings(**asked))
 

@@ -48,9 +48,13 @@ async def work(b: Bench | CanBench, part: str, known: Known | None, progress: Pr
 
 
 async def struck(
-    b: Bench | CanBench, doing: Callable[[Progress], Awaitable[None]], step: str, fraction: float,
-    strike: Callable[[], object], mend: Callable[[], object],
-) -> None:  # fmt: skip
+    b: Bench | CanBench,
+    doing: Callable[[Progress], Awaitable[None]],
+    step: str,
+    fraction: float,
+    strike: Callable[[], object],
+    mend: Callable[[], object],
+) -> None:
     """It ends in time with a reason that names the drive, and all comes back when it answers."""
     before = await settings_of(b.axis.drive, MODE)
     at = At(step, strike, fraction)

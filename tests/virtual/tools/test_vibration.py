@@ -35,9 +35,14 @@ CHAIN = mechanics((LOAD, STIFFNESS, 0.002), motor=MOTOR, viscous=3e-4)
 #: Free motor and load against each other.
 MODE_HZ = math.sqrt(STIFFNESS * (1 / MOTOR + 1 / LOAD)) / (2 * math.pi)
 MAP = VibrationSettings(
-    travel_limit=4.0, speed_limit=800.0, torque_limit=80.0, rated_torque_nm=RATED_NM, speeds=5,
-    closer=5, slowest_rpm=200.0,
-)  # fmt: skip
+    travel_limit=4.0,
+    speed_limit=800.0,
+    torque_limit=80.0,
+    rated_torque_nm=RATED_NM,
+    speeds=5,
+    closer=5,
+    slowest_rpm=200.0,
+)
 VIBRATE = DwellSettings(
     travel_limit=0.5, speed_limit=300.0, torque_limit=60.0, rated_torque_nm=RATED_NM,
     frequency_hz=60.0, by="torque", amplitude_percent=8.0, turn_rpm=60.0, duration_s=3.0,
@@ -166,9 +171,13 @@ async def test_a_dwell_ends_and_everything_is_as_before(ending: str) -> None:
     if ending == "envelope":
         # At the mode the chain answers with far more speed than the limit permits.
         settings = settings.model_copy(
-            update={"frequency_hz": round(MODE_HZ, 1), "amplitude_percent": 45.0,
-                    "speed_limit": 90.0, "turn_rpm": 20.0}
-        )  # fmt: skip
+            update={
+                "frequency_hz": round(MODE_HZ, 1),
+                "amplitude_percent": 45.0,
+                "speed_limit": 90.0,
+                "turn_rpm": 20.0,
+            }
+        )
     spec: MechanicsSpec = CHAIN
     async with direct(spec, drive="r6l") as bench:
         before = await settings_of(bench.axis.drive, "6060:00")

@@ -70,9 +70,13 @@ MMS7 = Family(
     0x40,
 )
 M6L = Family(
-    "m6l", {"2009:0B": 900, "2009:0C": 100}, {"2008:01": 20000, "2009:27": 2000}, "6072:00", 0x40,
+    "m6l",
+    {"2009:0B": 900, "2009:0C": 100},
+    {"2008:01": 20000, "2009:27": 2000},
+    "6072:00",
+    0x40,
     5e-5,
-)  # fmt: skip
+)
 families = pytest.mark.parametrize("family", [MMS7, M6L], ids=lambda family: family.drive)
 
 

@@ -30,9 +30,14 @@ class Bench:
     def __init__(self) -> None:
         dialect = replace(dialect_of(load_profile("ds_c")), speed_mode=cia402.Mode.PV)
         self.axis = AxisLoop(
-            3, inputs=IN, outputs=OUT, output_count=2, cycle_s=0.001,
-            report=lambda _station, _text: None, dialect=dialect,
-        )  # fmt: skip
+            3,
+            inputs=IN,
+            outputs=OUT,
+            output_count=2,
+            cycle_s=0.001,
+            report=lambda _station, _text: None,
+            dialect=dialect,
+        )
         self.position, self.moving, self.mode = 0, 0, PV
         self.words: list[int] = []
 

@@ -193,8 +193,11 @@ async def test_scan_tells_who_is_there(bench: Bench, link: CanopenLink) -> None:
     assert [f.station for f in found] == [5]
     drive = found[0]
     assert (drive.vendor_id, drive.product_code, drive.revision, drive.serial) == (
-        0x1234, 0x56, 3, 42,
-    )  # fmt: skip
+        0x1234,
+        0x56,
+        3,
+        42,
+    )
     assert drive.name == "Small drive of many letters"
     assert drive.notes == ()
     assert said[-1] == "1 nodes found"

@@ -58,9 +58,12 @@ def test_wrong_urls_say_what_is_wrong(url: str, says: str) -> None:
 
 
 MISSING = {
-    "socketcan": "no-such-can7", "slcan": "/dev/ttyNoSuch7", "pcan": "PCAN_USBBUS16",
-    "kvaser": "97", "usb2can": "NOSUCH77",
-}  # fmt: skip
+    "socketcan": "no-such-can7",
+    "slcan": "/dev/ttyNoSuch7",
+    "pcan": "PCAN_USBBUS16",
+    "kvaser": "97",
+    "usb2can": "NOSUCH77",
+}
 
 
 @pytest.mark.parametrize("interface", sorted(set(INTERFACES) - {"virtual", "udp_multicast"}))

@@ -137,9 +137,12 @@ def test_python_cans_own_slcan_client_sees_a_refused_frame_as_nothing(tmp_path: 
     """Why `drivers.canopen.slcan` exists: bus-off must not look like silence."""
     side = SlcanSide(tmp_path / "tty")
     node = CanopenNode(SmallDevice(), 5, time.monotonic_ns)
-    with CanWire(side, [node]) as wire, can.Bus(
-        interface="slcan", channel=str(tmp_path / "tty"), bitrate=1_000_000, sleep_after_open=0
-    ) as bus:  # fmt: skip
+    with (
+        CanWire(side, [node]) as wire,
+        can.Bus(
+            interface="slcan", channel=str(tmp_path / "tty"), bitrate=1_000_000, sleep_after_open=0
+        ) as bus,
+    ):
         request = can.Message(arbitration_id=0x605, is_extended_id=False, data=bytes(8))
         bus.send(request)
         assert bus.recv(2) is not None  # the commands that open the channel have been obeyed

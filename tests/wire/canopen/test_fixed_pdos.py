@@ -50,14 +50,15 @@ def _pdo(index: int, cob: str, entries: list[int], cob_access: str = "rw") -> st
     mapping = index + 0x200
     return (
         f"[{index:04X}]\nSubNumber=3\n[{mapping:04X}]\nSubNumber=9\n"
-        + _row(f"{index:04X}sub0", 5, "const", "2") + _row(f"{index:04X}sub1", 7, cob_access, cob)
+        + _row(f"{index:04X}sub0", 5, "const", "2")
+        + _row(f"{index:04X}sub1", 7, cob_access, cob)
         + _row(f"{index:04X}sub2", 5, "rw", "255")
         + _row(f"{mapping:04X}sub0", 5, "const", str(len(entries)))
         + "".join(
             _row(f"{mapping:04X}sub{n}", 7, "const", f"0x{entry:08X}")
             for n, entry in enumerate(entries, 1)
         )
-    )  # fmt: skip
+    )
 
 
 def eds(cob_access: str = "rw") -> Profile:
@@ -140,12 +141,16 @@ def test_signals_lie_where_the_file_says() -> None:
     assert profile.pdo is not None
     fixed = fixed_pdos(profile, 5)
     assert [(each.direction, each.number, each.cob_id) for each in fixed] == [
-        ("rx", 0, 0x205), ("tx", 0, 0x1A5), ("tx", 1, 0x1C7),
-    ]  # fmt: skip
+        ("rx", 0, 0x205),
+        ("tx", 0, 0x1A5),
+        ("tx", 1, 0x1C7),
+    ]
     padded = FixedPdo("tx", 1, 0x1C7, ((None, 1), (SPEED.address, 4)))
     pdos, left = plan([STATUS, POSITION, SPEED, TORQUE], [], {5: (*fixed[:2], padded)})
     assert left == (TORQUE,)
     assert [(pdo.cob_id, pdo.size) for pdo in pdos] == [(0x1A5, 7), (0x1C7, 5)]
     assert [(s.channel, start) for pdo in pdos for s, start in pdo.placed()] == [
-        ("status", 0), ("position", 3), ("speed", 1),
-    ]  # fmt: skip
+        ("status", 0),
+        ("position", 3),
+        ("speed", 1),
+    ]

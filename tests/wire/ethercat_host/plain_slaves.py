@@ -130,12 +130,15 @@ class Outputs(Slave):
     product = 0x0002
     body = (
         category(41, struct.pack("<HHBBBB", 0x0F00, 1, 0x44, 0, 1, 3))
-        + category(51, struct.pack("<HBBBBH", 0x1600, 1, 0, 0, 0, 0)
-                   + struct.pack("<HBBBBH", 0x7000, 1, 0, 5, 8, 0))
+        + category(
+            51,
+            struct.pack("<HBBBBH", 0x1600, 1, 0, 0, 0, 0)
+            + struct.pack("<HBBBBH", 0x7000, 1, 0, 5, 8, 0),
+        )
         + category(40, b"\x01\0")
         + category(30, bytes(32))
         + category(0x0800, b"maker's own.")
-    )  # fmt: skip
+    )
 
 
 class Servo(Slave):
@@ -144,13 +147,16 @@ class Servo(Slave):
     only_read: tuple[int, ...] = (0x1C12, 0x1C13, 0x1600, 0x1A00)
     body = (
         category(30, bytes([0, 0, 0, 1, 0, 0x01]) + bytes(26))
-        + category(41, struct.pack("<HHBBBB", OUT_BOX, BOX, 0x26, 0, 1, 1)
-                   + struct.pack("<HHBBBB", IN_BOX, BOX, 0x22, 0, 1, 2)
-                   + struct.pack("<HHBBBB", inputs_at, 0, 0x20, 0, 1, 4)
-                   + struct.pack("<HHBBBB", outputs_at, 0, 0x24, 0, 1, 3))
+        + category(
+            41,
+            struct.pack("<HHBBBB", OUT_BOX, BOX, 0x26, 0, 1, 1)
+            + struct.pack("<HHBBBB", IN_BOX, BOX, 0x22, 0, 1, 2)
+            + struct.pack("<HHBBBB", inputs_at, 0, 0x20, 0, 1, 4)
+            + struct.pack("<HHBBBB", outputs_at, 0, 0x24, 0, 1, 3),
+        )
         + category(10, b"\x01" + bytes([5]) + b"ODD-1" + b"\0")
         + category(40, b"\x02\x01\x03\0")
-    )  # fmt: skip
+    )
 
     def __init__(self) -> None:
         super().__init__()

@@ -47,9 +47,14 @@ class ScriptedSlave(ByHand):
 
     def box(self, timeout_s: float = 1.0) -> Mailbox:
         return Mailbox(
-            OUT, self.size, IN, self.answer_size or self.size, lambda: self.now,
-            self.emergencies.append, timeout_s,
-        )  # fmt: skip
+            OUT,
+            self.size,
+            IN,
+            self.answer_size or self.size,
+            lambda: self.now,
+            self.emergencies.append,
+            timeout_s,
+        )
 
     def queue(self, payload: bytes, protocol: int = 3, delay_s: float = 0.0) -> None:
         self.sent = self.sent % 7 + 1

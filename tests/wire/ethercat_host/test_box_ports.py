@@ -73,8 +73,11 @@ def started(network: Namespace, state: Path) -> Iterator[tuple[int, list[str]]]:
 def asked(network: Namespace, port: int, *said: str) -> dict[str, Any]:
     done = subprocess.run(
         network.command([sys.executable, str(CLIENT), f"https://{ADDRESS}:{port}", *said]),
-        capture_output=True, text=True, check=False, env=child_environment(),
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+        env=child_environment(),
+    )
     assert done.returncode == 0, done.stderr
     answer: dict[str, Any] = json.loads(done.stdout)
     return answer

@@ -29,9 +29,13 @@ POSITION = Address(0x607A, 0, "INT32")
 VELOCITY = Address(0x60FF, 0, "INT32")
 TORQUE = Address(0x6071, 0, "INT16")
 _INPUTS: tuple[tuple[int, DataType, str], ...] = (
-    (0x6041, "UINT16", "status"), (0x6064, "INT32", "position"), (0x606C, "INT32", "speed"),
-    (0x6077, "INT16", "torque"), (0x6061, "INT8", "mode"), (0x60F4, "INT32", "following"),
-)  # fmt: skip
+    (0x6041, "UINT16", "status"),
+    (0x6064, "INT32", "position"),
+    (0x606C, "INT32", "speed"),
+    (0x6077, "INT16", "torque"),
+    (0x6061, "INT8", "mode"),
+    (0x60F4, "INT32", "following"),
+)
 START = 1000
 LOCKSTEP = True
 """Of the rig, see `conftest`."""
@@ -182,16 +186,19 @@ async def test_velocity_and_torque_modes(rig: Rig) -> None:
     ("what", "envelope", "halt", "words"),
     [
         (
-            "torque", Envelope(torque_max=500), Halted(HaltCause.TORQUE, "torque", 900, 500),
+            "torque",
+            Envelope(torque_max=500),
+            Halted(HaltCause.TORQUE, "torque", 900, 500),
             "torque 900 is beyond the limit of 500",
         ),
         (
-            "following", Envelope(following_error_max=30),
+            "following",
+            Envelope(following_error_max=30),
             Halted(HaltCause.FOLLOWING, "following error", -40, 30),
             "following error -40 is beyond",
         ),
     ],
-)  # fmt: skip
+)
 async def test_the_envelope_stops_one_axis_and_not_the_other(
     rig: Rig, what: str, envelope: Envelope, halt: Halted, words: str
 ) -> None:

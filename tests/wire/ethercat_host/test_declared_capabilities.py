@@ -61,9 +61,13 @@ def limited(network: Namespace, names: list[str], *program: str) -> list[str]:
 def station(command: list[str], folder: Path) -> Iterator[tuple[int, str]]:
     """A running server: its process, and its address."""
     process = subprocess.Popen(
-        command, cwd=folder, env=child_environment(), text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-    )  # fmt: skip
+        command,
+        cwd=folder,
+        env=child_environment(),
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )
     assert process.stdout is not None
     try:
         printed = []

@@ -32,9 +32,12 @@ async def test_mailbox_process_data_and_our_own_remarks(rig: Rig, tmp_path: Path
         command = ["tshark", "-r", str(file), "-Y", chosen, "-T", "fields", "-E", "separator=|"]
         command += [part for field in fields for part in ("-e", field)]
         done = subprocess.run(
-            command, capture_output=True, check=True, text=True,
+            command,
+            capture_output=True,
+            check=True,
+            text=True,
             env={"PATH": "/usr/bin:/bin", "HOME": str(tmp_path)},
-        )  # fmt: skip
+        )
         return [line.split("|") for line in done.stdout.splitlines()]
 
     mails = await asyncio.to_thread(shown, path, "ecat_mailbox.coe")

@@ -76,9 +76,12 @@ class Loading:
 
     async def load(self, **options: str) -> str:
         return await self.bus.link.load_firmware(
-            1, "app.efw", FILE, lambda share, text: self.reported.append((share, str(text))),
+            1,
+            "app.efw",
+            FILE,
+            lambda share, text: self.reported.append((share, str(text))),
             **options,  # type: ignore[arg-type]
-        )  # fmt: skip
+        )
 
     async def works(self) -> None:
         """The drive is in PREOP and its mailboxes are those of PREOP again."""

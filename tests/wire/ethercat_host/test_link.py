@@ -373,8 +373,12 @@ def test_hazards_of_pysoem_are_guarded(namespace: Namespace, rig: Rig) -> None:
     )
     result = subprocess.run(
         namespace.command([sys.executable, "-c", script]),
-        capture_output=True, text=True, check=False, env=child_environment(), timeout=30,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+        env=child_environment(),
+        timeout=30,
+    )
     assert result.returncode == 0, result.stderr
     lines = result.stdout.splitlines()
     assert "no process data before they are mapped" in lines[0]

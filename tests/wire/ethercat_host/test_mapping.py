@@ -196,6 +196,10 @@ def test_a_search_takes_away_what_an_earlier_mapping_left_in_the_slaves(
     )
     result = subprocess.run(
         namespace.command([sys.executable, "-c", script]),
-        capture_output=True, text=True, check=False, env=child_environment(), timeout=60,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+        env=child_environment(),
+        timeout=60,
+    )
     assert result.returncode == 0, result.stderr

@@ -55,8 +55,11 @@ async def test_mms7_is_read_whole_and_moves(namespace: Namespace, mms7: VirtualS
         once = await link.read_many(1, addresses)
         again = await link.read_many(1, addresses)
         singles = [await link.read(1, address) for address in addresses[::7]]
-        unused = {str(a) for a, reported in zip(addresses, once, strict=True)
-                  if isinstance(reported, NotInUse)}  # fmt: skip
+        unused = {
+            str(a)
+            for a, reported in zip(addresses, once, strict=True)
+            if isinstance(reported, NotInUse)
+        }
         assert "1600:06" in unused, "five objects are mapped at first (004:5111)"
         assert all(key[:2] in ("16", "1A") for key in unused)
         others = [a for a in (*once, *again) if isinstance(a, DriveError)]

@@ -99,12 +99,17 @@ def test_blocks_are_cut_at_gaps_of_the_cycle_counter() -> None:
 @pytest.mark.parametrize(
     "error",
     [
-        DriveError("a"), errors.LinkTimeout("b"), LinkLost("c", remedy="d"),
-        errors.ProtocolError("e", parameter="6041:00"), errors.OutOfRange("f", limit="1…2"),
-        errors.NotAllowed("g"), errors.Busy("h"), Rejected("i", abort_code=0x06010002),
+        DriveError("a"),
+        errors.LinkTimeout("b"),
+        LinkLost("c", remedy="d"),
+        errors.ProtocolError("e", parameter="6041:00"),
+        errors.OutOfRange("f", limit="1…2"),
+        errors.NotAllowed("g"),
+        errors.Busy("h"),
+        Rejected("i", abort_code=0x06010002),
         errors.NotInUse("j"),
     ],
-)  # fmt: skip
+)
 def test_every_error_survives_the_pipe(error: DriveError) -> None:
     unpacker = protocol.Unpacker()
     data = protocol.pack({"error": protocol.error_to_wire(error)})

@@ -27,9 +27,13 @@ class Bench:
     def __init__(self, position: int = 500, cycle_s: float = CYCLE_S) -> None:
         self.reported: list[str] = []
         self.axis = AxisLoop(
-            1, inputs=IN, outputs=OUT, output_count=6, cycle_s=cycle_s,
+            1,
+            inputs=IN,
+            outputs=OUT,
+            output_count=6,
+            cycle_s=cycle_s,
             report=lambda _station, why: self.reported.append(why.words()),
-        )  # fmt: skip
+        )
         self.status, self.position, self.speed, self.torque, self.mode = DISABLED, position, 0, 0, 8
 
     def step(self, cycles: int = 1, late_s: float = 0.0) -> None:
@@ -143,23 +147,27 @@ def test_renewal_keeps_it_going() -> None:
     ("limits", "halt", "word"),
     [
         (
-            Limits(position_max=1000), Halted(HaltCause.POSITION, "position", 1001, 1000),
+            Limits(position_max=1000),
+            Halted(HaltCause.POSITION, "position", 1001, 1000),
             "position 1001 is beyond the limit of 1000",
         ),
         (
-            Limits(position_min=400), Halted(HaltCause.POSITION, "position", 399, 400),
+            Limits(position_min=400),
+            Halted(HaltCause.POSITION, "position", 399, 400),
             "position 399 is beyond the limit of 400",
         ),
         (
-            Limits(speed_max=100), Halted(HaltCause.SPEED, "speed", -101, 100),
+            Limits(speed_max=100),
+            Halted(HaltCause.SPEED, "speed", -101, 100),
             "speed -101 is beyond",
         ),
         (
-            Limits(torque_max=300), Halted(HaltCause.TORQUE, "torque", 301, 300),
+            Limits(torque_max=300),
+            Halted(HaltCause.TORQUE, "torque", 301, 300),
             "torque 301 is beyond",
         ),
     ],
-)  # fmt: skip
+)
 def test_the_envelope_stops_in_the_very_cycle(limits: Limits, halt: Halted, word: str) -> None:
     bench = Bench().enabled()
     bench.play([500] * 400, limits=limits)
@@ -188,9 +196,13 @@ def test_following_error_is_computed_where_the_drive_does_not_tell_it() -> None:
 def test_a_limit_that_cannot_be_watched_is_refused() -> None:
     bench = Bench()
     bench.axis = AxisLoop(
-        1, inputs={0x6041: 0, 0x6064: 1}, outputs=OUT, output_count=6, cycle_s=CYCLE_S,
+        1,
+        inputs={0x6041: 0, 0x6064: 1},
+        outputs=OUT,
+        output_count=6,
+        cycle_s=CYCLE_S,
         report=lambda *_: None,
-    )  # fmt: skip
+    )
     bench.enabled()
     with pytest.raises(NotAllowed, match="606Ch is not mapped"):
         bench.play([500], limits=Limits(speed_max=1))

@@ -219,12 +219,16 @@ def test_a_write_goes_before_reads_that_wait() -> None:
 @pytest.mark.parametrize(
     ("word", "stop"),
     [
-        (cia402.QUICK_STOP, True), (cia402.DISABLE_VOLTAGE, True),
-        (cia402.ENABLE_OPERATION | cia402.HALT, True), (cia402.ENABLE_OPERATION, False),
-        (cia402.SHUTDOWN, False), (cia402.SWITCH_ON, False), (cia402.FAULT_RESET, False),
+        (cia402.QUICK_STOP, True),
+        (cia402.DISABLE_VOLTAGE, True),
+        (cia402.ENABLE_OPERATION | cia402.HALT, True),
+        (cia402.ENABLE_OPERATION, False),
+        (cia402.SHUTDOWN, False),
+        (cia402.SWITCH_ON, False),
+        (cia402.FAULT_RESET, False),
         (cia402.ENABLE_OPERATION | cia402.NEW_SET_POINT, False),
     ],
-)  # fmt: skip
+)
 def test_which_control_words_stop(word: int, stop: bool) -> None:
     assert cia402.stops(word) is stop
 

@@ -63,9 +63,13 @@ def odd_profile() -> Profile:
             PdoSet(index=0x1600, direction="rx", source="test", entries=("6040:00", "607A:00")),
             PdoSet(index=0x1A00, direction="tx", source="test", entries=("6041:00", "6064:00")),
         ),
-        default_rx=0x1600, default_tx=0x1A00, max_entries=2, remappable=False,
-        sync_modes=("SM",), source="test",
-    )  # fmt: skip
+        default_rx=0x1600,
+        default_tx=0x1A00,
+        max_entries=2,
+        remappable=False,
+        sync_modes=("SM",),
+        source="test",
+    )
     fields = {name: getattr(base, name) for name in Profile.model_fields}
     return Profile(**(fields | {"pdo": spec}))
 
@@ -221,8 +225,10 @@ def test_sync_managers_too_far_back_in_the_eeprom_are_reported_as_such(
     setup = StationSetup(
         rx=alone(Pdo(0x1600, (Entry(0x6040, 0, 2, "H"),), write=False)),
         tx=alone(Pdo(0x1A00, (Entry(0x6041, 0, 2, "H"),), write=False)),
-        cycle_ns=1_000_000, dc=False, watchdog_ms=50.0,
-    )  # fmt: skip
+        cycle_ns=1_000_000,
+        dc=False,
+        watchdog_ms=50.0,
+    )
     steps = check_places(Station(1), setup, time.monotonic)
     with pytest.raises(DriveError, match=says) as reported:
         answered(steps, Wordy())

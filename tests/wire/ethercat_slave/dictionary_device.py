@@ -214,9 +214,14 @@ class DictionaryDevice:
     def entry(self, index: int, subindex: int) -> EntryInfo:
         p = self._find(index, subindex)
         return EntryInfo(
-            p.name, p.type, _BITS[p.type], p.access != "wo", p.access != "ro",
-            "r" in p.pdo, p.pdo in ("tx", "rxtx"),
-        )  # fmt: skip
+            p.name,
+            p.type,
+            _BITS[p.type],
+            p.access != "wo",
+            p.access != "ro",
+            "r" in p.pdo,
+            p.pdo in ("tx", "rxtx"),
+        )
 
     def map_process_data(self, entries: Sequence[int], direction: str) -> _Image:
         for word in entries:

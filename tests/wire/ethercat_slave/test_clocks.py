@@ -127,9 +127,13 @@ def test_sync1_beside_a_faster_sync0_rules_the_exchange() -> None:
         pulses.append((pulse, dc.exchanges_at(pulse)))
     start = 10 * MS
     assert pulses == [
-        (start, False), (start + 500_000, False), (start + 625_000, True),
-        (start + 1_000_000, False), (start + 1_500_000, False), (start + 1_625_000, True),
-    ]  # fmt: skip
+        (start, False),
+        (start + 500_000, False),
+        (start + 625_000, True),
+        (start + 1_000_000, False),
+        (start + 1_500_000, False),
+        (start + 1_625_000, True),
+    ]
     wire.write(0x0981, b"\x03")
     assert dc.exchange_cycle_ns == MS // 2
     assert dc.exchanges_at(start + 500_000)

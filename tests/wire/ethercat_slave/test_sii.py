@@ -59,8 +59,10 @@ def test_identity_and_mailbox_words(wire: Wire) -> None:
     assert struct.unpack_from("<HHHH", raw, 0x28) == (0, 0, 0, 0)  # no bootstrap
     assert raw[14] == sii.checksum(raw[:14])
     # Size in Kibit less one, version 1.
-    assert struct.unpack_from("<HH", raw, 0x7C) == (len(wire.slaves[0].controller.eeprom.image)
-                                                    * 8 // 1024 - 1, 1)  # fmt: skip
+    assert struct.unpack_from("<HH", raw, 0x7C) == (
+        len(wire.slaves[0].controller.eeprom.image) * 8 // 1024 - 1,
+        1,
+    )
 
 
 def test_strings_and_general(wire: Wire) -> None:

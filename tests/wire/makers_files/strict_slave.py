@@ -136,10 +136,13 @@ def _pdo(item: Element) -> FilePdo:
         for e in item.iterfind("Entry")
     ]
     return FilePdo(
-        number(item.findtext("Index")), words, flag(item, "Fixed"), flag(item, "Mandatory"),
+        number(item.findtext("Index")),
+        words,
+        flag(item, "Fixed"),
+        flag(item, "Mandatory"),
         {number(e.text) for e in item.iterfind("Exclude")},
         number(item.get("Sm")) if item.get("Sm") else None,
-    )  # fmt: skip
+    )
 
 
 def _manager(item: Element) -> FileManager:
@@ -158,12 +161,16 @@ def _mode(item: Element) -> Mode:
         return None if found is None else (number(found.text), int(found.get("Factor", "1")))
 
     return Mode(
-        number(item.findtext("AssignActivate")), cycle("0") or (0, 1),
-        number(item.findtext("ShiftTimeSync0")), cycle("1"),
+        number(item.findtext("AssignActivate")),
+        cycle("0") or (0, 1),
+        number(item.findtext("ShiftTimeSync0")),
+        cycle("1"),
         number(item.findtext("ShiftTimeSync1")),
-        {number(s.get("No")): [number(p.text) for p in s.iterfind("Pdo")]
-         for s in item.iterfind("Sm")},
-    )  # fmt: skip
+        {
+            number(s.get("No")): [number(p.text) for p in s.iterfind("Pdo")]
+            for s in item.iterfind("Sm")
+        },
+    )
 
 
 class _Image:
@@ -282,23 +289,30 @@ def _profile(file: File) -> Profile:
         )
     sets = tuple(
         PdoSet(
-            index=p.index, direction="rx" if p.index < 0x1800 else "tx", fixed=p.fixed,
+            index=p.index,
+            direction="rx" if p.index < 0x1800 else "tx",
+            fixed=p.fixed,
             entries=tuple(f"{w >> 16:04X}:{w >> 8 & 0xFF:02X}" for w in p.words if w >> 16),
             layout=tuple(
-                PdoPart(key=f"{w >> 16:04X}:{w >> 8 & 0xFF:02X}" if w >> 16 else None,
-                        bits=w & 0xFF)
+                PdoPart(
+                    key=f"{w >> 16:04X}:{w >> 8 & 0xFF:02X}" if w >> 16 else None, bits=w & 0xFF
+                )
                 for w in p.words
             ),
             source="file",
         )
         for p in file.pdos
-    )  # fmt: skip
+    )
     configurable = flag(file.coe, "PdoConfig")
     spec = PdoSpec(
-        sets=sets, default_rx=file.default("rx")[0], default_tx=file.default("tx")[0],
-        max_entries=12, remappable=configurable, source="file",
+        sets=sets,
+        default_rx=file.default("rx")[0],
+        default_tx=file.default("tx")[0],
+        max_entries=12,
+        remappable=configurable,
+        source="file",
         sync_modes=("DC",) if any(m.activate for m in file.modes) else ("SM",),
-    )  # fmt: skip
+    )
     link = base.links[0].model_copy(
         update={
             "complete_access": flag(file.coe, "CompleteAccess"),

@@ -109,8 +109,13 @@ async def test_from_the_file_to_process_data(namespace: Namespace, name: str) ->
 
 FIXED = {"fixed_with_padding", "two_each_way", "exclusive_sets", "pdos_of_the_mode"}
 """Samples with fixed contents, none of which carries torque and velocity offset as well."""
-ALL_OUTPUTS = ((0x6060, "INT8"), (0x6071, "INT16"), (0x607A, "INT32"), (0x60B1, "INT32"),
-               (0x60FF, "INT32"))  # fmt: skip
+ALL_OUTPUTS = (
+    (0x6060, "INT8"),
+    (0x6071, "INT16"),
+    (0x607A, "INT32"),
+    (0x60B1, "INT32"),
+    (0x60FF, "INT32"),
+)
 
 
 @pytest.mark.parametrize("name", SAMPLES)

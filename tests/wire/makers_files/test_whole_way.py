@@ -115,9 +115,14 @@ async def responded(way: Way) -> None:
     Up to 100 Hz a setpoint held for 1 ms takes 0.14 dB (sin πfT / πfT).
     """
     settings = SweepSettings(
-        ROOM, kind="speed_loop", f_min_hz=20.0, f_max_hz=100.0, realisations=1,
-        rated_torque_nm=1.0, inertia_kgm2=1e-4,
-    )  # fmt: skip
+        ROOM,
+        kind="speed_loop",
+        f_min_hz=20.0,
+        f_max_hz=100.0,
+        realisations=1,
+        rated_torque_nm=1.0,
+        inertia_kgm2=1e-4,
+    )
     found = await sweep(way.axis, way.session, settings, silent())
     assert found.unit
     inside = found.frf.in_band

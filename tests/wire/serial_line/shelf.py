@@ -145,11 +145,15 @@ def small_profile(
         {"kind": kind, "watchdog": Watchdog(present=False), "source": "test", **spec}
     )
     return Profile(
-        drive="small", title="small", manual="000",
-        identity=Identity(maker="m", model="m"), links=(link,), units=UnitSpec(),
+        drive="small",
+        title="small",
+        manual="000",
+        identity=Identity(maker="m", model="m"),
+        links=(link,),
+        units=UnitSpec(),
         supported_modes=(1,),
         parameters=tuple(
             Parameter(key=key, name=key, group="g", type=kind_, source="000:1")
             for key, kind_ in parameters
         ),
-    )  # fmt: skip
+    )

@@ -50,8 +50,11 @@ def test_rule_ends_at_16_bits() -> None:
 def test_objects_that_share_a_register_are_refused() -> None:
     # 2100h and 3000h both lead to 3000h; 6099h:00 leads to :01's register.
     profile = small_profile(
-        ("2100:00", "UINT16"), ("3000:00", "UINT16"), ("6099:00", "UINT8"), ("6099:01", "UINT32"),
-    )  # fmt: skip
+        ("2100:00", "UINT16"),
+        ("3000:00", "UINT16"),
+        ("6099:00", "UINT8"),
+        ("6099:01", "UINT32"),
+    )
     assert ambiguous_objects(profile) == {
         (0x2100, 0): "3000:00",
         (0x3000, 0): "2100:00",
@@ -147,10 +150,14 @@ async def test_drive_that_refuses_blocks_is_read_one_by_one(port: Path, opened: 
 async def test_scan_identifies_what_answers(port: Path, opened: OpenLink) -> None:
     plain, foreign = ShelfDevice(), ShelfDevice()
     plain.objects |= {
-        (0x1018, 1): b"\x54\x09\0\0", (0x1018, 2): b"\x07\0\0\0", (0x1018, 3): b"\x02\0\0\0",
-        (0x1018, 4): b"\x2a\0\0\0", (0x6041, 0): b"\x50\x02", (0x2105, 0): b"\x02",
+        (0x1018, 1): b"\x54\x09\0\0",
+        (0x1018, 2): b"\x07\0\0\0",
+        (0x1018, 3): b"\x02\0\0\0",
+        (0x1018, 4): b"\x2a\0\0\0",
+        (0x6041, 0): b"\x50\x02",
+        (0x2105, 0): b"\x02",
         (0x6061, 0): b"\xff",
-    }  # fmt: skip
+    }
     for key in [k for k in foreign.objects if k[0] != 0x6040]:
         del foreign.objects[key]
     said: list[float] = []
@@ -158,9 +165,14 @@ async def test_scan_identifies_what_answers(port: Path, opened: OpenLink) -> Non
         link = await opened(f"mlink://{port}")
         found = await link.scan(lambda fraction, _text: said.append(fraction), range(1, 6))
     assert found[0] == Found(
-        2, vendor_id=0x954, product_code=7, revision=2, serial=42,
-        state=text("mlink.state", status="0x0250"), notes=(text("mlink.note-mode", mode=-1),),
-    )  # fmt: skip
+        2,
+        vendor_id=0x954,
+        product_code=7,
+        revision=2,
+        serial=42,
+        state=text("mlink.state", status="0x0250"),
+        notes=(text("mlink.note-mode", mode=-1),),
+    )
     assert found[1].station == 4
     assert found[1].vendor_id is None
     assert found[1].notes[0].code == "mlink.note-no-identity"
@@ -208,8 +220,11 @@ async def test_reads_are_repeated(port: Path, opened: OpenLink, kind: str) -> No
         assert await link.read(1, STATUS) == b"\x37\x02"
         quality = link.quality(1)
     assert quality.retries == 2
-    counted = {"drop": quality.timeouts, "truncate": quality.framing_errors,
-               "corrupt": quality.crc_errors}  # fmt: skip
+    counted = {
+        "drop": quality.timeouts,
+        "truncate": quality.framing_errors,
+        "corrupt": quality.crc_errors,
+    }
     assert counted[kind] == 2
 
 

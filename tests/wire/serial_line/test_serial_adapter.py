@@ -198,9 +198,12 @@ async def test_search_of_line_settings_finds_the_rate_the_drive_has(port: Path) 
     said: list[str] = []
     with serving(port, {1: ShelfDevice()}, client_baudrate=460_800):
         found = await search_line_settings(
-            parse_url(f"mlink://{port}"), BUS, lambda _fraction, text: said.append(text),
-            baudrates=(2_500_000, 115_200, 460_800, 9600), parities=("N",),
-        )  # fmt: skip
+            parse_url(f"mlink://{port}"),
+            BUS,
+            lambda _fraction, text: said.append(text),
+            baudrates=(2_500_000, 115_200, 460_800, 9600),
+            parities=("N",),
+        )
     assert found is not None
     assert found.url.split("?")[1].split("&")[0] == "baudrate=460800"
     assert [f.station for f in found.drives] == [1]
@@ -210,9 +213,13 @@ async def test_search_of_line_settings_finds_the_rate_the_drive_has(port: Path) 
 async def test_search_that_finds_nothing(port: Path) -> None:
     with serving(port, {7: ShelfDevice()}):
         nothing = await search_line_settings(
-            parse_url(f"mlink://{port}"), BUS, lambda *_: None,
-            baudrates=(9600,), parities=("N",), stations=(1, 2),
-        )  # fmt: skip
+            parse_url(f"mlink://{port}"),
+            BUS,
+            lambda *_: None,
+            baudrates=(9600,),
+            parities=("N",),
+            stations=(1, 2),
+        )
     assert nothing is None
 
 

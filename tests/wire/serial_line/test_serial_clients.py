@@ -64,8 +64,11 @@ async def test_our_link_on_a_pymodbus_server(port: Path, opened: OpenLink) -> No
             places = [Address(None, 0, "UINT16", 0x6400 + i) for i in (0, 1, 2)]
             long = Address(None, 0, "UINT32", 0x6403)
             assert await link.read_many(1, [*places, long]) == [
-                b"\1\0", b"\2\0", b"\3\0", b"\x78\x56\x34\x12",
-            ]  # fmt: skip
+                b"\1\0",
+                b"\2\0",
+                b"\3\0",
+                b"\x78\x56\x34\x12",
+            ]
             await link.write(1, places[1], b"\xcd\xab")
             await link.write(1, long, b"\x01\x02\x03\x04")
             assert await link.read(1, places[1]) == b"\xcd\xab"

@@ -214,8 +214,11 @@ def test_gaps_and_length_split_blocks() -> None:
     assert [(b.start, b.count) for b in plan_blocks(places, 125, 2)] == [(0, 4), (10, 3)]
     assert [(b.start, b.count) for b in plan_blocks(places, 125, 1)] == [(0, 1), (3, 1), (10, 3)]
     assert [(b.start, b.count) for b in plan_blocks(places, 2, 9)] == [
-        (0, 1), (3, 1), (10, 1), (11, 2),
-    ]  # fmt: skip
+        (0, 1),
+        (3, 1),
+        (10, 1),
+        (11, 2),
+    ]
 
 
 def test_overlapping_and_lonely_values_are_not_joined() -> None:

@@ -388,8 +388,10 @@ def test_lost_adapter_is_reported_once_and_opened_again() -> None:
     line = Line(
         SETTINGS,
         on_change=lambda up, _text: changes.append(up),
-        clock=port.clock, sleep=port.sleep, opener=lambda _: port,
-    )  # fmt: skip
+        clock=port.clock,
+        sleep=port.sleep,
+        opener=lambda _: port,
+    )
     line.open()
     line.read(1, 0, 1)
     port.broken = True

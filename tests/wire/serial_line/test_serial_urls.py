@@ -24,9 +24,14 @@ def test_examples() -> None:
     assert not parse_url("mlink:///tmp/virtual0").is_virtual
 
 
-@pytest.mark.parametrize("text", [
-    "ethercat://eth0", "mlink:///dev/ttyUSB0?baudrate=9600&parity=E", "canopen://virtual/x",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "text",
+    [
+        "ethercat://eth0",
+        "mlink:///dev/ttyUSB0?baudrate=9600&parity=E",
+        "canopen://virtual/x",
+    ],
+)
 def test_url_reads_back_as_written(text: str) -> None:
     assert str(parse_url(text)) == text
 
@@ -68,10 +73,15 @@ def test_bad_urls(text: str, complaint: str) -> None:
         link_for(text)
 
 
-@pytest.mark.parametrize(("text", "kinds"), [
-    ("http://x", ["ethercat", "canopen", "modbus", "mlink"]), ("modbus:///x?speed=1", ["modbus"]),
-    ("mlink:///x?stopbits=3", ["mlink"]), ("ethercat://", ["ethercat"]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "kinds"),
+    [
+        ("http://x", ["ethercat", "canopen", "modbus", "mlink"]),
+        ("modbus:///x?speed=1", ["modbus"]),
+        ("mlink:///x?stopbits=3", ["mlink"]),
+        ("ethercat://", ["ethercat"]),
+    ],
+)
 def test_the_remedy_is_an_example_of_that_bus(text: str, kinds: list[str]) -> None:
     with pytest.raises(OutOfRange) as refused:
         link_for(text)

@@ -70,9 +70,13 @@ class DsC(Cia402):
         values = super().fallback_values(motor)
         turn = values["6065:00"]
         return values | {
-            "2500:00": min(turn, 65535), "2501:00": values["6067:00"], "2502:00": 10,
-            "2400:02": 1, "2400:03": 2, "2400:04": 3,
-        }  # fmt: skip
+            "2500:00": min(turn, 65535),
+            "2501:00": values["6067:00"],
+            "2502:00": 10,
+            "2400:02": 1,
+            "2400:03": 2,
+            "2400:04": 3,
+        }
 
     def in_place_s(self, od: ObjectDictionary) -> float:
         """2502h (003:577)."""

@@ -48,9 +48,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--sdo-ms", type=float, default=1.0, help="answer time of the mailbox")
     parser.add_argument("--eeprom-us", type=float, default=50.0, help="read time of the EEPROM")
     parser.add_argument(
-        "--mailboxes", type=int, nargs=2, default=MAILBOXES, metavar=("OUT", "IN"),
+        "--mailboxes",
+        type=int,
+        nargs=2,
+        default=MAILBOXES,
+        metavar=("OUT", "IN"),
         help="bytes of the mailboxes to and from the drives",
-    )  # fmt: skip
+    )
     parser.add_argument("--seed", type=int, default=1, help="of random trouble")
     parser.add_argument("--realtime", type=int, default=0, help="SCHED_FIFO priority, if allowed")
     return parser

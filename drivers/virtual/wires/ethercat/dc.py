@@ -65,9 +65,14 @@ class DistributedClock:
         arrival = self.local(now_ns + before * HOP_NS)
         back = self.local(now_ns + (before + 2 * behind) * HOP_NS) if behind else 0
         struct.pack_into(
-            "<IIII", self._memory, reg.DC_RECEIVE_TIMES, arrival & 0xFFFFFFFF,
-            back & 0xFFFFFFFF, 0, 0,
-        )  # fmt: skip
+            "<IIII",
+            self._memory,
+            reg.DC_RECEIVE_TIMES,
+            arrival & 0xFFFFFFFF,
+            back & 0xFFFFFFFF,
+            0,
+            0,
+        )
         struct.pack_into("<Q", self._memory, reg.DC_RECEIVE_TIME_UNIT, arrival)
 
     def compare(self, received: bytes, now_ns: int) -> None:

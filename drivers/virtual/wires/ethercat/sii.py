@@ -85,9 +85,14 @@ def build(content: SiiContent) -> bytes:
     struct.pack_into("<HHHHH", image, 0, 0x0C08, 0xEE88, 0x000A, 0, content.alias)
     image[14] = checksum(bytes(image[:14]))
     struct.pack_into(
-        "<IIII", image, 16,
-        content.vendor_id, content.product_code, content.revision, content.serial,
-    )  # fmt: skip
+        "<IIII",
+        image,
+        16,
+        content.vendor_id,
+        content.product_code,
+        content.revision,
+        content.serial,
+    )
     layout = (mailbox_out.start, mailbox_out.length, mailbox_in.start, mailbox_in.length)
     if content.boot is not None:
         out, back = content.boot

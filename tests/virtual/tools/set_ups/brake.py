@@ -36,10 +36,13 @@ def braked(
     spec = mechanics((1e-4, 60.0, 0.006), coulomb=COULOMB_NM, gravity=gravity_nm)
     motor = spec.motor.model_copy(
         update={
-            "brake": True, "brake_nm": holds_nm, "brake_output": True,
-            "brake_windup_rad": 2 * math.pi * windup_rev, "brake_supplied": supplied,
+            "brake": True,
+            "brake_nm": holds_nm,
+            "brake_output": True,
+            "brake_windup_rad": 2 * math.pi * windup_rev,
+            "brake_supplied": supplied,
         }
-    )  # fmt: skip
+    )
     return spec.model_copy(update={"motor": motor})
 
 

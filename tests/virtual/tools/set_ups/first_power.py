@@ -27,9 +27,13 @@ FAMILIES = ("mms7", "r6l", "ep3e", "m6l")
 
 
 def motor(
-    phases: PhaseSpec = RIGHT, *, inverted: bool = False, counted: float = 1.0,
-    brake: bool = False, gravity: float = 0.0,
-) -> MechanicsSpec:  # fmt: skip
+    phases: PhaseSpec = RIGHT,
+    *,
+    inverted: bool = False,
+    counted: float = 1.0,
+    brake: bool = False,
+    gravity: float = 0.0,
+) -> MechanicsSpec:
     spec = mechanics((1e-4, 60.0, 0.006), gravity=gravity)
     encoder = spec.encoder.model_copy(update={"inverted": inverted, "counted_share": counted})
     turned = spec.motor.model_copy(update={"brake": brake, "brake_supplied": not brake})

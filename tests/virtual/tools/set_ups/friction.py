@@ -30,24 +30,34 @@ FRICTION = FrictionSpec(
 )
 
 RIPPLE = RippleSpec(
-    revolution_nm=0.004, cogging_nm=0.012, cogging_second_nm=0.005, cogging_per_rev=24,
+    revolution_nm=0.004,
+    cogging_nm=0.012,
+    cogging_second_nm=0.005,
+    cogging_per_rev=24,
     phase_rad=0.4,
-)  # fmt: skip
+)
 
 SMOOTH = mechanics((1e-4, 60.0, 0.006)).model_copy(update={"friction": FRICTION})
 
 RIPPLED = SMOOTH.model_copy(update={"ripple": RIPPLE})
 
 ASKED = FrictionSettings(
-    travel_limit=3.0, speed_limit=1200.0, torque_limit=80.0, time_limit_s=50.0, speeds=6,
-    slowest_rpm=10.0, rated_torque_nm=RATED_NM,
-)  # fmt: skip
+    travel_limit=3.0,
+    speed_limit=1200.0,
+    torque_limit=80.0,
+    time_limit_s=50.0,
+    speeds=6,
+    slowest_rpm=10.0,
+    rated_torque_nm=RATED_NM,
+)
 
 
 async def mapped(
-    axis: Axis, session: CyclicSession, asked: FrictionSettings = ASKED,
+    axis: Axis,
+    session: CyclicSession,
+    asked: FrictionSettings = ASKED,
     progress: Progress | None = None,
-) -> FrictionResult:  # fmt: skip
+) -> FrictionResult:
     """As a job or the command line does it."""
     async with profile_speed.prepared(axis, session, asked.envelope, True):
         found = await TOOL.run(Run(axis, session, progress or silent()), asked)

@@ -41,21 +41,30 @@ ASKED = GantrySettings(
 )
 
 SQUARE = GantrySpec(
-    axes=("L", "R"), inertia_kgm2=2e-4, yaw_inertia_kgm2=4e-5, off_centre=0.15,
-    joint_stiffness_nm_per_rad=25.0, joint_damping_nms_per_rad=3e-3,
-    yaw_stiffness_nm_per_rad=4.0, yaw_damping_nms_per_rad=2e-3,
-)  # fmt: skip
+    axes=("L", "R"),
+    inertia_kgm2=2e-4,
+    yaw_inertia_kgm2=4e-5,
+    off_centre=0.15,
+    joint_stiffness_nm_per_rad=25.0,
+    joint_damping_nms_per_rad=3e-3,
+    yaw_stiffness_nm_per_rad=4.0,
+    yaw_damping_nms_per_rad=2e-3,
+)
 
 
 def motor(brake: bool = False) -> MechanicsSpec:
-    return MechanicsSpec.model_validate({
-        "motor": {
-            "inertia_kgm2": 5e-5, "rated_torque_nm": RATED, "rated_speed_rpm": 3000,
-            "brake": brake,
-        },
-        "friction": {"viscous_nms": 2e-4, "coulomb_nm": 0.03},
-        "encoder": {"noise_counts": 4},
-    })  # fmt: skip
+    return MechanicsSpec.model_validate(
+        {
+            "motor": {
+                "inertia_kgm2": 5e-5,
+                "rated_torque_nm": RATED,
+                "rated_speed_rpm": 3000,
+                "brake": brake,
+            },
+            "friction": {"viscous_nms": 2e-4, "coulomb_nm": 0.03},
+            "encoder": {"noise_counts": 4},
+        }
+    )
 
 
 @dataclass
@@ -77,9 +86,13 @@ class Two:
 
 @asynccontextmanager
 async def gantry(
-    namespace: Namespace, spec: GantrySpec = SQUARE, *, brake: bool = False,
-    defects: tuple[Defect, ...] = (), joined: bool = True,
-) -> AsyncIterator[Two]:  # fmt: skip
+    namespace: Namespace,
+    spec: GantrySpec = SQUARE,
+    *,
+    brake: bool = False,
+    defects: tuple[Defect, ...] = (),
+    joined: bool = True,
+) -> AsyncIterator[Two]:
     """The beam between both drives, or nothing where they are not ``joined``; ``defects`` are those
     that the first axis has in the file.
     """

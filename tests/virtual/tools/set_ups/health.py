@@ -30,9 +30,12 @@ def axis_of(stiffness: float = 1.0, friction: float = 1.0) -> MechanicsSpec:
     """Friction falls by 1 - tanh towards Coulomb's, which no model of the tools is."""
     spec = mechanics((LOAD, STIFFNESS * stiffness, 0.006))
     worn = FrictionSpec(
-        viscous_nms=VISCOUS * friction, coulomb_nm=COULOMB * friction,
-        static_nm=0.05 * friction, stribeck_rad_s=4.0, stribeck_law="tanh",
-    )  # fmt: skip
+        viscous_nms=VISCOUS * friction,
+        coulomb_nm=COULOMB * friction,
+        static_nm=0.05 * friction,
+        stribeck_rad_s=4.0,
+        stribeck_law="tanh",
+    )
     return spec.model_copy(update={"friction": worn})
 
 

@@ -18,9 +18,13 @@ DRIVE, CYCLE_S = "generic402", 2e-3
 
 #: 60A9h and 60AAh of this drive state increments; 6076h states its rated torque.
 ASKED = LoadSideSettings(
-    travel_limit=3.0, speed_limit=1200.0, torque_limit=80.0, time_limit_s=90.0,
-    rated_torque_nm=RATED, motor_inertia_kgm2=MOTOR,
-)  # fmt: skip
+    travel_limit=3.0,
+    speed_limit=1200.0,
+    torque_limit=80.0,
+    time_limit_s=90.0,
+    rated_torque_nm=RATED,
+    motor_inertia_kgm2=MOTOR,
+)
 
 
 def axis(gap: float = GAP, **encoder: Any) -> MechanicsSpec:

@@ -51,9 +51,11 @@ def braked(bench: DirectBench) -> None:
 
 
 async def recorded(
-    bench: DirectBench, act: Callable[[DirectBench], None] | None, asked: SafetySettings = ASKED,
+    bench: DirectBench,
+    act: Callable[[DirectBench], None] | None,
+    asked: SafetySettings = ASKED,
     kept: dict[str, Any] | None = None,
-) -> SafetyResult:  # fmt: skip
+) -> SafetyResult:
     """As a job does it; what is read from files is the same."""
     kept = {} if kept is None else kept
 

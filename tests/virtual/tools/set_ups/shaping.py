@@ -26,9 +26,14 @@ ASKED = ShapingSettings(
 
 
 def arm(
-    frequency_hz: float, *, damping: float = 0.01, load: float = 1e-4, coulomb: float = 0.01,
-    backlash: float = 0.0, second_hz: float | None = None,
-) -> MechanicsSpec:  # fmt: skip
+    frequency_hz: float,
+    *,
+    damping: float = 0.01,
+    load: float = 1e-4,
+    coulomb: float = 0.01,
+    backlash: float = 0.0,
+    second_hz: float | None = None,
+) -> MechanicsSpec:
     """A motor with a soft load: it oscillates at this frequency while the motor is held."""
     stiffness = load * (2 * math.pi * frequency_hz) ** 2
     loads: list[dict[str, float]] = []
@@ -37,15 +42,22 @@ def arm(
         loads.append(
             {"inertia_kgm2": 5e-5, "stiffness_nm_per_rad": first, "damping_nms_per_rad": 2e-3}
         )
-    loads.append({
-        "inertia_kgm2": load, "stiffness_nm_per_rad": stiffness, "backlash_rad": backlash,
-        "damping_nms_per_rad": 2 * damping * math.sqrt(stiffness * load),
-    })  # fmt: skip
-    return MechanicsSpec.model_validate({
-        "motor": {"inertia_kgm2": 5e-5, "rated_torque_nm": 1.27, "rated_speed_rpm": 3000},
-        "friction": {"viscous_nms": 2e-4, "coulomb_nm": coulomb},
-        "encoder": {"noise_counts": 4.0}, "load": loads,
-    })  # fmt: skip
+    loads.append(
+        {
+            "inertia_kgm2": load,
+            "stiffness_nm_per_rad": stiffness,
+            "backlash_rad": backlash,
+            "damping_nms_per_rad": 2 * damping * math.sqrt(stiffness * load),
+        }
+    )
+    return MechanicsSpec.model_validate(
+        {
+            "motor": {"inertia_kgm2": 5e-5, "rated_torque_nm": 1.27, "rated_speed_rpm": 3000},
+            "friction": {"viscous_nms": 2e-4, "coulomb_nm": coulomb},
+            "encoder": {"noise_counts": 4.0},
+            "load": loads,
+        }
+    )
 
 
 class Load:
