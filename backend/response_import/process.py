@@ -22,7 +22,7 @@ from backend.response_import.errors import BadRecording
 from backend.response_import.evaluation import ImportSettings, evaluate_signals, prepared
 from backend.response_import.preview import preview
 from backend.response_import.stored import pack_import
-from drivers.computer.processes import limit_memory
+from drivers.computer.processes import limit_memory, yield_processor
 from drivers.texts.message import Text, prose, text
 
 #: An evaluation that takes longer is ended: the largest file takes a fraction of it.
@@ -103,6 +103,8 @@ async def import_in_process(task: ImportTask, limit_s: float = LIMIT_S) -> dict[
 
 def main() -> None:
     """Carry out the one task of this process."""
+    # STOP and the buses go first, however many files are read.
+    yield_processor()
     # Where the system can: a file made to exhaust the memory ends this process alone.
     limit_memory(_MEMORY_BYTES)
     task: ImportTask = pickle.load(sys.stdin.buffer)  # noqa: S301 - from our own parent

@@ -63,7 +63,7 @@ def _mark_from_proc(pid: int) -> str:
         return ""
 
 
-def yield_processor(nice: int) -> None:
+def yield_processor(nice: int = 10) -> None:
     """Have this process go after others: by ``nice`` steps, on Windows by one priority class."""
     if sys.platform == "win32":
         psutil.Process().nice(psutil.BELOW_NORMAL_PRIORITY_CLASS)
