@@ -127,7 +127,7 @@ async def test_what_is_not_in_use_is_no_failure_and_no_value(
 ) -> None:
     link.read_errors[0x2005, 0x10] = NotInUse("not in use: 2005:00 counts 3 entries")
     reported = await read_all(drive, ["2005:03", "2005:10"], lambda _share, _text: None)
-    assert reported == {"read": 1, "failed": {}}
+    assert reported == {"read": 1, "failed": {}, "failed_messages": {}}
     reading = drive.readings["2005:10"]
     assert (reading.raw, reading.unused) == (None, True)
     assert "counts 3 entries" in reading.error
