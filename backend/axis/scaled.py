@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -10,11 +12,16 @@ from backend.axis.power import PowerState
 from backend.drive.drive import Drive
 from backend.drive.readings import Reading
 from backend.motion.grant import Grant
+from backend.scales.resolve import stating_keys
 from backend.scales.scale import ScaleChanged
 from backend.scales.taught import Taught
 from backend.scales.units import AxisUnits, read_units
 from drivers.errors import DriveError
 from profiles.schema import Raw
+
+#: One motion relies so long on its last look at the scales. A look takes some ten reads, and a
+#: server compares the scales of an axis with power every 0.9 s anyway.
+JUST_LOOKED_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +53,10 @@ class ScaledAxis(PowerState):
         self._taught: Taught | None = None
         self._unit_raws: dict[str, Raw | None] = {}
         self._planned: _Planned | None = None
+        #: Objects of the scales that the drive refused as absent, until `forget_scales`.
+        self._absent: frozenset[str] = frozenset()
+        #: The motion (its grant) that looked at the scales last before power, and when.
+        self._looked: tuple[Grant | None, float] = (None, -math.inf)
         #: None until one was made since this axis is connected, or since its scales changed.
         self.small_moves: SmallMoves | None = None
         #: Called with the keys of objects of the scales that have other values than they had.
@@ -55,8 +66,13 @@ class ScaledAxis(PowerState):
     async def units(self) -> AxisUnits:
         """Units with the present gearing, read once until `forget_scales`."""
         if self._units is None:
-            units = await read_units(self.drive, self._taught)
+            units = await read_units(self.drive, self._taught, self._absent)
             known = self.drive.readings
+            self._absent = frozenset(
+                key
+                for key in stating_keys(self.drive)
+                if key not in known or known[key].raw is None
+            )
             raws = {key: known[key].raw for key in self.drive.profile.unit_keys if key in known}
             before, self._unit_raws, self._units = self._unit_raws, raws, units
             if before and raws != before:
@@ -88,9 +104,9 @@ class ScaledAxis(PowerState):
             ScaleChanged: the drive has other scales than at the begin of this motion.
             DriveError: the objects that state them cannot be read.
         """
-        units = await self.read_scales()
-        units.require_certain()
         whole = self.drive.authority.outermost(self.drive.id)
+        units = await (self.units() if self._just_looked(whole) else self.read_scales())
+        units.require_certain()
         planned = self._planned
         if whole is not None and planned is not None and planned.grant is whole:
             self._require_same(planned.units, units)
@@ -107,10 +123,19 @@ class ScaledAxis(PowerState):
         before = self._units
         if planned is not None and planned.grant is whole:
             before = planned.units
-        units = await self.read_scales()
+        if self._just_looked(whole):
+            units = await self.units()
+        else:
+            units = await self.read_scales()
+            self._looked = (whole, time.monotonic())
         units.require_certain()
         if before is not None:
             self._require_same(before, units)
+
+    def _just_looked(self, whole: Grant | None) -> bool:
+        """Whether this motion has looked at the scales before power, a short time ago."""
+        grant, at_s = self._looked
+        return whole is not None and grant is whole and time.monotonic() - at_s < JUST_LOOKED_S
 
     def _require_same(self, before: AxisUnits, now: AxisUnits) -> None:
         if now.scales != before.scales:
@@ -146,7 +171,7 @@ class ScaledAxis(PowerState):
 
     def forget_scales(self) -> None:
         """The gearing changed, or may have: it is read before the next use."""
-        self._units = None
+        self._units, self._absent = None, frozenset()
 
     def _units_may_have_changed(self, readings: list[Reading]) -> None:
         """Whoever wrote the gearing (a page, a set, the panel): units are read again."""

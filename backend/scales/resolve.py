@@ -8,7 +8,7 @@ manual. The defaults of the standard alone are nobody's word: makers use others.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 
 from backend.drive.drive import Drive
@@ -63,14 +63,14 @@ def stating_keys(drive: Drive) -> tuple[str, ...]:
     )
 
 
-async def read_reported(drive: Drive) -> Reported:
-    """What the drive says of its scales, read now.
+async def read_reported(drive: Drive, absent: Container[str] = ()) -> Reported:
+    """What the drive says of its scales, read now, without what is known to be ``absent``.
 
     Raises:
         DriveError: an object that it has cannot be read.
     """
     # At once where the bus can; what failed is asked for alone, to learn whether it exists.
-    readings = await drive.read_many(stating_keys(drive))
+    readings = await drive.read_many([key for key in stating_keys(drive) if key not in absent])
     failed = [key for key, reading in readings.items() if reading.raw is None]
     readings = readings | await existing(drive, failed)
     return Reported(

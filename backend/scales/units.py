@@ -6,6 +6,7 @@ each profile's ``units``, which carries the manual's line.
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass, replace
 
 from backend.drive.drive import Drive
@@ -214,7 +215,9 @@ def ramp_raw(units: AxisUnits, drive: Drive, key: str, rpm_per_s: float) -> int:
     )
 
 
-async def read_units(drive: Drive, taught: Taught | None = None) -> AxisUnits:
+async def read_units(
+    drive: Drive, taught: Taught | None = None, absent: Container[str] = ()
+) -> AxisUnits:
     """Units of an axis with its present gearing, and what was ``taught`` of it.
 
     User increments per motor revolution are ``feed/feed_revs * shaft_revs/motor_revs`` where the
@@ -223,13 +226,14 @@ async def read_units(drive: Drive, taught: Taught | None = None) -> AxisUnits:
     with P05.05 = 0, 000:1276). Gear ratio, feed constant and resolution are optional in CiA 402-2
     (clause 7): where the drive says that it has no such object, nothing is geared, and without feed
     constant and resolution nothing is known. Units are those of 60A8h to 60AAh where it has them.
+    Objects that are known to be ``absent`` are not asked for.
 
     Raises:
         DriveError: the objects cannot be read.
         NotAllowed: a unit switch of the drive is not where the profile's units hold.
     """
     await _check_unit_switches(drive)
-    reported = await read_reported(drive)
+    reported = await read_reported(drive, absent)
     if drive.profile.units.feed not in reported.raws:
         reported = replace(reported, encoder=await encoder_counts(drive))
     scales = scales_of(drive.profile.units, reported, taught)

@@ -63,7 +63,9 @@ async def test_mechanics_beside_the_speed_loop_at_4_khz(namespace: Namespace) ->
 async def test_autotune_keeps_its_promise_and_can_be_undone(namespace: Namespace) -> None:
     async with bench(namespace, ONE, 5e-4) as b:
         before = await b.values()
-        result = await autotune(b.axis, b.session, AutotuneSettings(WIDE), silent())
+        # One grant for the whole of it, as a job holds.
+        with b.axis.granted("autotune"):
+            result = await autotune(b.axis, b.session, AutotuneSettings(WIDE), silent())
         assert result.applied is not None
         assert result.verified is not None
         predicted, measured = (

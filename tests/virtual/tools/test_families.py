@@ -96,7 +96,9 @@ async def test_autotune_of_a_family_and_back(drive: str) -> None:
     # M6-L does not report its motor's inertia, which its inertia ratio counts in.
     settings = AutotuneSettings(WIDE, motor_inertia_kgm2=None if drive == "mms7" else 5e-5)
     async with direct(ONE, 5e-4, drive=drive) as b:
-        result = await autotune(b.axis, b.session, settings, silent())
+        # One grant for the whole of it, as a job holds.
+        with b.axis.granted("autotune"):
+            result = await autotune(b.axis, b.session, settings, silent())
         assert result.applied is not None
         assert result.verified is not None
         # A resonance at 213.5 Hz limits it.

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from backend.axis import teaching
+from backend.axis import scaled, teaching
 from backend.scales.scale import ScaleChanged, ScaleUnknown
 from backend.tools.first_power.result import FirstPowerResult
 from backend.tools.measuring.recording import enabled
@@ -124,8 +124,12 @@ async def test_another_clients_feed_constant_is_that_of_the_next_motion(kind: st
     assert 0 < limits.speed_max <= 1.01 * most * 1_000 / 60
 
 
-async def test_scales_that_change_within_a_motion_end_it_before_the_next_power_on() -> None:
+async def test_scales_that_change_within_a_motion_end_it_before_the_next_power_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Places of before are no places any more: the axis is not enabled by them."""
+    # As long after the last look as a motion relies on it.
+    monkeypatch.setattr(scaled, "JUST_LOOKED_S", 0.0)
     async with direct(spec_of(), drive="generic402") as b:
         axis = b.axis
         with axis.granted("a measurement of two parts"):
