@@ -149,8 +149,7 @@ class Runner:
         """Run them in turn; what they print goes where this prints.
 
         Files with failed tests go to `again`, whole, as the tests of some follow one another; not
-        at the ``last`` time. Only suites with buses in real time have a second one: what keeps
-        no time fails by a defect, whatever else the computer does.
+        at the ``last`` time. A busy machine is no defect, and a defect stays one.
         """
         for check in checks:
             self._say(f"== {check.name}")
@@ -257,12 +256,11 @@ def run_quick(runner: Runner) -> None:
 
 
 def run_suites(runner: Runner) -> list[str]:
-    """Run one suite after the other; returns what failed.
+    """Run one suite after the other; returns what failed twice.
 
     Two at a time take as long on two processors, and disturb one another.
     """
-    runner.run([*TIMED, *BUSES, *PAGES])
-    runner.run(PARALLEL, last=True)
+    runner.run([*TIMED, *BUSES, *PAGES, *PARALLEL])
     again = runner.again
     if again:
         alone = Runner(sys.stdout)
