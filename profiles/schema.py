@@ -403,6 +403,9 @@ class UnitSpec(Frozen):
     encoder_counts_per_rev: int | None = None
     gear_numerator: str | None = None
     gear_denominator: str | None = None
+    gear_not_set_at_zero: bool = Field(
+        default=False, description="both parts of the gear at 0 mean that none is set"
+    )
     feed: str | None = None
     feed_revolutions: str | None = None
     ramp_reference_rpm: float | None = Field(

@@ -200,7 +200,7 @@ def _commands(line: str, place: Text) -> list[list[str]]:
     """Words behind ``ethercat`` of each download in a line.
 
     Raises:
-        BadRow: the line writes in a form of which it cannot be told what.
+        BadRow: the line writes, and what it writes is not certain.
     """
     plain = _REDIRECTED.sub(" ", line.replace("`", " ; "))
     words = shlex.shlex(plain, posix=True, punctuation_chars=";&|()")

@@ -158,12 +158,10 @@ def _zero(spec: UnitSpec, reported: Reported) -> str | None:
     """The part of a ratio that the drive has at 0; None without one.
 
     No ratio has a 0 (CiA 402-2 clause 7): what the drive takes in its place is the maker's choice.
-    A gear with 0 in both parts is one that was never set, in a drive whose speed is no count of its
-    increments (the DS_C in rpm; 003:490 prints no default): 606Ch shows there when 6064h goes by
-    another one.
+    A profile may state that a gear with 0 in both parts is one that was never set.
     """
     parts: list[str | None] = [spec.gear_numerator, spec.gear_denominator]
-    if spec.velocity != "inc/s" and all(key and reported.raws.get(key) == 0 for key in parts):
+    if spec.gear_not_set_at_zero and all(key and reported.raws.get(key) == 0 for key in parts):
         parts.clear()
     parts.append(spec.feed_revolutions if reported.get(spec.feed) else None)
     parts.append(_RESOLUTION_REVS if reported.get(_RESOLUTION) else None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from backend.axis.axis import Axis
 from backend.axis.remembered import AxisRecord, AxisStore
 from backend.drive.drive import Drive
 from backend.drive.ports import Port
+from backend.drive.readings import Reading
 from backend.scales.resolve import Reported, scales_of
 from backend.scales.scale import Origin, ScaleUnknown, Uncertainty
 from backend.scales.taught import Taught
@@ -139,6 +141,39 @@ def test_a_resolution_that_nobody_states_is_none(
 ) -> None:
     scale = scales_of(GENERIC, Reported(raws), None).position
     assert (scale.raw_per_unit, scale.uncertainty) == (None, uncertainty)
+
+
+@pytest.mark.parametrize(
+    ("numerator", "denominator", "per_rev"),
+    [(0, 0, 10_000), (1, 1, 10_000), (2, 1, 5_000), (0, 1, None), (1, 0, None)],
+)
+def test_a_gear_that_was_never_set_is_none_where_the_profile_states_it(
+    numerator: int, denominator: int, per_rev: float | None
+) -> None:
+    """DS_C, 003:490; any other family with 0 in both parts is not certain."""
+    spec = load_profile("ds_c").units
+    raws = {"2300:00": numerator, "2301:00": denominator}
+    assert scales_of(spec, Reported(raws), None).position.raw_per_unit == per_rev
+    both = Reported({"6092:01": 10_000, "6091:01": 0, "6091:02": 0})
+    assert scales_of(GENERIC, both, None).position.raw_per_unit is None
+
+
+async def test_what_a_drive_has_not_is_asked_for_once() -> None:
+    axis = plain(resolution=131_072)
+    asked: list[list[str]] = []
+    read_many = axis.drive.read_many
+
+    async def counted(keys: Sequence[str]) -> dict[str, Reading]:
+        asked.append(list(keys))
+        return await read_many(keys)
+
+    axis.drive.read_many = counted  # type: ignore[method-assign, assignment]
+    await axis.units()
+    await axis.read_scales()
+    axis.forget_scales()
+    await axis.units()
+    assert [len(keys) for keys in asked] == [len(asked[0]), 1, len(asked[0])]
+    assert asked[1] == ["608F:01"]
 
 
 def test_what_a_person_said_counts_while_the_drive_is_as_it_was() -> None:
