@@ -212,7 +212,7 @@ class MotionAuthority:
                 self._expire(record, why)
 
     def end_motion(self, drive: str, why: Text) -> bool:
-        """Whoever moves this axis may move it no longer, and is informed; False: nobody does.
+        """End the grants by which this axis is moved, and inform their holders; False: there is none.
 
         An axis that is only left enabled keeps its grant.
         """

@@ -229,9 +229,10 @@ class Monitor:
         return await self._snapshot()
 
     async def _read_settings(self, now_s: float) -> None:
-        """What anybody may change while the axis has power, and nobody has time to ask for then.
+        """Read what other programs may change while the axis has power.
 
-        How the drive brakes, for STOP; and what its scales rest on: the axis compares them.
+        How the drive brakes, as STOP has no time to read it; and the scales, which the axis
+        compares.
         """
         if now_s - self._stop_asked_s >= STOP_ASKED_S:
             self._stop_asked_s = now_s

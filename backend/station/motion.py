@@ -126,7 +126,7 @@ class Motion:
         return grants()
 
     def scales_changed(self, drive_id: str, keys: Sequence[str]) -> None:
-        """Somebody gave this axis other units; a motion that goes on was planned with others."""
+        """End a motion that was planned with other scales than the axis has now."""
         connected = self._bench.connected_drives.get(drive_id)
         authority = self._bench.authority
         if connected is None or authority.mover_of(drive_id) is None:
