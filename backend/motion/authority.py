@@ -212,9 +212,9 @@ class MotionAuthority:
                 self._expire(record, why)
 
     def end_motion(self, drive: str, why: Text) -> bool:
-        """End the grants by which this axis is moved, and inform their holders; False: there is none.
+        """End the grants by which this axis is moved, and inform their holders.
 
-        An axis that is only left enabled keeps its grant.
+        An axis that is only left enabled keeps its grant. False where no grant moves it.
         """
         moving = [
             r for r in list(self._records.get(drive, ())) if not r.grant.standing and not r.why
