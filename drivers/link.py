@@ -55,6 +55,13 @@ class Found:
     firmware: str = ""
     state: Text | None = None
     notes: tuple[Text, ...] = ()
+    device_profile: int | None = None
+    """Low word of 1000h (CiA 301 clause 7.5.2.1): 402 for drives, 0 for none of the standard."""
+
+    @property
+    def is_other_device(self) -> bool:
+        """It states a device profile, and not that of drives: a terminal, say."""
+        return self.device_profile not in (None, 0, 402)
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,8 @@ from profiles.language.standard_help import HELP_FILE, with_standard_help
 from profiles.motion.classify import STANDARD_FILE, classified
 from profiles.schema import Profile
 
+#: The profile of a CiA 402 drive of which nothing else is known.
+STANDARD = "generic402"
 _HERE = Path(__file__).parent
 #: libyaml's loader where PyYAML was built with it; ten times as fast.
 _SafeLoader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)

@@ -18,9 +18,9 @@ from backend.station.matching import match_profiles
 from drivers.doctor.diagnosis import Cause
 from drivers.doctor.trials import trials
 from drivers.errors import NotAllowed
-from drivers.link import Link
+from drivers.link import Found, Link
 from drivers.texts.message import language
-from profiles import load_profile
+from profiles import STANDARD, load_profile
 from profiles.schema import Profile as ProfileOf
 
 
@@ -74,9 +74,10 @@ async def _here(
     results = []
     # A station that was named and not found is examined all the same: that is the question.
     for number in sorted(found) if station is None else [station]:
-        known = match_profiles(link.kind, found[number]) if number in found else []
-        best = known[0].profile if known else None
-        chosen = load_profile(profile) if profile else best
+        chosen = load_profile(profile) if profile else _fitting(link.kind, found.get(number))
+        if chosen is None and station is None and found[number].is_other_device:
+            print_text("printed.no-drive", station=str(number))
+            continue
         if chosen is not None:
             link.attach(number, chosen)
         seen = await examined(link, number)
@@ -90,6 +91,15 @@ async def _here(
             result["trials"] = await tried(link, number, chosen, seen.causes)
         results.append(result)
     return results
+
+
+def _fitting(kind: str, found: Found | None) -> ProfileOf | None:
+    """The profile of what was found; of an unknown drive that of the standard, no maker's."""
+    known = match_profiles(kind, found) if found is not None else []
+    sure = (m for m in known if m.confidence != "possible")
+    standard = (m for m in known if m.profile.drive == STANDARD)
+    best = next(sure, None) or next(standard, None)
+    return None if best is None else best.profile
 
 
 async def tried(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -12,7 +13,7 @@ from typing import Annotated
 import typer
 from pydantic import ValidationError
 
-from backend.api.drive.models_scales import ScalesInfo
+from backend.api.drive.models_scales import ScalesInfo, SmallMoveResult
 from backend.axis import teaching
 from backend.axis.axis import Axis
 from backend.commands.options import Json, Place, Profile, Server, Station, Url, place
@@ -184,10 +185,10 @@ async def _teach_there(where: Place, increments: int, torque: float, cycle_ms: f
         path, ask = f"/drives/{drive.id}", increments
         while True:
             body = {"increments": ask, "torque_limit": torque, "cycle_ms": cycle_ms}
-            await at.result(f"{path}/jobs/small_move", body)
-            if (turned := _turned(ask)) is not None:
+            found = SmallMoveResult.model_validate(await at.result(f"{path}/jobs/small_move", body))
+            if (turned := _turned(found.moved_increments)) is not None:
                 break
-            ask *= 10
+            ask = _farther(ask, found.next_most)
         said = {"turned_rev": turned}
         _print_info(await at.ask("POST", f"{path}/scales/confirm", ScalesInfo, body=said))
 
@@ -205,15 +206,23 @@ async def _teach_here(
         ask = increments
         try:
             while True:
-                await small_move(axis, session, SmallMoveSettings(ask, torque), progress())
-                if (turned := _turned(ask)) is not None:
+                settings = SmallMoveSettings(ask, torque)
+                found = SmallMoveResult.model_validate(
+                    await small_move(axis, session, settings, progress())
+                )
+                if (turned := _turned(found.moved_increments)) is not None:
                     break
-                ask *= 10
+                ask = _farther(ask, found.next_most)
         finally:
             axis.session = None
             await session.stop()
         await _keep(axis, await teaching.confirmed(axis, turned), state)
         _print((await axis.units()).scales.all)
+
+
+def _farther(increments: int, most: int) -> int:
+    """Ten times as far the same way; a move may have arrived an increment short of that."""
+    return int(math.copysign(min(10 * abs(increments), most), increments))
 
 
 def _turned(increments: int) -> float | None:

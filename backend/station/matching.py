@@ -36,8 +36,10 @@ def match_profiles(kind: str, found: Found) -> list[Match]:
                 continue
             if identity.product_code is not None and identity.product_code == found.product_code:
                 matches.append(Match(profile, "certain", text("station.match-product")))
-            else:
+            elif not found.is_other_device:
                 matches.append(Match(profile, "likely", text("station.match-vendor")))
+            continue
+        if found.is_other_device:
             continue
         if any(re.search(p, found.name, re.IGNORECASE) for p in identity.name_patterns):
             why = text("station.match-name", name=found.name)

@@ -120,7 +120,15 @@ class Mix:
                 self.found(bench, f"{motion}: said to be unreachable, and it answers")
             return verdict
         if (verdict == "stopped") is not (rpm <= _STANDS_RPM):
-            self.found(bench, f"{motion}: {verdict!r} is said of a shaft at {rpm:.1f} rpm")
+            later = []
+            for _ in range(5):
+                await asyncio.sleep(0.02)
+                later.append(f"{bench.shaft_rpm:.1f}")
+            self.found(
+                bench,
+                f"{motion}: {verdict!r} is said of a shaft at {rpm:.1f} rpm, then "
+                f"{', '.join(later)}; {answers[0]['axes'][0]}",
+            )
         if verdict == "stopped":
             await asyncio.sleep(0.8)
             if bench.shaft_rpm > _STANDS_RPM:

@@ -62,6 +62,7 @@ def identify(channel: SdoChannel, answers: Sequence[bytes], timeout_s: float) ->
         hardware=shown(0x1009),
         firmware=shown(0x100A),
         notes=tuple(notes),
+        device_profile=None if device_type is None else device_type & 0xFFFF,
     )
 
 

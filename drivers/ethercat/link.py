@@ -406,6 +406,7 @@ def _found(item: Message) -> Found:
         firmware=item["firmware"],
         state=prose(item["state"]),
         notes=notes,
+        device_profile=item["device_profile"],
     )
 
 

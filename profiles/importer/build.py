@@ -10,7 +10,7 @@ from profiles.importer.description import DescribedEntry, Description
 from profiles.importer.esi import EsiDevice
 from profiles.importer.file_units import FileUnits
 from profiles.importer.report import ImportFailed, ImportReport
-from profiles.loader import load_profile
+from profiles.loader import STANDARD, load_profile
 from profiles.motion.classify import classified
 from profiles.schema import (
     INTEGER_RANGE,
@@ -26,8 +26,6 @@ from profiles.schema import (
     Profile,
     Watchdog,
 )
-
-GENERIC = "generic402"
 
 #: Objects of the axes of a device, each 800h behind the one before (CiA 402-1).
 _AXES = range(0x6000, 0xA000)
@@ -78,7 +76,7 @@ def build_profile(
     Raises:
         ImportFailed: nothing in it has a known type.
     """
-    base = generic or load_profile(GENERIC)
+    base = generic or load_profile(STANDARD)
     parameters: dict[str, Parameter] = {}
     units = FileUnits(description.entries)
     for entry in description.entries:

@@ -200,21 +200,17 @@ def send_commands(
                 ) from error
 
 
-def set_watchdog_divider(station: Station, rules: StationBringUp) -> Steps[None]:
-    """Write 0400h as the file gives it.
+def set_watchdog_divider(station: Station, divider: int) -> Steps[None]:
+    """Write 0400h.
 
     Raises:
         NotAllowed: it reads back as something else.
     """
-    if rules.watchdog_divider is None:
-        return
-    wanted = struct.pack("<H", rules.watchdog_divider)
+    wanted = struct.pack("<H", divider)
     yield Write(WATCHDOG_DIVIDER, wanted)
     if (yield from read_again(WATCHDOG_DIVIDER, 2)) != wanted:
         raise NotAllowed(
-            "ethercat.station-not-take-watchdog",
-            station=station.number,
-            watchdog_divider=rules.watchdog_divider,
+            "ethercat.station-not-take-watchdog", station=station.number, watchdog_divider=divider
         )
 
 

@@ -136,23 +136,13 @@ class Preparation:
             },
             "ethercat.doing-reading-values",
         )
-        probes = {
-            s.number: setup_.reads_whole(s)
-            for s in self._stations
-            if s.mailbox is not None and not (s.vendor_id or s.product_code)
-        }
-        whole = self._run("mailbox", probes, "ethercat.doing-complete-access")
-        entry_by_entry = [number for number, can in whole.items() if not can]
-        entry_by_entry += [
-            n for n, plan in self._setups.items() if plan.bring_up.complete_access is False
-        ]
         if total > IO_MAP_BYTES:
             self._segment.map(total)
         # An emergency that lies in a mailbox would make SOEM's mapping fail.
         drains = {s.number: s.box.drain() for s in self._stations if s.mailbox is not None}
         self._run("mailbox", drains, "ethercat.doing-emptying-mailboxes")
         self._announce_life("ethercat.doing-building-map")
-        self._segment.map(total, entry_by_entry)
+        self._segment.map(total)
         wrong = {n: p for n, p in self._setups.items() if not self._fits(n, p)}
         if not wrong:
             return initial

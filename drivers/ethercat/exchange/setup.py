@@ -31,6 +31,8 @@ from drivers.texts.message import text
 FMMU, SYNC_MANAGERS = 0x600, 0x800
 _FMMU_COUNT = 0x004
 WATCHDOG_DIVIDER, WATCHDOG_TIME = 0x400, 0x420
+_USUAL_DIVIDER = 0x09C2
+"""Steps of 100 µs, the value after power-on (ETG.1000.4 clause 6.3); some controllers hold 0."""
 _MANAGERS, _OUTPUTS, _SM_WATCHDOG = 4, 0x04, 0x40
 """Control byte of a sync manager (ETG.1000.4 clause 6.7): three buffers, written by the master."""
 
@@ -184,15 +186,6 @@ def _has_them_anyway(station: Station, assign: int, assigned: Assigned) -> Steps
     return True
 
 
-def reads_whole(station: Station) -> Steps[bool]:
-    """Whether the drive has complete access, asked with the object that SOEM begins with."""
-    try:
-        yield from coe.upload(station.box, 0x1C00, 0, complete=True)
-    except DriveError:
-        return False
-    return True
-
-
 def assigned_bytes(station: Station) -> Steps[int]:
     """Bytes of all process data that a slave has mapped by itself."""
     total = 0
@@ -246,16 +239,15 @@ def arm_watchdog(station: Station, setup: StationSetup) -> Steps[None]:
         NotAllowed: the slave does not take it. No axis may then be moved over this bus, because
             nothing would stop it when the computer dies.
     """
-    limit_ns = setup.bring_up.watchdog_limit_ns
+    limit_ns, of_file = setup.bring_up.watchdog_limit_ns, setup.bring_up.watchdog_divider
     milliseconds = min(setup.watchdog_ms, (limit_ns or 1 << 62) / 1e6)
-    yield from set_watchdog_divider(station, setup.bring_up)
-    divider = yield from read_again(WATCHDOG_DIVIDER, 2)
-    if divider is None:
-        raise ProtocolError("ethercat.station-not-answer-watchdog", station=station.number)
-    # ETG.1000.4 clause 6.3: unit is 40 ns times (divider + 2).
-    unit_ns = 40 * (int.from_bytes(divider, "little") + 2)
-    ticks = round(milliseconds * 1e6 / unit_ns)
-    if not 0 < ticks <= 0xFFFF:
+    if of_file is not None:
+        yield from set_watchdog_divider(station, of_file)
+    ticks = yield from _watchdog_ticks(station, milliseconds)
+    if ticks is None and of_file is None:
+        yield from set_watchdog_divider(station, _USUAL_DIVIDER)
+        ticks = yield from _watchdog_ticks(station, milliseconds)
+    if ticks is None:
         raise NotAllowed(
             "ethercat.watchdog-ms-not-fit", milliseconds_ms=milliseconds, station=station.number
         )
@@ -264,6 +256,16 @@ def arm_watchdog(station: Station, setup: StationSetup) -> Steps[None]:
     watched = yield from _watch_outputs()
     if reported != struct.pack("<H", ticks) or watched < bool(setup.rx.size):
         raise NotAllowed("ethercat.station-not-take-process", station=station.number)
+
+
+def _watchdog_ticks(station: Station, milliseconds: float) -> Steps[int | None]:
+    """Value of 0420h by the divider that the slave holds; None where no value is near enough."""
+    divider = yield from read_again(WATCHDOG_DIVIDER, 2)
+    if divider is None:
+        raise ProtocolError("ethercat.station-not-answer-watchdog", station=station.number)
+    # ETG.1000.4 clause 6.3: unit is 40 ns times (divider + 2).
+    ticks = round(milliseconds * 1e6 / (40 * (int.from_bytes(divider, "little") + 2)))
+    return ticks if 0 < ticks <= 0xFFFF else None
 
 
 def _watch_outputs() -> Steps[int]:

@@ -99,8 +99,13 @@ def _objects(station: Station, found: Message) -> Steps[None]:
             bits += sum(word & 0xFF for word in (yield from _list(station, pdo)) or ())
         found[name] = (bits + 7) // 8
     found["assigned"] = assigned
-    for key, subindex in (("vendor", 1), ("product", 2), ("revision", 3)):
-        found[key] = yield from _number(station, 0x1018, subindex)
+    # By the EEPROM, as a search recognises the drive; 1018h can be of another firmware.
+    for key, subindex, known in (
+        ("vendor", 1, station.vendor_id),
+        ("product", 2, station.product_code),
+        ("revision", 3, station.revision),
+    ):
+        found[key] = known or (yield from _number(station, 0x1018, subindex))
     found["drive_error"] = yield from _number(station, 0x603F, 0)
     counters = []
     for subindex in (0x0B, 0x0C, 0x20):

@@ -155,6 +155,7 @@ class Operations:
             "product_code": station.product_code, "revision": station.revision,
             "serial": station.serial, "name": station.name, "alias": station.alias,
             "hardware": station.hardware, "firmware": station.firmware,
+            "device_profile": station.device_profile,
             "state": state_name(station.al_state),
             "notes": [note.to_wire() for note in station.notes],
             "parent": parent, "parent_port": port, "dc": station.distributed_clock,

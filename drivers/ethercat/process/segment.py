@@ -20,7 +20,7 @@ import os
 import select
 import socket
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import pysoem
 
@@ -38,7 +38,9 @@ IO_MAP_BYTES = 4096
 MAX_STATIONS = 199
 _NAME_LIMIT = 15
 _EMERGENCY = "an emergency or another unexpected mail came in between"
-_FRAME_TIMEOUT_US = 2000
+_FRAME_TIMEOUT_US, _IDLE_FRAME_TIMEOUT_US = 2000, 10_000
+"""With and without process data. A mail is gone once it was read: a slave made of software, on a
+busy computer, may send the frame with it late."""
 _STALL_S = 0.1
 _MOST_STRAY = 64
 """Frames of something else that may come before the answer."""
@@ -203,10 +205,7 @@ class Segment:
         ear = self._ear
         if ear is None or self.socket_fd is None:
             return None
-        # Process data must not wait long for each of many frames that do not come back.
-        hurried = self.silent and not blocks(self.socket_fd)
-        patience_us = _FRAME_TIMEOUT_US if hurried else self.frame_timeout_us
-        deadline = time.monotonic() + patience_us * 1e-6
+        deadline = time.monotonic() + self._patience_us(self.socket_fd) * 1e-6
         scrap = memoryview(self._scrap)
         try:
             ear.send(sent, MSG_DONTWAIT)
@@ -226,6 +225,12 @@ class Segment:
             return None
         return None
 
+    def _patience_us(self, descriptor: int) -> int:
+        if blocks(descriptor):
+            return max(self.frame_timeout_us, _IDLE_FRAME_TIMEOUT_US)
+        # Process data must not wait long for each of many frames that do not come back.
+        return _FRAME_TIMEOUT_US if self.silent else self.frame_timeout_us
+
     def read(self, station: int, register: int, size: int) -> bytes | None:
         """Read a register of a slave, or None when it does not answer."""
         return self.exchange([(station, Read(register, size))])[0]
@@ -234,11 +239,12 @@ class Segment:
         """Write a register of a slave; False when it does not answer."""
         return self.exchange([(station, Write(register, data))])[0] is not None
 
-    def map(self, expected_bytes: int, entry_by_entry: Collection[int] = ()) -> None:
+    def map(self, expected_bytes: int) -> None:
         """Build the IO map from what the drives have mapped. States stay as they are.
 
         ``expected_bytes`` is the sum of all process data, checked before SOEM writes past the
-        end of its buffer. ``entry_by_entry`` are stations without complete access.
+        end of its buffer. SOEM reads the mapping entry by entry: slaves pack a whole object in
+        several ways, and SOEM takes one for granted.
 
         Raises:
             NotAllowed: more process data than the IO map holds, or no search came before.
@@ -256,9 +262,8 @@ class Segment:
         self._fresh = False
         self.forget_errors()
         self.master.manual_state_change = 1
-        for number in entry_by_entry:
-            # Another drive's EEPROM may have shown SOEM that this one has it.
-            self.slaves[number - 1]._disable_complete_access()  # noqa: SLF001 - its only name
+        for slave in self.slaves:
+            slave._disable_complete_access()  # noqa: SLF001 - its only name
         try:
             self.master.config_map()
         except pysoem.ConfigMapError as error:

@@ -17,6 +17,7 @@ from drivers.texts.message import Text, text
 
 AL_CONTROL, AL_STATUS = 0x120, 0x130
 _SYNC_MANAGERS, _NO_MAILBOXES = 0x800, 0x0016
+_SERVO = 402
 
 #: ETG.1020 clause 5.3.7.2: how long a slave may take for each state.
 STATE_TIMEOUT_S = {
@@ -57,6 +58,8 @@ class Station:
     """Layouts of whole objects that were found equal to single reads, with their lengths."""
     describes: bool = True
     """It has the SDO information service, as far as is known."""
+    device_profile: int | None = None
+    """Low word of 1000h; None where it was not read."""
     notes: list[Text] = field(default_factory=list)
     ports: esc.PortCounters | None = None
     wiring: esc.PortCounters | None = None
@@ -229,6 +232,12 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
         reported = yield from _try_read(station, 0x1018, 4)
         if reported is not None and len(reported) == 4:
             station.serial = int.from_bytes(reported, "little") or station.serial
+        device_type = yield from _try_read(station, 0x1000, 0)
+        if device_type is not None and len(device_type) == 4:
+            station.device_profile = int.from_bytes(device_type[:2], "little")
+            if station.device_profile != _SERVO:
+                note = text("ethercat.note-no-drive", device_profile=station.device_profile)
+                station.notes.append(note)
         for key, index in (("name", 0x1008), ("hardware", 0x1009), ("firmware", 0x100A)):
             data = yield from _try_read(station, index, 0)
             if data is not None:

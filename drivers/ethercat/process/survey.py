@@ -100,7 +100,7 @@ def exchange_from(status: Message) -> ExchangeFigures | None:
 
 
 def _station(item: Message, ports: PortCounters | None) -> SurveyedStation:
-    taken = {"hardware", "state", "dc", "notes"}
+    taken = {"hardware", "state", "dc", "notes", "device_profile"}
     return SurveyedStation(
         **{name: value for name, value in item.items() if name not in taken},
         distributed_clock=item["dc"],

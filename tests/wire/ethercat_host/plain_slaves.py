@@ -13,6 +13,8 @@ imports nothing of servodeck, and its slaves have the oddities that real ones ha
              no FMMUs, sync managers or PDOs. Its dictionary comes in fragments that end in the
              middle of a number, and with names longer than its mailbox
 ``fixed``    a servo whose PDOs can be assigned, and whose mapping can only be read
+``packed``   a servo whose watchdog divider is 0 at power-on, and which reads an object as a whole
+             with a subindex 0 of one byte, where SOEM awaits two
 ``hasty``    a servo whose sync managers the first search does not get to read, as when frames of
              the search are lost
 """
@@ -345,6 +347,27 @@ class Fixed(Servo):
     only_read = (0x1600, 0x1A00)
 
 
+class Packed(Servo):
+    product = 0x0405
+    body = Servo.body.replace(bytes([0, 0, 0, 1, 0, 0x01]), bytes([0, 0, 0, 1, 0, 0x21]), 1)
+
+    def __init__(self) -> None:
+        super().__init__()
+        struct.pack_into("<H", self.memory, 0x400, 0)
+
+    def mail(self, kind: int, payload: bytes) -> None:
+        command, index, _ = struct.unpack_from("<BHB", payload, 2)
+        whole = kind == 3 and payload[1] >> 4 == 2 and command & 0xF0 == 0x50
+        entries = sorted(sub for i, sub in self.objects if i == index)
+        if whole and entries:
+            self.upload(payload[3:6], b"".join(self.objects[index, sub] for sub in entries))
+        elif whole:
+            refusal = b"\x90" + payload[3:6] + struct.pack("<I", 0x06020000)
+            self.post(struct.pack("<H", 0x2000) + refusal)
+        else:
+            super().mail(kind, payload)
+
+
 class Hasty(Servo):
     product = 0x0403
     managers_at = 2 * 0x52  # behind the general category
@@ -368,7 +391,7 @@ class Hasty(Servo):
 
 
 KINDS = {"coupler": Coupler, "outputs": Outputs, "servo": Servo, "bare": Bare, "fixed": Fixed,
-         "hasty": Hasty}  # fmt: skip
+         "packed": Packed, "hasty": Hasty}  # fmt: skip
 
 
 def station(slave: Slave) -> int:

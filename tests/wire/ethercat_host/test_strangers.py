@@ -30,15 +30,20 @@ from tests.wire.ethercat_host.plain_slaves import LONG, Coupler, Servo, Slave, c
 from tests.wire.ethercat_host.servo_device import servo_profile
 
 HERE = Path(__file__).parent
-SERVO, BARE, FIXED = 3, 4, 5
+SERVO, BARE, FIXED, PACKED = 3, 4, 5, 6
 RECORD = [Address(0x2000, 0, "UINT8"), Address(0x2000, 1, "UINT16"), Address(0x2000, 2, "UINT16")]
 
 
 @pytest.fixture(scope="module")
 def wire(namespace: Namespace) -> Iterator[Namespace]:
-    """Coupler, digital outputs, and three servo drives behind them."""
+    """Coupler, digital outputs, and four servo drives behind them."""
     process = namespace.popen(
-        [sys.executable, str(HERE / "plain_slaves.py"), "ec0s", "coupler,outputs,servo,bare,fixed"],
+        [
+            sys.executable,
+            str(HERE / "plain_slaves.py"),
+            "ec0s",
+            "coupler,outputs,servo,bare,fixed,packed",
+        ],
         stdout=subprocess.PIPE,
     )
     assert process.stdout is not None
@@ -183,6 +188,26 @@ async def test_a_mapping_that_can_only_be_read_is_reported_and_left_assigned(bus
         assigned = [Address(0x1C12, 0, "UINT8"), Address(0x1C12, 1, "UINT16")]
         assert await bus.link.read_many(FIXED, assigned) == [b"\x01", b"\x00\x1a"]
         await bus.link.process_data.configure([position], [target], 0.004)  # what it has anyway
+    finally:
+        await bus.link.close()
+
+
+async def test_a_drive_with_another_complete_access_and_no_divider_is_taken_to_op(bus: Bus) -> None:
+    """So an independent slave stack is: no complete access of SOEM's kind, 0400h at 0."""
+    await bus.link.open()
+    cyclic = bus.link.process_data
+    try:
+        await bus.link.scan(lambda _s, _t: None)
+        bus.link.attach(PACKED, odd_profile())
+        await cyclic.configure(
+            [CyclicSignal(PACKED, Address(0x6064, 0, "INT32"), "position")],
+            [CyclicSignal(PACKED, Address(0x607A, 0, "INT32"), "target")],
+            0.004,
+        )
+        await cyclic.start()
+        await cyclic.drive_to(PACKED, State.OPERATION_ENABLED, Mode.CSP)
+        await until(lambda: cyclic.axis_state(PACKED)[0] == "Operation enabled", 30.0)
+        await cyclic.stop()
     finally:
         await bus.link.close()
 

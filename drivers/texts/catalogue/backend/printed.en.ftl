@@ -105,6 +105,7 @@ printed_profile-imported = { $title }: { $count } parameters, { $summary }
 printed_profile-of-drive-written = { $count } parameters written to { $file }; use it as { $name }
 printed_profile-written = written to { $file }; use it as { $name }
 printed_raw-per-unit = { $raw } per { $unit }  ({ $origin })
+printed_no-drive = station { $station }: no servo drive, left out
 printed_reaches-operational = station { $station }: reaches Operational
 printed_remedy = try:   { $remedy }
 printed_restored = { $name }: restored: { $key } = { $value }

@@ -102,6 +102,7 @@ printed_profile-imported = { $title }：{ $count } 个参数，{ $summary }
 printed_profile-of-drive-written = { $count } 个参数已写入 { $file }；使用时名称为 { $name }
 printed_profile-written = 已写入 { $file }；使用时名称为 { $name }
 printed_raw-per-unit = 每 { $unit } 为 { $raw }（{ $origin }）
+printed_no-drive = 站 { $station }：不是伺服驱动器，已跳过
 printed_reaches-operational = 站 { $station }：可进入 Operational 状态
 printed_remedy = 请尝试：{ $remedy }
 printed_restored = { $name }：已恢复：{ $key } = { $value }
