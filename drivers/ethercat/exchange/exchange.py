@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import array
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
@@ -78,6 +78,10 @@ class Exchange:
         """Above 0: the segment's time follows the frames, see `CyclicLoop`."""
         self.operational = False
         """All configured stations have reached OP and none was asked to leave it."""
+
+    def end_set_up_when(self, stop_waits: Callable[[], bool]) -> None:
+        """A set-up ends with an error once this is true: STOP is not kept waiting by it."""
+        self._preparation.stop_waits = stop_waits
 
     def prepare(self, stations: Sequence[Station]) -> None:
         """Identify all stations after a search, which leaves those that can in PREOP."""

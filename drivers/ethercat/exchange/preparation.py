@@ -53,6 +53,8 @@ class Preparation:
         self._ring = ring
         self._lanes = lanes
         self._report = report
+        self.stop_waits: Callable[[], bool] = lambda: False
+        """Whether a word that stops an axis has come meanwhile; the set-up ends for it."""
         self._stations: Sequence[Station] = ()
         self._setups: dict[int, StationSetup] = {}
         self._snapshots: dict[int, Snapshot] = {}
@@ -264,6 +266,10 @@ class Preparation:
                 late = LinkTimeout("ethercat.takes-longer", doing=text(doing), setup_s=_SETUP_S)
                 self._lanes.drop(late.text)
                 raise late
+            if self.stop_waits():
+                stopped = NotAllowed("ethercat.stop-ended-set-up")
+                self._lanes.drop(stopped.text)
+                raise stopped
             if not self._lanes.step():
                 time.sleep(0.0002)
         for number, error in errors.items():

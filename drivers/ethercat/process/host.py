@@ -18,6 +18,7 @@ import socket
 import struct
 import sys
 import time
+from collections import deque
 
 from drivers.computer import realtime, signals
 from drivers.computer.processes import end_within
@@ -47,10 +48,12 @@ class Host:
         control.setblocking(False)
         self._unpacker = protocol.Unpacker()
         self._outgoing = bytearray()
+        self._incoming: deque[Message] = deque()
         self._ring = ring
         self._orphaned = False
         self._next_status = 0.0
         self.operations = Operations(interface, ring, self.send)
+        self.operations.roster.exchange.end_set_up_when(self._stop_waits)
 
     def run(self, granted: realtime.RealTime) -> None:
         """Until the server goes away."""
@@ -105,6 +108,15 @@ class Host:
     def _commands(self, timeout_s: float) -> None:
         if timeout_s > 0 and not select.select((self._control,), (), (), timeout_s)[0]:
             return
+        self._receive()
+        while self._incoming:
+            self._handle(self._incoming.popleft())
+
+    def _stop_waits(self) -> bool:
+        self._receive()
+        return any(self.operations.stops(message) for message in self._incoming)
+
+    def _receive(self) -> None:
         try:
             data = self._control.recv(1 << 16)
         except BlockingIOError:
@@ -114,8 +126,7 @@ class Host:
         if not data:
             self._orphaned = True
             return
-        for message in self._unpacker.feed(data):
-            self._handle(message)
+        self._incoming.extend(self._unpacker.feed(data))
 
     def _handle(self, message: Message) -> None:
         number = message["id"]

@@ -31,7 +31,7 @@ from drivers.ethercat.wire.lanes import Done, Lanes, Urgency
 from drivers.halt import HaltCause, Halted
 from drivers.texts.message import Text, text
 
-_CONTROL_WORD = 0x6040
+_CONTROL_WORD = (0x6040, 0)
 _MAX_STEPS_PER_CYCLE = 16
 _STARVED_CYCLES = 8
 _NS_PER_BYTE = 80
@@ -91,6 +91,12 @@ class Operations:
         if not self.roster.is_open:
             raise LinkLost("ethercat.interface-gone", interface=self.segment.interface)
         handler(message, done)
+
+    @staticmethod
+    def stops(message: Message) -> bool:
+        """Whether it writes a control word that takes the power or the speed of an axis."""
+        place = message["op"], message.get("index"), message.get("subindex")
+        return place == ("write", *_CONTROL_WORD) and cia402.stops(_word(message["data"]))
 
     def use_spare_time(self) -> None:
         """Mailbox frames between two cycles; now and then one although there is no time."""
@@ -196,9 +202,9 @@ class Operations:
         if self.roster.exchange.route_write(station.number, index, subindex, data):
             done(None, None)
             return
-        if (index, subindex) == (_CONTROL_WORD, 0):
+        if (index, subindex) == _CONTROL_WORD:
             self.roster.commanded(station.number, _word(data))
-        if (index, subindex) == (_CONTROL_WORD, 0) and cia402.stops(_word(data)):
+        if self.stops(message):
             station.box.stopping = True
             steps = coe.stop_write(station.box, index, subindex, data)
             self.lanes.submit(station.number, "mailbox", steps, done, Urgency.STOP)

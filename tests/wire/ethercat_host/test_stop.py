@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import struct
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -17,7 +18,7 @@ from drivers.ethercat.wire.frames import Request
 from drivers.ethercat.wire.lanes import GRACE_S, Lanes, Urgency
 from drivers.ethercat.wire.reading import read_items
 from drivers.ethercat.wire.steps import Read, Write
-from drivers.link import Address
+from drivers.link import Address, CyclicSignal
 from tests.support.machine import OwnTime
 from tests.wire.ethercat_host.conftest import Rig, until
 from tests.wire.ethercat_host.scripted import OUT, ScriptedSlave
@@ -252,3 +253,24 @@ async def test_on_a_real_wire_a_stop_does_not_wait_behind_reads(rig: Rig) -> Non
         await asyncio.gather(*reading)
         await bus.link.write(1, control, QUICK_STOP)
         await until(lambda: rig.do("read", slave=0, index=0x6040) == "0200", 30.0)
+
+
+async def test_a_stop_does_not_wait_for_the_set_up_of_an_exchange(rig: Rig) -> None:
+    """Nothing of ours moves meanwhile, but somebody else may turn the axis."""
+    async with rig.link() as bus:
+        signals = [CyclicSignal(1, Address(0x6064, 0, "INT32"), "position")]
+        targets = [CyclicSignal(1, Address(0x607A, 0, "INT32"), "target")]
+        rig.do("timing", al_s=0.002, sdo_s=0.1, eeprom_read_s=5e-5)
+        set_up = asyncio.create_task(
+            bus.link.process_data.configure(signals, targets, 0.001), name="set-up"
+        )
+        await asyncio.sleep(0.5)
+        assert not set_up.done()
+        began = time.monotonic()
+        await bus.link.write(1, Address(0x6040, 0, "UINT16"), QUICK_STOP)
+        assert time.monotonic() - began < 0.4, "one answer of the slave, and that of the set-up"
+        with pytest.raises(NotAllowed, match="an axis is being stopped"):
+            await set_up
+        rig.do("timing", al_s=0.002, sdo_s=0.0003, eeprom_read_s=5e-5)
+        assert rig.truth(0, 0x6040) == 2
+        await bus.link.process_data.configure(signals, targets, 0.001)
