@@ -23,7 +23,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 #: A reading of fewer bytes costs less than the start of a process.
-SMALL_BYTES = 64 << 10
+SMALL_BYTES = 256 << 10
 #: The longest reading, and the address space that it may use.
 LIMIT_S = 60.0
 LIMIT_MIB = 768
