@@ -13,7 +13,7 @@ import os
 import pickle
 import sys
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 from drivers.computer.processes import limit_memory, yield_processor
 from drivers.errors import NotAllowed
@@ -53,13 +53,14 @@ async def read_apart(
     async with _at_once.setdefault(loop, asyncio.Semaphore(AT_ONCE)):
         task = await asyncio.to_thread(pickle.dumps, (work, arguments, named))
         out = await _answered(task)
+    result: T
     try:
         result, error = await asyncio.to_thread(_loaded, out)
     except (EOFError, pickle.UnpicklingError):
         raise ReadingEnded("work.reading-memory", limit=limits.size(LIMIT_MIB << 20)) from None
     if error is not None:
         raise error
-    return result  # type: ignore[no-any-return]
+    return result
 
 
 async def _answered(task: bytes) -> bytes:
@@ -83,7 +84,7 @@ async def _answered(task: bytes) -> bytes:
             await asyncio.shield(process.wait())
 
 
-def _loaded(out: bytes) -> tuple[object, Exception | None]:
+def _loaded(out: bytes) -> tuple[Any, Exception | None]:
     result, error = pickle.loads(out)  # noqa: S301 - from our own child
     return result, error
 
