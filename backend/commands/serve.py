@@ -7,6 +7,7 @@ import contextlib
 import importlib
 import socket
 import ssl
+import sys
 import webbrowser
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
@@ -159,6 +160,11 @@ def _known_by_name(
     return announced(box, addresses, port, failed)
 
 
+#: After this time [s] a thread that computes lets the event loop go on. STOP asks for its turn some
+#: twenty times on its way, and a thread that reads a file holds it up each time (Python: 5 ms).
+_SWITCH_S = 0.0005
+
+
 async def settle() -> None:
     """What a first request would wait for otherwise, and every later one again and again."""
     # One that cannot be read is reported where it is asked for, and keeps no server from its work.
@@ -166,6 +172,7 @@ async def settle() -> None:
         await asyncio.to_thread(load_all)
     await asyncio.to_thread(_load_late)
     scheduling.spare_collector()
+    sys.setswitchinterval(_SWITCH_S)
 
 
 def _load_late() -> None:

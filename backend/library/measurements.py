@@ -32,7 +32,9 @@ SUFFIX = ".sdmeas"
 VERSION = 1
 #: Unpacked size that no measurement reaches; more is a file made to exhaust the memory.
 _MAX_UNPACKED = 1024 * 1024 * 1024
-_MAX_HEAD = 64 * 1024 * 1024
+#: Of the JSON of one file. Those of our tools have some ten KiB, with curves of thousands of points
+#: 1 MiB; a decoder of JSON lets no other thread run until it has ended (20 ms a MiB).
+_MAX_HEAD = 4 * 1024 * 1024
 Arrays = dict[str, npt.NDArray[np.generic]]
 
 
@@ -150,6 +152,7 @@ def unpack(data: bytes, name: str = "the file") -> Measurement:
     with _reported(name), zipfile.ZipFile(io.BytesIO(data)) as archive:
         if sum(each.file_size for each in archive.infolist()) > _MAX_UNPACKED:
             raise ValueError("it is larger than any measurement")
+        _require_small_head(archive)
         arrays: Arrays = {}
         for member in archive.namelist():
             values = np.load(io.BytesIO(archive.read(member)), allow_pickle=False)
@@ -166,10 +169,14 @@ def unpack_head(file: Path) -> Head:
         BadMeasurement: as `unpack`; damage in the signals is not seen.
     """
     with _reported(file.name), zipfile.ZipFile(file) as archive:
-        if archive.getinfo("meta.npy").file_size > _MAX_HEAD:
-            raise ValueError("it is larger than any measurement")
+        _require_small_head(archive)
         values = np.load(io.BytesIO(archive.read("meta.npy")), allow_pickle=False)
         return _head(values, file.name)
+
+
+def _require_small_head(archive: zipfile.ZipFile) -> None:
+    if archive.getinfo("meta.npy").file_size > _MAX_HEAD:
+        raise ValueError("it is larger than any measurement")
 
 
 def _head(text: npt.NDArray[np.generic], name: str) -> Head:

@@ -12,6 +12,9 @@ from drivers.link import Found
 from profiles.importer import is_dcf, read_dcf_identity
 from profiles.schema import Profile
 
+#: Problems of a list that its notes name at the most; the answer has the first 200 as well.
+_NOTED = 200
+
 
 def import_list(
     data: bytes, profile: Profile, name: str, saved: datetime
@@ -31,7 +34,9 @@ def import_list(
             source.found = Found(0, vendor_id=vendor, product_code=product)
     else:
         found = read_csv(data, profile, name)
-    notes = "\n".join(("imported from a list", *map(str, found.problems)))[:4000]
+    # Words are slow to make, and the notes hold no more than the first ones.
+    problems = map(str, found.problems[:_NOTED])
+    notes = "\n".join(("imported from a list", *problems))[:4000]
     return dump(source, found.readings, author="", notes=notes, saved=saved), found
 
 

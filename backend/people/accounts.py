@@ -95,7 +95,8 @@ class Accounts:
         """
         known = self._known(name, device)
         self._budgets.require(name, address, known)
-        async with self._turns.turn(known or address_group(address), known=bool(known)):
+        place, wrong = known or address_group(address), self._budgets.wrong_tries_of(address)
+        async with self._turns.turn(place, known=bool(known), wrong=wrong):
             async with self._changing:
                 await self._load()
             known = self._known(name, device)

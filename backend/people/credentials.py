@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import hmac
+import re
 import secrets
 import unicodedata
 
@@ -12,6 +13,14 @@ from drivers.texts.message import text
 
 #: Letters and digits that are not mistaken for one another when read aloud or copied by hand.
 _CLEAR = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"
+
+#: Signs that show nothing (Default_Ignorable_Code_Point, Unicode Standard 15.0
+#: DerivedCoreProperties.txt): with them one name could be written in any number of ways.
+_IGNORABLE = re.compile(
+    "[\u00ad\u034f\u061c\u115f\u1160\u17b4\u17b5\u180b-\u180f\u200b-\u200f\u202a-\u202e"
+    "\u2060-\u206f\u3164\ufe00-\ufe0f\ufeff\uffa0\ufff0-\ufff8"
+    "\U0001bca0-\U0001bca3\U0001d173-\U0001d17a\U000e0000-\U000e0fff]"
+)
 
 
 def new_secret(prefix: str = "") -> str:
@@ -47,10 +56,10 @@ def same_code(given: str, code: str) -> bool:
 def name_key(name: str) -> str:
     """What a name is counted and looked up by: names that look the same are the same.
 
-    Compatibility forms, case and white space around and between words make no difference
-    (Unicode's NFKC_Casefold, Unicode Standard 3.13 D147, which is stable under itself).
+    Compatibility forms, case, signs without a shape and white space around and between words make
+    no difference (NFKC_Casefold, Unicode Standard 3.13 D147, which is stable under itself).
     """
-    text = unicodedata.normalize("NFD", name)
+    text = unicodedata.normalize("NFD", _IGNORABLE.sub("", name))
     for _ in range(2):
         text = unicodedata.normalize("NFKC", text.casefold())
     return " ".join(text.split())

@@ -65,7 +65,7 @@ async def import_in_process(task: ImportTask, limit_s: float = LIMIT_S) -> dict[
     )
     try:
         async with asyncio.timeout(limit_s):
-            out, said = await process.communicate(pickle.dumps(task))
+            out, said = await process.communicate(await asyncio.to_thread(pickle.dumps, task))
     except TimeoutError:
         raise BadRecording(
             "import.evaluation-ended-after",
@@ -79,7 +79,7 @@ async def import_in_process(task: ImportTask, limit_s: float = LIMIT_S) -> dict[
                 process.kill()
             await asyncio.shield(process.wait())
     try:
-        answer: dict[str, Any] = json.loads(out)
+        answer: dict[str, Any] = await asyncio.to_thread(json.loads, out)
     except ValueError:
         last = said.decode("utf-8", "replace").strip().splitlines()[-1:] or ["it said nothing"]
         raise BadRecording(

@@ -29,6 +29,9 @@ from profiles.loader import user_folder
 IMPORT_LIMIT_S = 120.0
 #: Address space of an import: a description of 4 MiB takes 90 MiB, and 32 MiB is the largest one.
 IMPORT_LIMIT_MIB = 768
+#: Imports at once, whoever asks: each may use a processor and that memory.
+IMPORTS_AT_ONCE = 2
+_at_once: dict[asyncio.AbstractEventLoop, asyncio.Semaphore] = {}
 #: Object 1021h "Store EDS" and 1022h, its format; 0 is plain text (CiA 301 clause 7.5.2.19).
 _STORED_EDS = Address(0x1021, 0, "OCTETS")
 _STORED_FORMAT = Address(0x1022, 0, "UINT16")
@@ -57,6 +60,12 @@ async def import_in_process(
         BadDescription: nothing usable in it, the name is in use, or it takes too long or more
             memory than an import may use.
     """
+    loop = asyncio.get_running_loop()
+    async with _at_once.setdefault(loop, asyncio.Semaphore(IMPORTS_AT_ONCE)):
+        return await _imported_apart(task, limit_s, limit_mib)
+
+
+async def _imported_apart(task: Work, limit_s: float, limit_mib: int) -> dict[str, Any]:
     process = await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",
@@ -68,7 +77,7 @@ async def import_in_process(
     )
     try:
         async with asyncio.timeout(limit_s):
-            out, said = await process.communicate(pickle.dumps(task))
+            out, said = await process.communicate(await asyncio.to_thread(pickle.dumps, task))
     except TimeoutError:
         raise BadDescription("station.import-ended-after", limit_s=limit_s) from None
     finally:
@@ -77,7 +86,7 @@ async def import_in_process(
                 process.kill()
             await asyncio.shield(process.wait())
     try:
-        answer: dict[str, Any] = json.loads(out)
+        answer: dict[str, Any] = await asyncio.to_thread(json.loads, out)
     except ValueError:
         last = said.decode("utf-8", "replace").strip().splitlines()[-1:] or ["it said nothing"]
         raise BadDescription(

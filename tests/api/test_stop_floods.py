@@ -1,4 +1,4 @@
-"""STOP is served within 100 ms while connections, log-ins, jobs or bodies flood the server.
+"""STOP is served within 100 ms while connections, log-ins, jobs, bodies or files flood the server.
 
 The figures of one run stand in docs/security.md; ``SERVODECK_PRINT_FIGURES=1`` prints those of
 this one.
@@ -26,7 +26,7 @@ from backend.people.rights import Role
 from tests.support import flood
 from tests.support.guarded import Caller, GuardedServer
 
-KINDS = ["none", "idle", "logins", "jobs", "bodies", "requests"]
+KINDS = ["none", "idle", "logins", "jobs", "bodies", "requests", "files"]
 STOPS, P99_S = 200, 0.1
 
 

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import io
 import json
 import socket
 import sys
 import time
+import zipfile
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
@@ -130,6 +132,42 @@ class Flood:
 
         await asyncio.gather(*(one() for _ in range(8)))
 
+    async def files(self) -> None:
+        """Large files of somebody who may, one after the other: what takes long to read."""
+        rows = b"index;subindex;value\n" + b"0x6083;0;100\n" * 300_000
+        uploads = [
+            ("POST", "/measurements?name=a.sdmeas", _measurement_with_long_head()),
+            ("POST", "/drives/x/handover/compare?file=a.csv", rows * 2),
+            ("POST", "/sets/list?profile=mms7&file=b.toml&overwrite=true", rows),
+            (
+                "PUT",
+                "/sets/a.toml?overwrite=true",
+                b"".join(map(b"k%d = [1]\n".__mod__, range(250_000))),
+            ),
+            ("POST", "/scope/snapshots/a", b"SDSCOPE1" + b"\xff" * (30 << 20)),
+        ]
+
+        async def one(upload: tuple[str, str, bytes]) -> None:
+            while True:
+                await self.ask(self.request(*upload, known=True))
+
+        self.ready.set()
+        await asyncio.gather(*map(one, uploads))
+
+
+def _measurement_with_long_head() -> bytes:
+    """A file whose JSON about itself has 20 MB, in the form of numpy (NEP 1) inside a zip."""
+    text = b'{"version":1,"kind":"sweep","drive":"x","saved":"2026-01-01T00:00:00+00:00","pad":['
+    text += b'["abc"],' * 2_500_000 + b"0]}"
+    head = b"{'descr':'|u1','fortran_order':False,'shape':(%d,),}" % len(text)
+    head += b" " * (118 - len(head) - 1) + b"\n"
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        archive.writestr(
+            "meta.npy", b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head + text
+        )
+    return out.getvalue()
+
 
 def stops(port: int, head: str) -> None:
     """STOP by a connection of its own for each line of the standard input.
@@ -163,6 +201,7 @@ async def main(kind: str, port: int, head: str) -> None:
         "jobs": flood.jobs,
         "bodies": flood.bodies,
         "requests": flood.requests,
+        "files": flood.files,
     }
     running = asyncio.ensure_future(kinds[kind]())
     await asyncio.wait_for(flood.ready.wait(), 30)

@@ -16,6 +16,9 @@ from backend.people.throttle import Bucket
 
 #: Requests under way at once: all but STOP, those of nobody known, and of these from one address.
 MOST_REQUESTS, MOST_OF_STRANGERS, MOST_OF_PLACE = 400, 200, 40
+#: More requests of nobody known, only for addresses from which none is under way: a few addresses
+#: that keep theirs under way do not shut out all others.
+MOST_FIRST_OF_PLACES = 100
 #: Requests that begin in one turn of the event loop; a turn with nothing else to do is short.
 PER_TURN = 1
 #: Requests of nobody known from one address: so many at once, and a second.
@@ -106,8 +109,9 @@ class Admission:
         place = "" if known else address_group(address)
         if self._running >= MOST_REQUESTS:
             raise TooOften("api-admission.too-many-requests-run", 1.0)
+        most = MOST_OF_STRANGERS + (0 if self._strangers[place] else MOST_FIRST_OF_PLACES)
         if not known and (
-            self._strangers[place] >= MOST_OF_PLACE or self._strangers.total() >= MOST_OF_STRANGERS
+            self._strangers[place] >= MOST_OF_PLACE or self._strangers.total() >= most
         ):
             raise TooOften("api-admission.too-many-requests-without-login", 1.0)
         self._running += 1

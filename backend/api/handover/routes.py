@@ -46,6 +46,7 @@ from backend.parameters.set_file import BadSet, ParameterSet
 from backend.people.identity import acting_person
 from backend.station.bench import Bench
 from backend.station.description import import_in_process
+from backend.work.apart import read_apart
 from drivers.errors import NotAllowed
 from drivers.texts.message import language, text
 from profiles.importer.esi_controller import ControllersTask
@@ -220,7 +221,7 @@ async def compare_handover(
         data += chunk
         if len(data) > MAX_BYTES:
             raise BadSet("api-handover.larger-bytes", file=file, max_bytes=MAX_BYTES)
-    listed = await asyncio.to_thread(read_list, bytes(data), drive.profile, file, slave)
+    listed = await read_apart(len(data), read_list, bytes(data), drive.profile, file, slave)
     content = None if set_file is None else await _set(bench, drive, set_file, version)
     ours = None if content is None else _raws(content)
     now = await _now(drive, {write.key for write in listed.writes})

@@ -88,7 +88,7 @@ async def save_scope_snapshot(store: TheStore, name: str, request: Request) -> S
                 limit=f"{MAX_SNAPSHOT_BYTES >> 20} MiB",
             )
     content = bytes(data)
-    header = snapshot_header(content, name)
+    header = await asyncio.to_thread(snapshot_header, content, name)
     try:
         SnapshotHeader.model_validate(header)
     except ValidationError as error:

@@ -13,6 +13,7 @@ from backend.api.errors import NotFound
 from backend.api.station.models_description import ImportedList
 from backend.parameters.lists import export_list, import_list
 from backend.parameters.set_file import MAX_BYTES, BadSet
+from backend.work.apart import read_apart
 from drivers.errors import NotAllowed
 from drivers.texts.message import language, reason_of, text
 from profiles import load_profile
@@ -54,7 +55,7 @@ async def export_set(
     stem = file.removesuffix(".sdset").encode("ascii", "replace").decode().replace("?", "_")
     name = f"{stem}.{kind}"
     return Response(
-        export_list(content, profile, name, datetime.now()),
+        await asyncio.to_thread(export_list, content, profile, name, datetime.now()),
         media_type=_MEDIA[kind],
         headers={"Content-Disposition": f'attachment; filename="{name}"'},
     )
@@ -86,9 +87,8 @@ async def store_list(
         data += chunk
         if len(data) > MAX_BYTES:
             raise BadSet("api-sets.larger-bytes", file=file, max_bytes=MAX_BYTES)
-    # On a thread: STOP of others does not wait while a large list is read.
-    content, found = await asyncio.to_thread(
-        import_list, bytes(data), _family(profile), file, datetime.now(UTC)
+    content, found = await read_apart(
+        len(data), import_list, bytes(data), _family(profile), file, datetime.now(UTC)
     )
     stored = await bench.records.store.call(bench.sets.store, file, content, overwrite=overwrite)
     line = text("journal.set-imported", file=stored, count=len(found.readings))

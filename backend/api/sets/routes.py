@@ -23,6 +23,7 @@ from backend.parameters.set_file import MAX_BYTES, BadSet, ParameterSet, Row
 from backend.people.identity import acting_person
 from backend.station.bench import Bench
 from backend.tools import parameters
+from backend.work.apart import SMALL_BYTES, read_apart
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import Text, text
 
@@ -101,6 +102,9 @@ async def upload_set(
         data += chunk
         if len(data) > MAX_BYTES:
             raise BadSet("api-sets.larger-bytes", file=file, max_bytes=MAX_BYTES)
+    if len(data) > SMALL_BYTES:
+        # What is no set is refused before a thread of this process reads it.
+        await read_apart(len(data), parameter_set.parse, bytes(data), file)
     store = bench.records.store
     name = await store.call(bench.sets.store, file, bytes(data), overwrite=overwrite)
     return await _info(bench, name)

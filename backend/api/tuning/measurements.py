@@ -138,7 +138,7 @@ async def upload_measurement(
         )
     whole = name.removesuffix(SUFFIX) + SUFFIX
     stored = await asyncio.to_thread(bench.measurements.store, whole, data)
-    return info_of(stored, bench.measurements.head(stored))
+    return info_of(stored, await asyncio.to_thread(bench.measurements.head, stored))
 
 
 @router.post("/measurements/{name}/signature")

@@ -56,16 +56,15 @@ async def import_recording(
         current_bandwidth_hz=query.current_bandwidth_hz, loop_delay_s=query.loop_delay_s,
     )  # fmt: skip
     found = await _run(ImportTask(await request.body(), name, settings))
-    data = base64.b64decode(str(found["packed"]))
-    stored = await asyncio.to_thread(_store, bench, name, data)
-    return info_of(stored, bench.measurements.head(stored))
+    stored = await asyncio.to_thread(_store, bench, name, str(found["packed"]))
+    return info_of(stored, await asyncio.to_thread(bench.measurements.head, stored))
 
 
-def _store(bench: TheBench, name: str, data: bytes) -> str:
+def _store(bench: TheBench, name: str, packed: str) -> str:
     """Under the time and a plain form of the file's name; never over another file."""
     stem = re.sub(r"[^\w-]+", "-", PurePath(name.replace("\\", "/")).name.split(".")[0])[:40]
     begin = f"{datetime.now(UTC):%Y%m%d-%H%M%S}-imported-{stem.strip('-') or 'recording'}"
     whole, number = begin + SUFFIX, 2
     while bench.measurements.path(whole).exists():
         whole, number = f"{begin}-{number}{SUFFIX}", number + 1
-    return bench.measurements.store(whole, data)
+    return bench.measurements.store(whole, base64.b64decode(packed))

@@ -111,4 +111,5 @@ def _seen(drive: Drive, key: str | None) -> int | None:
     reading = drive.readings.get(key or "")
     if reading is None or not isinstance(reading.raw, int) or reading.time is None:
         return None
-    return reading.raw if time.time() - reading.time < _SEEN_S else None
+    # Where the clock was set back since, its age is not known.
+    return reading.raw if 0.0 <= time.time() - reading.time < _SEEN_S else None

@@ -55,6 +55,10 @@ class LoginBudgets:
         crowded = max(self._names.failures(key), self._addresses.failures(place)) > CROWDED
         self._pairs.failed(_pair(name, address), free_tries=FREE_IN_CROWD if crowded else None)
 
+    def wrong_tries_of(self, address: str) -> int:
+        """Wrong tries of an address within the last hour; 0 behind a proxy on this machine."""
+        return self._addresses.failures(address_group(address))
+
     def succeeded(self, name: str, address: str, device: str = "") -> None:
         """It was right; the wrong tries before are forgotten."""
         self._pairs.succeeded(_pair(name, address, device))

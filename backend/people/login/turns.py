@@ -2,9 +2,10 @@
 
 A hash costs a tenth of a second of a core on purpose, and more than one at a time would keep the
 cores from what moves. So turns are given in a fixed order: first to those who are known (a browser
-that has logged in before, somebody who changes their password), then to the addresses of everybody
-else in rotation. Of one address the newest has the turn and the oldest goes away with "try again",
-so that a crowd of guesses in front does not keep back the one that comes after it.
+that has logged in before, somebody who changes their password), then to everybody else's address
+with the fewest wrong tries, and between equal ones in rotation: those who guess go behind those
+who have not been wrong. Of one address the newest has the turn and the oldest goes away with "try
+again", so that a crowd of guesses in front does not keep back the one that comes after it.
 """
 
 from __future__ import annotations
@@ -28,25 +29,34 @@ class _Lane:
 
     def __init__(self) -> None:
         self._places: OrderedDict[str, deque[Waiting]] = OrderedDict()
+        self._wrong: dict[str, int] = {}
 
-    def join(self, place: str) -> Waiting:
-        """Wait for a turn.
+    def join(self, place: str, wrong: int) -> Waiting:
+        """Wait for a turn; ``wrong`` counts the wrong tries of this place.
 
         Raises:
-            TooOften: too many places wait already.
+            TooOften: too many places wait already that were not wrong more often.
         """
         waiting = self._places.get(place)
         if waiting is None:
-            if len(self._places) >= MOST_PLACES:
-                raise TooOften("people.too-many-log-ins", _RETRY_S)
+            self._make_room(wrong)
             waiting = self._places[place] = deque()
+        self._wrong[place] = wrong
         if len(waiting) >= MOST_OF_PLACE:
-            oldest = waiting.popleft()
-            if not oldest.done():
-                oldest.set_exception(TooOften("people.too-many-log-ins", _RETRY_S))
+            _refuse(waiting.popleft())
         mine: Waiting = asyncio.get_running_loop().create_future()
         waiting.append(mine)
         return mine
+
+    def _make_room(self, wrong: int) -> None:
+        if len(self._places) < MOST_PLACES:
+            return
+        worst = max(self._places, key=self._wrong.__getitem__)
+        if self._wrong[worst] <= wrong:
+            raise TooOften("people.too-many-log-ins", _RETRY_S)
+        del self._wrong[worst]
+        for each in self._places.pop(worst):
+            _refuse(each)
 
     def leave(self, place: str, mine: Waiting) -> None:
         """Wait no longer."""
@@ -54,18 +64,26 @@ class _Lane:
         if waiting is not None and mine in waiting:
             waiting.remove(mine)
             if not waiting:
-                del self._places[place]
+                del self._places[place], self._wrong[place]
 
     def next(self) -> Waiting | None:
         """The newest of the place whose turn it is; None where nobody waits."""
         while self._places:
-            place, waiting = self._places.popitem(last=False)
+            place = min(self._places, key=self._wrong.__getitem__)  # of equal ones the first
+            waiting = self._places.pop(place)
             mine = waiting.pop()
             if waiting:
                 self._places[place] = waiting
+            else:
+                del self._wrong[place]
             if not mine.done():
                 return mine
         return None
+
+
+def _refuse(waiting: Waiting) -> None:
+    if not waiting.done():
+        waiting.set_exception(TooOften("people.too-many-log-ins", _RETRY_S))
 
 
 class HashTurns:
@@ -76,15 +94,17 @@ class HashTurns:
         self._known, self._strangers = _Lane(), _Lane()
 
     @asynccontextmanager
-    async def turn(self, place: str, *, known: bool) -> AsyncIterator[None]:
+    async def turn(self, place: str, *, known: bool, wrong: int = 0) -> AsyncIterator[None]:
         """Wait for a turn and have it. ``place`` is an address, or a browser or session.
+
+        ``wrong`` counts its wrong tries.
 
         Raises:
             TooOften: others of the same place came after, or too many places wait.
         """
         if self._busy:
             lane = self._known if known else self._strangers
-            mine = lane.join(place)
+            mine = lane.join(place, wrong)
             try:
                 await mine
             except asyncio.CancelledError:

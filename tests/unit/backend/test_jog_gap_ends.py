@@ -8,17 +8,21 @@ from __future__ import annotations
 
 import asyncio
 import tempfile
+import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
 
+from backend.api.live.jog import Jogs
+from backend.api.live.messages import JogRenew, JogStart
 from backend.people.identity import LOCAL, Actor, acting
 from backend.station.bench import Bench
 from backend.tools.jog.run import Hold, JogSettings, jog
 from backend.work.jobs import Job, JobResult, Progress
 from benchmarks.stopping.clock import run_simulated
+from drivers.errors import Busy
 from drivers.texts.message import text
 from tests.support.servo import CONTROL, STATUS, TARGET, Servo, bench_with
 
@@ -35,6 +39,15 @@ class Jogged:
     servo: Servo
     hold: Hold
     job: Job
+    patch: pytest.MonkeyPatch
+
+    async def end_the_grant(self) -> None:
+        """The grant has ended, and other work has one for the axis before the signs are back."""
+        self.bench.authority.end_motion("x", text("motion.session-is-over"))
+        grant = self.bench.authority.standing(
+            "x", "another motion", lasts_s=60.0, ended=lambda _why: None
+        )
+        asyncio.get_running_loop().call_later(1.0, self.bench.authority.end, grant)
 
     async def nothing(self) -> None:
         """The page was busy, and no more."""
@@ -54,6 +67,18 @@ class Jogged:
     async def release(self) -> None:
         """The button was let go."""
         self.hold.release("released", 1)
+
+    async def set_the_clock(self) -> None:
+        """The computer's clock was set forward by an hour."""
+        self._set_the_clock(3600.0)
+
+    async def set_the_clock_back(self) -> None:
+        """The same the other way."""
+        self._set_the_clock(-3600.0)
+
+    def _set_the_clock(self, by_s: float) -> None:
+        now = time.time
+        self.patch.setattr(time, "time", lambda: now() + by_s)
 
     async def lose_power_elsewhere(self) -> None:
         """Another program took the power off."""
@@ -91,8 +116,9 @@ def after_gap(happens: Callable[[Jogged], Awaitable[None]]) -> tuple[list[int], 
             await asyncio.sleep(HAPPENS_S)
             assert servo.words()[-1] & HALT, "the gap has braked the axis"
             count = len(servo.written)
-            await happens(Jogged(bench, servo, hold, job))
-            await asyncio.gather(job.wait(), signs)
+            with pytest.MonkeyPatch.context() as patch:
+                await happens(Jogged(bench, servo, hold, job, patch))
+                await asyncio.gather(job.wait(), signs)
             late = servo.written[count:]
             words = [int.from_bytes(data, "little") for place, data in late if place == CONTROL]
             found.append((words, any(place == TARGET for place, _ in late), job))
@@ -103,8 +129,14 @@ def after_gap(happens: Callable[[Jogged], Awaitable[None]]) -> tuple[list[int], 
     return found[0]
 
 
-def test_a_gap_in_which_nothing_happens_is_gone_over() -> None:
-    words, targets, job = after_gap(Jogged.nothing)
+@pytest.mark.parametrize(
+    "happens", [Jogged.nothing, Jogged.set_the_clock, Jogged.set_the_clock_back]
+)
+def test_a_gap_in_which_nothing_happens_is_gone_over(
+    happens: Callable[[Jogged], Awaitable[None]],
+) -> None:
+    """The time of day is no matter of the hold and its grant."""
+    words, targets, job = after_gap(happens)
     assert targets
     assert any(word & ENABLES == ENABLES and not word & HALT for word in words)
     assert job.state == "done"
@@ -115,6 +147,7 @@ def test_a_gap_in_which_nothing_happens_is_gone_over() -> None:
     [
         Jogged.stop,
         Jogged.lose_the_right,
+        Jogged.end_the_grant,
         Jogged.trip,
         Jogged.release,
         Jogged.lose_power_elsewhere,
@@ -125,3 +158,34 @@ def test_what_happens_in_a_gap_is_final(happens: Callable[[Jogged], Awaitable[No
     assert not targets, "a new target would move it on"
     # Halt may be written again; a word that enables without it would end the halt.
     assert all(word & HALT for word in words if word & ENABLES == ENABLES), words
+
+
+async def test_the_signs_of_one_page_keep_no_jog_of_another_alive(tmp_path: Path) -> None:
+    """Two pages of one person hold their buttons for the same axis."""
+    bench, _x = await bench_with(Servo(), tmp_path)
+    first, second = (Jogs(bench, name, lambda _message: None) for name in ("page 1", "page 2"))
+    request = JogStart(
+        drive="x",
+        direction=1,
+        speed=60.0,
+        acceleration=600.0,
+        travel_limit=5.0,
+        torque_limit=50.0,
+        press=1,
+    )
+    first.start(request, "Anna")
+    hold = first._holds["x"]
+    try:
+        with pytest.raises(Busy):
+            second.start(request, "Anna")
+        alive = hold._alive
+        second.renew(JogRenew(drive="x", press=1, sign=1))
+        assert hold._alive == alive, "a sign of the other page"
+        second.release("x", "released", 1)
+        assert not hold.released
+        first.release("x", "released", 1)
+        assert hold.released == "released"
+        first.renew(JogRenew(drive="x", press=1, sign=2))
+        assert hold.ended() == "released"
+    finally:
+        await bench.close()

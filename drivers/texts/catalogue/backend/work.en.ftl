@@ -1,5 +1,9 @@
 work_axis-already-moved = the axis is already moved by { QUOTED($other_title) }
     .remedy = wait for it to end, or stop it
 work_of-drive = { $title }: { $drive }
+work_reading-memory = reading the file takes more than { $limit } of memory
+    .remedy = use a smaller file, with the values of one drive
+work_reading-time = reading the file was ended after { NUM($limit_s, format: "g") } s
+    .remedy = use a smaller file, with the values of one drive
 work_run-already = { $bound } { $what } are already running
     .remedy = wait until one of them has ended, or cancel one

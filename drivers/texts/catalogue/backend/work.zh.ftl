@@ -1,5 +1,9 @@
 work_axis-already-moved = 轴已由 { QUOTED($other_title) } 驱动
     .remedy = 请等待其结束，或将其停止
 work_of-drive = { $title }：{ $drive }
+work_reading-memory = 读取文件所需内存超过 { $limit }
+    .remedy = 请使用较小的文件，只含一台驱动器的值
+work_reading-time = 读取文件在 { NUM($limit_s, format: "g") } s 后被终止
+    .remedy = 请使用较小的文件，只含一台驱动器的值
 work_run-already = 已有 { $bound } 个{ $what }在运行
     .remedy = 请等待其中之一结束，或取消一个
