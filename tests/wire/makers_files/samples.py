@@ -192,7 +192,7 @@ SAMPLES: dict[str, bytes] = {
         '<CycleTimeSync1 Factor="2">0</CycleTimeSync1><ShiftTimeSync1>125000</ShiftTimeSync1>'
         "</OpMode></Dc>",
     ),
-    # No distributed clocks, other watchdog registers, control bytes with interrupts, EoE and FoE.
+    # Distributed clocks in the chip, no mode that uses them; other watchdog registers, control bytes with interrupts, EoE and FoE.
     "without_clock": esi(
         FREE_OUT + FREE_IN,
         sms=managers(control=(0x24, 0x20), box=192),

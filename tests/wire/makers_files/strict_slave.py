@@ -311,7 +311,7 @@ def _profile(file: File) -> Profile:
         max_entries=12,
         remappable=configurable,
         source="file",
-        sync_modes=("DC",) if any(m.activate for m in file.modes) else ("SM",),
+        sync_modes=("SM",) if file.device.find("Dc") is None else ("DC",),
     )
     link = base.links[0].model_copy(
         update={
