@@ -37,7 +37,6 @@ _LOOK_S = 0.01
 """At 4000 cycles/s of the longest frames 80 frames wait meanwhile, less than 200 kB."""
 
 
-
 class Recorder:
     """Frames in, files out. ``control`` ends it when it closes."""
 

@@ -57,7 +57,7 @@ def _looks_chinese(data: bytes) -> bool:
 
 
 def _by_editor(data: bytes) -> str:
-    """Windows has hardly a letter at 80h to 9Fh; DOS has its umlauts there, Shift-JIS first bytes."""
+    """Windows has hardly a letter at 80h to 9Fh: DOS has umlauts there, Shift-JIS first bytes."""
     high = [byte for byte in data[:100_000] if byte >= 0x80]
     if sum(byte < 0xA0 for byte in high) * 2 < len(high):
         return "cp1252"

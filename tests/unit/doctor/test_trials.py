@@ -41,7 +41,7 @@ def test_the_operation_modes_of_the_file_come_before_those_of_others() -> None:
 
 
 def test_without_distributed_clocks() -> None:
-    """A file that names modes, none with a clock, is brought up without SYNC0 (ETG.2000, OpMode)."""
+    """A file that names modes, none with a clock, is brought up without SYNC0 (ETG.2000)."""
     off = ClockMode(name="FreeRun", assign_activate=0)
     assert station_bring_up(profile(clock_modes=(off,)), 1_000_000).activate == 0
     assert station_bring_up(profile(), 1_000_000).activate == 0x300
