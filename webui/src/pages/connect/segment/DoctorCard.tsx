@@ -35,9 +35,7 @@ export function DoctorCard({ url }: { url: string }) {
                   <p>{chinese ? cause.remedy_zh : cause.remedy}</p>
                   <ul className="plain-list dim num">
                     {cause.facts.map((fact) => (
-                      <li key={fact.name}>
-                        {factText(t, fact, chinese)}
-                      </li>
+                      <li key={fact.name}>{factText(t, fact, chinese)}</li>
                     ))}
                   </ul>
                 </li>
