@@ -124,7 +124,7 @@ class PdoReader:
             self._report.left_out(where, "description.padding-unknown", bits=bits or 0)
             return []
         whole, rest = divmod(bits, _MOST_BITS)
-        return [(None, _MOST_BITS)] * whole + ([(None, rest)] if rest else [])
+        return [(None, length) for length in (*[_MOST_BITS] * whole, rest) if length]
 
     def _natural_bits(self, key: str) -> int | None:
         entry = self._by_key.get(key)
