@@ -96,6 +96,10 @@ class SyncSignal(Frozen):
         return cycle_ns * max(self.factor, 1)
 
 
+PLAIN_ACTIVATE = 0x0300
+"""SYNC0 alone: for a drive whose profile names no operation mode."""
+
+
 class ModePdos(Frozen):
     """The PDOs that an operation mode assigns to one sync manager."""
 
@@ -151,9 +155,17 @@ class BringUp(Frozen):
         """The first mode with distributed clocks; None where there is none."""
         return next((mode for mode in self.clock_modes if mode.assign_activate), None)
 
-    def mode_pdos(self, sync_manager: int) -> tuple[int, ...]:
-        """PDOs that `clock_mode` assigns to a sync manager; empty where it says nothing."""
+    @property
+    def assign_activate(self) -> int:
+        """For 0980h; 0, without SYNC0, where the file names modes and none has a clock."""
         mode = self.clock_mode
+        if mode is None:
+            return 0 if self.clock_modes else PLAIN_ACTIVATE
+        return mode.assign_activate
+
+    def mode_pdos(self, sync_manager: int) -> tuple[int, ...]:
+        """PDOs that the mode in use assigns to a sync manager; empty where it says nothing."""
+        mode = self.clock_mode or next(iter(self.clock_modes), None)
         found = (
             (each.pdos for each in mode.pdos if each.sync_manager == sync_manager) if mode else ()
         )

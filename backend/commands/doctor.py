@@ -139,7 +139,16 @@ def shown(cause: Cause) -> dict[str, Any]:
         "weight": cause.weight,
         "title": text.title,
         "remedy": text.remedy,
-        "facts": [asdict(fact) for fact in cause.facts],
+        "facts": [
+            asdict(fact)
+            | {
+                "label": fact.text.en,
+                "label_zh": fact.text.zh,
+                "shown": fact.shown,
+                "shown_expected": fact.shown_expected,
+            }
+            for fact in cause.facts
+        ],
     }
 
 
@@ -156,9 +165,10 @@ def _show(results: list[dict[str, Any]], *, as_json: bool) -> None:
         for number, cause in enumerate(each["causes"], start=1):
             print(f"  {number}. {cause['title']}")
             for fact in cause["facts"]:
-                line = f"     {fact['name']} = {fact['actual']}"
-                if fact["expected"] is not None:
-                    line += words_of("printed.should-be", expected=str(fact["expected"]))
+                label = fact["label_zh"] if language() == "zh" else fact["label"]
+                line = f"     {label}: {fact['shown']}"
+                if fact["shown_expected"] is not None:
+                    line += words_of("printed.should-be", expected=str(fact["shown_expected"]))
                 print(line)
             print_text("printed.cause-remedy", remedy=str(cause["remedy"]))
         _show_trials(each.get("trials"))

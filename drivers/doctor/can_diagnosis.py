@@ -113,7 +113,8 @@ def _numbers(e: CanEvidence) -> Iterator[Sign]:
     if e.foreign_master:
         yield "can_other_master", 4, Fact("requests_of_others", 1, 0)
     for cob_id, other in e.collisions:
-        yield "can_cob_id_collision", 6, Fact(f"{cob_id:03X}h_also_of_node", other)
+        yield "can_cob_id_collision", 6, Fact("shared_identifier", f"{cob_id:03X}h")
+        yield "can_cob_id_collision", 0, Fact("other_node", other)
 
 
 def _refusals(e: CanEvidence) -> Iterator[Sign]:

@@ -17,6 +17,7 @@ import yaml
 from drivers.doctor.evidence import Evidence
 
 CATALOGUE = Path(__file__).with_name("causes.yaml")
+_FACTS = Path(__file__).with_name("facts.yaml")
 _BUSY_PREFIX = ("1C12", "1C13")
 
 
@@ -34,12 +35,42 @@ class CauseText:
 
 
 @dataclass(frozen=True, slots=True)
+class FactText:
+    """What a fact is called; ``digits``: its number is hexadecimal with so many, 0: decimal."""
+
+    en: str
+    zh: str
+    digits: int = 0
+
+    def notation(self, value: int | str) -> str:
+        """``0x001B`` or ``27``; a text stays as it is."""
+        if isinstance(value, int) and self.digits:
+            return f"0x{value:0{self.digits}X}"
+        return str(value)
+
+
+@dataclass(frozen=True, slots=True)
 class Fact:
     """A piece of evidence: what it is, as it is, and as it should be (None: nobody says)."""
 
     name: str
     actual: int | str
     expected: int | str | None = None
+
+    @property
+    def text(self) -> FactText:
+        """What it is called."""
+        return fact_texts()[self.name]
+
+    @property
+    def shown(self) -> str:
+        """As it is, in the notation that manuals use for it."""
+        return self.text.notation(self.actual)
+
+    @property
+    def shown_expected(self) -> str | None:
+        """As it should be, likewise; None where nobody says."""
+        return None if self.expected is None else self.text.notation(self.expected)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +85,13 @@ class Cause:
     def text(self) -> CauseText:
         """The cause as text."""
         return catalogue()[self.code]
+
+
+@cache
+def fact_texts() -> dict[str, FactText]:
+    """Names of all facts by code."""
+    data = yaml.safe_load(_FACTS.read_text("utf-8"))
+    return {name: FactText(**texts) for name, texts in data.items()}
 
 
 @cache

@@ -17,11 +17,10 @@ MOST = 4
 """Trials of one station: each takes the drive to Operational again."""
 
 _ACTIVATES = (0x0300, 0x0700, 0x0330)
-"""Values of 0980h that drives in use need: SYNC0, SYNC0 and SYNC1, SYNC0 on its pin.
+"""Values of 0980h that drives in use need: SYNC0, SYNC0 and SYNC1, SYNC0 on its pin."""
 
-Not 0000h: the bring-up takes a profile that names no mode with a clock to 0300h, so a trial of it
-would change nothing.
-"""
+_HALF_CYCLE_NS = 500_000
+"""Of the 1 ms that a trial takes: as far as possible from the arrival of the process data."""
 
 _LONGER = (2, 4)
 
@@ -108,25 +107,67 @@ def _without_command(cause: Cause, profile: Profile) -> Iterator[Trial]:
 
 
 def _other_clock(_cause: Cause, profile: Profile) -> Iterator[Trial]:
-    """Operation modes of the file before values that other drives need."""
-    rules = _rules(profile)
-    used = rules.clock_mode
-    before = 0x0300 if used is None else used.assign_activate
-    others = [m for m in rules.clock_modes if m is not used and m.assign_activate]
-    known = {before, *(mode.assign_activate for mode in others)}
-    shape = used or ClockMode(name="doctor")
-    others += [
-        shape.model_copy(update={"assign_activate": value, "name": "doctor"})
-        for value in _ACTIVATES
-        if value not in known
-    ]
+    """Modes of the file with a clock, none, then values that other drives need."""
+    used = _rules(profile).clock_mode
+    others = [m for m in _rules(profile).clock_modes if m is not used and m.assign_activate]
     for mode in others:
-        yield Trial(
-            "bring_up.clock_modes",
-            f"{before:04X}h",
-            f"{mode.assign_activate:04X}h",
-            _with_rules(profile, clock_modes=(mode,)),
-        )
+        yield _mode_tried(profile, mode)
+    if _rules(profile).assign_activate:
+        yield _mode_tried(profile, _mode_without_clock(profile))
+    known = {_rules(profile).assign_activate, *(mode.assign_activate for mode in others)}
+    shape = used or ClockMode(name="doctor")
+    for value in _ACTIVATES:
+        if value not in known:
+            mode = shape.model_copy(update={"assign_activate": value, "name": "doctor"})
+            yield _mode_tried(profile, mode)
+
+
+def _with_clock(cause: Cause, profile: Profile) -> Iterator[Trial]:
+    """For a drive that reports that it needs one."""
+    return (each for each in _other_clock(cause, profile) if _rules(each.profile).assign_activate)
+
+
+def _without_clock(_cause: Cause, profile: Profile) -> Iterator[Trial]:
+    if _rules(profile).assign_activate:
+        yield _mode_tried(profile, _mode_without_clock(profile))
+
+
+def _mode_without_clock(profile: Profile) -> ClockMode:
+    """The file's own where it has one: it may assign other PDOs."""
+    modes = (mode for mode in _rules(profile).clock_modes if not mode.assign_activate)
+    return next(modes, ClockMode(name="doctor"))
+
+
+def _mode_tried(profile: Profile, mode: ClockMode) -> Trial:
+    return Trial(
+        "bring_up.clock_modes",
+        f"{_rules(profile).assign_activate:04X}h",
+        f"{mode.assign_activate:04X}h",
+        _with_rules(profile, clock_modes=(mode,)),
+    )
+
+
+def _other_shift(_cause: Cause, profile: Profile) -> Iterator[Trial]:
+    """SYNC0 at another place between two process data: without the file's shift, or half way."""
+    activate = _rules(profile).assign_activate
+    if not activate:
+        return
+    mode = _rules(profile).clock_mode or ClockMode(name="doctor", assign_activate=activate)
+    before = mode.sync0.shift_ns
+    after = 0 if before else _HALF_CYCLE_NS
+    shifted = mode.model_copy(update={"sync0": mode.sync0.model_copy(update={"shift_ns": after})})
+    yield Trial(
+        "bring_up.clock_modes.sync0.shift_ns",
+        f"{before}",
+        f"{after}",
+        _with_rules(profile, clock_modes=(shifted,)),
+    )
+
+
+def _steadier_clock(cause: Cause, profile: Profile) -> Iterator[Trial]:
+    yield from _other_shift(cause, profile)
+    yield from _longer_cycle(cause, profile)
+    yield from _without_clock(cause, profile)
 
 
 def _usual_watchdog(_cause: Cause, profile: Profile) -> Iterator[Trial]:
@@ -176,11 +217,12 @@ _BY_CAUSE: dict[str, _Rule] = {
     "inputs_size": _own_contents,
     "init_command_refused": _without_command,
     "clock_mode_wrong": _other_clock,
-    "clock_needed": _other_clock,
+    "clock_needed": _with_clock,
     "sync0_missing": _other_clock,
-    "sync0_unsteady": _longer_cycle,
+    "sync0_unsteady": _steadier_clock,
     "cycle_refused": _clock_then_cycle,
     "watchdog_refused": _usual_watchdog,
+    "watchdog_expired": _usual_watchdog,
     "makers_code": _clock_then_contents,
     "unknown": _clock_then_contents,
     "can_mapping_refused": _own_contents,

@@ -14,7 +14,14 @@ from profiles.importer.description import (
     Description,
 )
 from profiles.importer.eds_pdo import read_pdos
-from profiles.importer.eds_sections import COMPACT, OBJECT, SUBOBJECT, Section, read_sections
+from profiles.importer.eds_sections import (
+    COMMISSIONING,
+    COMPACT,
+    OBJECT,
+    SUBOBJECT,
+    Section,
+    read_sections,
+)
 from profiles.importer.report import ImportFailed, ImportReport
 from profiles.importer.texts import check_size, decode_text
 from profiles.importer.values import (
@@ -116,6 +123,7 @@ class _Entries:
         self._name = name
         self._report = report
         self._configured = 0
+        self._of_machine = any(title in sections for title in COMMISSIONING)
         self._objects: dict[int, Section] = {}
         self._members: dict[int, dict[int, Section]] = {}
         self._compact: dict[tuple[int, str], Section] = {}
@@ -199,7 +207,8 @@ class _Entries:
             member = Section(parent.line, dict(parent.values))
             member.values["parametername"] = names.get(str(subindex)) or f"{title}{subindex}"
             if value := values.get(str(subindex)):
-                member.values["defaultvalue"] = value
+                # In a DCF these are values of one machine (CiA 306-1 clause 5.3).
+                member.values["parametervalue" if self._of_machine else "defaultvalue"] = value
             entries += self._entry(index, subindex, member, parent, title)
         return entries
 

@@ -15,6 +15,8 @@ _LINE = re.compile(r"\r\r\n|\r\n|\n|\r")
 OBJECT = re.compile(r"(?:0x)?([0-9a-f]{4})h?$")
 SUBOBJECT = re.compile(r"(?:0x)?([0-9a-f]{4})h?\s*_?sub\s*_?(?:0x)?([0-9a-f]{1,2})$")
 COMPACT = re.compile(r"(?:0x)?([0-9a-f]{4})(name|value|denotation)$")
+#: The section that makes a DCF of an EDS; the standard spells it with one m.
+COMMISSIONING = ("devicecomissioning", "devicecommissioning")
 #: Begins an editor's remark behind a value: text may hold both, numbers and words of the standard
 #: cannot. The white space in front is not in the pattern: a search for it takes the square of its
 #: length, and a file may have a megabyte of it.
@@ -54,7 +56,10 @@ def read_sections(text: str, name: str, report: ImportReport) -> dict[str, Secti
                 report.repaired(place, "description.heading-not-closed", heading=line[:40])
             if title in sections:
                 report.noted(place, "description.section-twice", section=title[:40])
-            current = sections.setdefault(title, Section(number))
+            # Two descriptions of one object are never mixed.
+            current = Section(number)
+            if title not in sections or not sections[title].values:
+                sections[title] = current
             continue
         key, equals, value = line.partition("=")
         if not equals:
@@ -70,8 +75,8 @@ def read_sections(text: str, name: str, report: ImportReport) -> dict[str, Secti
 
 
 def node_id_of(sections: dict[str, Section], name: str) -> int | None:
-    """The node-ID that a DCF was made for; the standard spells the heading with one m."""
-    for title in ("devicecomissioning", "devicecommissioning"):
+    """The node-ID that a DCF was made for."""
+    for title in COMMISSIONING:
         if title in sections:
             text = sections[title].word("nodeid")
             number = parse_number(text, f"{name}: NodeID", ImportReport())

@@ -7,6 +7,7 @@ files come from anywhere.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, ParseError
 from xml.parsers.expat import ErrorString
@@ -22,7 +23,7 @@ from profiles.importer.description import (
     Description,
 )
 from profiles.importer.esi_bring_up import read_bring_up
-from profiles.importer.esi_modules import dictionaries_of, module_list, parts_of
+from profiles.importer.esi_modules import dictionaries_of, module_list, overwritten, parts_of
 from profiles.importer.esi_objects import DictionaryReader
 from profiles.importer.esi_pdo import PdoReader
 from profiles.importer.report import ImportFailed, ImportReport
@@ -40,6 +41,7 @@ from profiles.importer.xml_tree import (
 )
 
 MAX_BYTES = 32 * 2**20
+_PDO_TAGS: tuple[tuple[str, Literal["rx", "tx"]], ...] = (("RxPdo", "rx"), ("TxPdo", "tx"))
 _ROOTS = {name.lower(): name for name in ("EtherCATInfo", "EtherCATInfoList", "EtherCATConfig")}
 
 
@@ -162,6 +164,8 @@ def open_esi(data: bytes, name: str, report: ImportReport) -> EsiFile:
             root.tag = "EtherCATInfo"
     if root.tag == "EtherCATConfig":
         raise ImportFailed("description.network-configuration", file=name)
+    if root.tag == "ISO15745ProfileContainer":
+        raise ImportFailed("description.xdd", file=name)
     if root.tag in ("EtherCATDict", "EtherCATModule"):
         raise ImportFailed("description.part-of-esi", file=name, root=root.tag)
     if root.tag != "EtherCATInfo":
@@ -235,8 +239,9 @@ def _contents(file: EsiFile, element: Element) -> tuple[list[DescribedEntry], li
     pdos = []
     for part in parts:
         pdo_reader = PdoReader(file.name, file.report, entries, seen, part)
-        for pdo in children(part.element, "RxPdo"):
-            pdos += pdo_reader.read(pdo, "rx")
-        for pdo in children(part.element, "TxPdo"):
-            pdos += pdo_reader.read(pdo, "tx")
+        others = parts[1:] if part is parts[0] else []
+        for tag, direction in _PDO_TAGS:
+            for pdo in children(part.element, tag):
+                if not overwritten(pdo, part, others):
+                    pdos += pdo_reader.read(pdo, direction)
     return entries, pdos

@@ -31,7 +31,7 @@ def parts_of(root: Element, device: Element) -> list[Part]:
     modules = children(child(child(root, "Descriptions"), "Modules"), "Module")
     slots = child(device, "Slots")
     by_ident = {_number(attribute_of(child(m, "Type"), "ModuleIdent")): m for m in modules}
-    for number, slot in enumerate(children(slots, "Slot")[:_MOST_SLOTS]):
+    for number, slot in enumerate(_slots(slots)):
         module = by_ident.get(_delivered(slot, number))
         if module is not None:
             parts.append(
@@ -44,6 +44,33 @@ def parts_of(root: Element, device: Element) -> list[Part]:
     if len(parts) == 1 and not dictionaries_of(device):
         parts += [Part(m) for m in modules if dictionaries_of(m)][:1]
     return parts
+
+
+def _slots(slots: Element | None) -> list[Element]:
+    """One for each slot: ``MinInstances`` of a ``Slot`` follow one another (ETG.2000)."""
+    found: list[Element] = []
+    for slot in children(slots, "Slot"):
+        count = _number(attribute_of(slot, "MinInstances")) or 1
+        found += [slot] * min(count, _MOST_SLOTS - len(found))
+    return found
+
+
+def overwritten(pdo: Element, device: Part, modules: list[Part]) -> bool:
+    """Whether a module brings the PDO that the device itself has under the same index."""
+    if not flag_of(pdo, "OverwrittenByModule"):
+        return False
+    index = pdo_index(pdo, device)
+    others = (
+        pdo_index(other, part) for part in modules for other in children(part.element, pdo.tag)
+    )
+    return index is not None and index in others
+
+
+def pdo_index(pdo: Element, part: Part) -> int | None:
+    """Where it lies in this slot; None where the file gives no number."""
+    index = _number(text_of(child(pdo, "Index")))
+    shifts = flag_of(child(pdo, "Index"), "DependOnSlot")
+    return index + part.pdo_shift if index is not None and shifts else index
 
 
 def module_list(root: Element, device: Element) -> InitCommand | None:

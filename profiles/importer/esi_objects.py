@@ -23,6 +23,7 @@ from profiles.importer.xml_tree import attribute_of, child, children, flag_of, n
 from profiles.schema import Access, DataType, PdoMapping, Raw
 
 #: Names that only count: "SubIndex 003", "Element 3".
+_UNSIGNED_BITS = {"UINT8": 8, "UINT16": 16, "UINT32": 32, "UINT64": 64}
 _NUMBERED = re.compile(r"(?:sub\s*index|element|entry|item)?\s*\d+", re.I)
 
 
@@ -131,10 +132,26 @@ class DictionaryReader:
             max_raw=high,
             unit=_unit(info, element) or unit,
             group=tidy(text_of(child(element, "Group")), 60),
-            enum=self._types.enumeration(member.type),
+            enum=self._enumeration(member.type, data_type, place),
             help=tidy(text_of(child(element, "Comment")), 500),
             source=f"{self._file}: {index:04X}h",
         )
+
+    def _enumeration(self, name: str, data_type: DataType | None, place: str) -> dict[int, str]:
+        """Texts by raw value. Below zero in a type without sign it is two's complement."""
+        found: dict[int, str] = {}
+        for value, words in self._types.enumeration(name).items():
+            size = _UNSIGNED_BITS.get(data_type or "")
+            if size and -(1 << size - 1) <= value < 0:
+                self._report.repaired(
+                    place, "description.enum-negative", value=value, raw=value + (1 << size)
+                )
+                found.setdefault(value + (1 << size), words)
+                continue
+            raw = value if data_type is None else fit(value, data_type, "Enum", place, self._report)
+            if raw is not None:
+                found.setdefault(int(raw), words)
+        return found
 
     def _value(
         self,

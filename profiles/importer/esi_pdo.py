@@ -18,6 +18,8 @@ _BITS = {
     "INT64": 64, "UINT64": 64, "REAL32": 32,
 }  # fmt: skip
 _MOST_BITS = 64 * 8
+#: Process data of one station fit into a frame: 1486 bytes (ETG.1000.4 clause 5.4).
+_MOST_PADDING = 1486 * 8
 
 
 class PdoReader:
@@ -54,12 +56,10 @@ class PdoReader:
         layout: list[tuple[str | None, int]] = []
         keys: list[str] = []
         for item in children(pdo, "Entry"):
-            part = self._part(item, direction, where)
-            if part is None:
-                continue
-            layout.append(part)
-            if part[0] is not None and part[0] not in keys:
-                keys.append(part[0])
+            for part in self._parts(item, direction, where):
+                layout.append(part)
+                if part[0] is not None and part[0] not in keys:
+                    keys.append(part[0])
         fixed = flag_of(pdo, "Fixed")
         if not keys and fixed:
             return []
@@ -80,28 +80,31 @@ class PdoReader:
             )
         ]
 
-    def _part(
+    def _parts(
         self, item: Element, direction: Literal["rx", "tx"], where: str
-    ) -> tuple[str | None, int] | None:
-        """One stretch of the PDO; index 0 is padding. None: it cannot be understood."""
+    ) -> list[tuple[str | None, int]]:
+        """The stretches of one entry of the PDO; index 0 is padding.
+
+        Long padding becomes several. Empty: the entry cannot be understood.
+        """
         object_index = whole_number(text_of(child(item, "Index")), where, self._report)
         bits = whole_number(text_of(child(item, "BitLen")), where, self._report)
         if object_index and flag_of(child(item, "Index"), "DependOnSlot"):
             object_index += self._part_of_device.index_shift
         if not object_index:
-            return (None, bits) if bits and bits <= _MOST_BITS else None
+            return self._padding(bits, where)
         subindex = whole_number(text_of(child(item, "SubIndex")), where, self._report) or 0
         if not 0x1000 <= object_index <= 0xFFFF or not 0 <= subindex <= 255:
             self._report.left_out(
                 where, "description.pdo-entry-invalid", index=object_index, subindex=subindex
             )
-            return None
+            return self._padding(bits, where)
         key = f"{object_index:04X}:{subindex:02X}"
         if key not in self._seen and len(self._entries) < MAX_ENTRIES:
             kind = named_type(text_of(child(item, "DataType")), bits) or named_type("", bits)
             if kind is None:
                 self._report.left_out(where, "description.mapped-type-unknown", key=key)
-                return (None, bits) if bits and bits <= _MOST_BITS else None
+                return self._padding(bits, where)
             access: Access = "rw" if direction == "rx" else "ro"
             name = tidy(name_of(item)) or f"Object {key}"
             entry = DescribedEntry(
@@ -113,7 +116,15 @@ class PdoReader:
         natural = self._natural_bits(key)
         if not bits or bits > _MOST_BITS:
             bits = natural
-        return (key, bits) if bits else None
+        return [(key, bits)] if bits else self._padding(bits, where)
+
+    def _padding(self, bits: int | None, where: str) -> list[tuple[str | None, int]]:
+        """What follows keeps its place: padding is never dropped without a finding."""
+        if not bits or bits > _MOST_PADDING:
+            self._report.left_out(where, "description.padding-unknown", bits=bits or 0)
+            return []
+        whole, rest = divmod(bits, _MOST_BITS)
+        return [(None, length) for length in (*[_MOST_BITS] * whole, rest) if length]
 
     def _natural_bits(self, key: str) -> int | None:
         entry = self._by_key.get(key)

@@ -128,6 +128,8 @@ class EsiTypes:
             size = parse_number(text_of(child(element, "BitSize")), self._file, self._report)
             bits = int(size) if size is not None else bits
             following = text_of(child(element, "BaseType"))
+            if not following and child(element, "SubItem") is not None:
+                return "OCTETS"  # a record within a record: its bytes, whatever their number
             if not following:
                 break
             name = following

@@ -14,6 +14,8 @@ _MARKS = (
 )
 _DECLARED = re.compile(rb"^\s*<\?xml[^>]*?encoding\s*=\s*[\"']([A-Za-z0-9._-]{1,40})[\"'][^>]*\?>")
 _DECLARATION = re.compile(r"^\s*<\?xml[^>]*\?>")
+#: Of Western languages in code page 850, with the signs for degrees and for the square.
+_DOS_LETTERS = "äöüÄÖÜßéèêàâçñ°²".encode("cp850")
 #: By the names that Python gives them; a file may use any alias.
 _KNOWN_ENCODINGS = {
     "utf-8", "ascii", "utf-16", "utf-16-le", "utf-16-be", "gb2312", "gbk", "gb18030", "big5",
@@ -42,7 +44,7 @@ def decode_text(data: bytes, name: str, report: ImportReport) -> str:
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:
-        encoding = "gb18030" if _looks_chinese(data) else "cp1252"
+        encoding = "gb18030" if _looks_chinese(data) else _by_editor(data)
     report.repaired(name, "description.not-utf8", encoding=encoding)
     return data.decode(encoding, "replace")
 
@@ -52,6 +54,20 @@ def _looks_chinese(data: bytes) -> bool:
     runs = re.findall(rb"[\x80-\xff]+", data[:100_000])
     pairs = sum(len(run) for run in runs if len(run) % 2 == 0 and min(run) > 0xA0)
     return pairs * 2 > sum(map(len, runs))
+
+
+def _by_editor(data: bytes) -> str:
+    """Windows has hardly a letter at 80h to 9Fh: DOS has umlauts there, Shift-JIS first bytes."""
+    high = [byte for byte in data[:100_000] if byte >= 0x80]
+    if sum(byte < 0xA0 for byte in high) * 2 < len(high):
+        return "cp1252"
+    if sum(byte in _DOS_LETTERS for byte in high) * 5 >= len(high) * 4:
+        return "cp850"
+    try:
+        data.decode("cp932")
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "cp932"
 
 
 def _python_name(encoding: str) -> str:

@@ -54,6 +54,8 @@ _SMALLEST: tuple[tuple[int, DataType], ...] = (
     (64, "UINT64"),
 )
 
+_ODD_BYTES = (3, 5, 6, 7)
+
 _ACCESS: dict[str, Access] = {
     "ro": "ro", "r": "ro", "read": "ro", "readonly": "ro", "const": "ro", "c": "ro",
     "wo": "wo", "w": "wo", "write": "wo", "writeonly": "wo",
@@ -251,6 +253,8 @@ def named_type(name: str, bits: int | None) -> DataType | None:
         return found
     if bits is None or bits < 1:
         return None
+    if (bits + 7) // 8 in _ODD_BYTES:
+        return "OCTETS"  # as a number it would be written with more bytes than the object has
     return next((kind for width, kind in _SMALLEST if bits <= width), None)
 
 

@@ -11,13 +11,14 @@ _CONTROL = re.compile(
     r"|&#(?:0*(?:[0-8]|1[124-9]|2\d|3[01])|[xX]0*(?:[0-8bcefBCEF]|1[0-9a-fA-F]));"
 )
 _AMPERSAND = re.compile(r"&(?!(?:#\d+|#[xX][0-9a-fA-F]+|amp|lt|gt|quot|apos);)")
+_TAG_PREFIX = re.compile(r"<([A-Za-z_][\w.-]*):[A-Za-z_]")
 _PREFIXED = re.compile(r"(\s)(?!xmlns:)[A-Za-z_][\w.-]*:([A-Za-z_][\w.-]*\s*=\s*[\"'])")
 
 
 def mended(text: str) -> str:
     """The text without remarks around its root, control characters and bare ampersands.
 
-    A prefix that nobody declares is taken off its attribute. What is cut off stays so.
+    A prefix that nobody declares is taken off its tag or attribute. What is cut off stays so.
     """
     begin = _BEGIN.search(text)
     if begin is not None:
@@ -26,5 +27,8 @@ def mended(text: str) -> str:
     if ends:
         text = text[: ends[-1].end()]
     text = _AMPERSAND.sub("&amp;", _CONTROL.sub("", text))
+    for prefix in set(_TAG_PREFIX.findall(text)):
+        if f"xmlns:{prefix}" not in text:
+            text = re.sub(rf"<(/?){re.escape(prefix)}:", r"<\1", text)
     root, bracket, rest = text.partition(">")
     return _PREFIXED.sub(r"\1\2", root) + bracket + rest

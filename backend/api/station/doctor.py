@@ -148,5 +148,16 @@ def _cause(cause: Cause) -> DoctorCause:
         title_zh=words.zh,
         remedy=words.remedy,
         remedy_zh=words.zh_remedy,
-        facts=[DoctorFact(name=f.name, actual=f.actual, expected=f.expected) for f in cause.facts],
+        facts=[
+            DoctorFact(
+                name=fact.name,
+                label=fact.text.en,
+                label_zh=fact.text.zh,
+                actual=fact.actual,
+                expected=fact.expected,
+                shown=fact.shown,
+                shown_expected=fact.shown_expected,
+            )
+            for fact in cause.facts
+        ],
     )

@@ -9,11 +9,18 @@ from backend.tools.wire_message import MessageInfo
 
 
 class DoctorFact(Message):
-    """A piece of evidence as it is and as it should be (null: nobody says)."""
+    """A piece of evidence as it is and as it should be (null: nobody says).
+
+    ``shown`` and ``shown_expected`` are the same in the notation of manuals.
+    """
 
     name: str
+    label: str
+    label_zh: str
     actual: int | str
     expected: int | str | None
+    shown: str
+    shown_expected: str | None
 
 
 class DoctorCause(Message):

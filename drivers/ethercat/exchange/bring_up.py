@@ -16,13 +16,12 @@ from drivers.ethercat.wire import coe
 from drivers.ethercat.wire.registers import read_again
 from drivers.ethercat.wire.steps import Steps, Write
 from drivers.texts.message import Text, text
-from profiles.bring_up import BringUp, ClockMode, InitCommand
+from profiles.bring_up import PLAIN_ACTIVATE, BringUp, ClockMode, InitCommand
 from profiles.motion.classify import standard_rule
 from profiles.schema import Profile
 
 SYNC_MANAGERS, WATCHDOG_DIVIDER = 0x800, 0x400
 _WATCHDOG_BIT = 0x40
-_PLAIN_ACTIVATE = 0x0300
 _MODE_OF_OPERATION = 0x6060
 _MAPPING = (
     range(0x1600, 0x1800),
@@ -51,7 +50,9 @@ class StationBringUp:
     """See the module. Times in ns unless their name says ms; None: the file does not say."""
 
     commands: tuple[Command, ...] = ()
-    activate: int = _PLAIN_ACTIVATE
+    activate: int = PLAIN_ACTIVATE
+    """For 0980h; 0: without SYNC0, the drive follows the process data (ETG.2000, OpMode)."""
+
     sync0_cycle_ns: int = 0
     sync0_shift_ns: int = 0
     sync1_ns: int = 0
@@ -75,7 +76,7 @@ def station_bring_up(profile: Profile | None, cycle_ns: int) -> StationBringUp:
     sync0_ns = cycle_ns if mode is None else mode.sync0.period_ns(cycle_ns)
     return StationBringUp(
         commands=commands,
-        activate=_PLAIN_ACTIVATE if mode is None else mode.assign_activate,
+        activate=rules.assign_activate,
         sync0_cycle_ns=sync0_ns,
         sync0_shift_ns=0 if mode is None else mode.sync0.shift_ns,
         sync1_ns=_sync1_ns(mode, sync0_ns),

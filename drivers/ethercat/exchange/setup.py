@@ -50,7 +50,7 @@ _SYNC1_BIT, _SYNC_TRY_S = 0x0400, 3.0
 
 @dataclass(frozen=True, slots=True)
 class StationSetup:
-    """Process data of one station as the server chose them."""
+    """Process data of one station as the server chose them; ``dc``: the segment has a clock."""
 
     rx: Assigned
     tx: Assigned
@@ -63,6 +63,11 @@ class StationSetup:
     def bring_up(self) -> StationBringUp:
         """What its file prescribes; the usual where there is none."""
         return self.rules or StationBringUp(sync0_cycle_ns=self.cycle_ns)
+
+    @property
+    def sync0(self) -> bool:
+        """Whether the drive gets SYNC0; otherwise its outputs are valid when they arrive."""
+        return self.dc and self.bring_up.activate != 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,8 +122,8 @@ def write_mapping(station: Station, setup: StationSetup) -> Steps[None]:
     for index, sub, data in (
         (0x60C2, 1, struct.pack("<B", value)),
         (0x60C2, 2, struct.pack("<b", exponent)),
-        (0x1C32, 1, struct.pack("<H", 2 if setup.dc else 1)),
-        (0x1C33, 1, struct.pack("<H", 2 if setup.dc else 0x22)),
+        (0x1C32, 1, struct.pack("<H", 2 if setup.sync0 else 1)),
+        (0x1C33, 1, struct.pack("<H", 2 if setup.sync0 else 0x22)),
         (0x1C32, 2, struct.pack("<I", setup.cycle_ns)),
         (0x1C33, 2, struct.pack("<I", setup.cycle_ns)),
     ):
@@ -387,7 +392,7 @@ def start_sync0(station: Station, setup: StationSetup, clock: Callable[[], float
 
     A start that has passed when it is activated comes only after the clock has wrapped (ETG.1000.4
     clause 6.7.3), and the drive then refuses OP: a lost frame or a pause of this computer must not
-    do that.
+    do that. Where the drive gets no SYNC0, that of an earlier exchange is stopped.
 
     Raises:
         LinkLost: frames are lost again and again.
@@ -402,7 +407,9 @@ def _sync0_started(setup: StationSetup) -> Steps[bool]:
     """One try; False where a frame was lost, or the start had passed before it was activated."""
     rules = setup.bring_up
     stopped = yield Write(_DC_ACTIVATE, b"\0")
-    yield Write(_DC_CONTROL, bytes([rules.activate & 0xFF]))
+    assigned = yield Write(_DC_CONTROL, bytes([rules.activate & 0xFF]))
+    if not setup.sync0:
+        return stopped is not None and assigned is not None
     here = yield Read(_DC_SYSTEM_TIME, 8)
     if here is None or stopped is None:
         return False

@@ -46,9 +46,9 @@ def _planned(setup: StationSetup | None) -> Message:
     planned: Message = {
         "planned_outputs": setup.rx.size,
         "planned_inputs": setup.tx.size,
-        "planned_activate": rules.activate if setup.dc else 0,
+        "planned_activate": rules.activate if setup.sync0 else 0,
     }
-    if setup.dc:
+    if setup.sync0:
         planned["planned_sync0_ns"] = rules.sync0_cycle_ns
     return planned
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 
-from drivers.doctor.diagnosis import AL_CAUSES, catalogue, diagnose
+from drivers.doctor import diagnosis
+from drivers.doctor.diagnosis import AL_CAUSES, Fact, catalogue, diagnose, fact_texts
 from drivers.doctor.evidence import Counters, Evidence, SyncManagerState
 from drivers.doctor.page import PAGE, text
 from drivers.ethercat.wire.al_status import al_status_text
 
+RULES = ("diagnosis", "can_diagnosis")
 MANAGERS = (
     SyncManagerState(2, 0x1200, 8, 0x64, True, 8),
     SyncManagerState(3, 0x1500, 6, 0x20, True, 6),
@@ -81,3 +84,26 @@ def test_every_text_is_there_in_both_languages() -> None:
 
 def test_the_page_is_that_of_the_catalogue() -> None:
     assert PAGE.read_text("utf-8") == text(), "write it again: python -m drivers.doctor.page"
+
+
+def test_every_fact_has_a_name_in_both_languages() -> None:
+    """Facts are made where the rules are; nobody reads ``al_status = 27`` on the page."""
+    folder = Path(diagnosis.__file__).parent
+    sources = "".join((folder / f"{name}.py").read_text("utf-8") for name in RULES)
+    made = set(re.findall(r'Fact\(\s*"(\w+)"', sources))
+    made |= {f"{name}_sm{number}" for name in ("assigned_bytes", "length") for number in (2, 3)}
+    made |= {"vendor", "product"}
+    assert made == set(fact_texts())
+    assert all(re.search("[一-鿿]|（", each.zh) for each in fact_texts().values())
+
+
+def test_codes_are_shown_as_manuals_print_them() -> None:
+    """ETG.1020 prints AL status codes in hexadecimal; times and counts are decimal."""
+    watchdog = Fact("al_status", 0x1B, 0)
+    assert (watchdog.shown, watchdog.shown_expected) == ("0x001B", "0x0000")
+    assert Fact("vendor", 0xA2B).shown == "0x00000A2B"
+    assert (Fact("sync0_cycle_ns", 1_000_000).shown, Fact("alias", 7).shown_expected) == (
+        "1000000",
+        None,
+    )
+    assert Fact("refused_object", "1C12:00").shown == "1C12:00"

@@ -32,12 +32,41 @@ def of(code: str, known: Profile, *facts: Fact) -> list[tuple[str, str, str]]:
 
 def test_the_operation_modes_of_the_file_come_before_those_of_others() -> None:
     found = of("clock_mode_wrong", profile(clock_modes=MODES))
-    assert [after for _, _, after in found] == ["0700h", "0300h"]
+    assert [after for _, _, after in found] == ["0700h", "0000h", "0300h"]
     first = trials([Cause("clock_mode_wrong", 3, ())], profile(clock_modes=MODES))[0]
     assert first.profile.bring_up is not None
     assert first.profile.bring_up.clock_mode == MODES[1]
     # Without a file the master's own 0300h is in use.
     assert of("clock_needed", servo_profile())[0][2] == "0700h"
+
+
+def test_without_distributed_clocks() -> None:
+    """A file that names modes, none with a clock, is brought up without SYNC0 (ETG.2000)."""
+    off = ClockMode(name="FreeRun", assign_activate=0)
+    assert station_bring_up(profile(clock_modes=(off,)), 1_000_000).activate == 0
+    assert station_bring_up(profile(), 1_000_000).activate == 0x300
+    clock = "bring_up.clock_modes"
+    # No pulse of the clock comes: the drive may do without.
+    assert of("sync0_missing", servo_profile())[0] == (clock, "0300h", "0000h")
+    # The file's own mode is used, with the PDOs that it assigns.
+    found = trials([Cause("clock_mode_wrong", 3, ())], profile(clock_modes=(MODES[0], off)))
+    assert [t.profile.bring_up.clock_modes for t in found if t.after == "0000h"] == [(off,)]  # type: ignore[union-attr]
+    # A drive that reports that it needs the clock is not tried without, and one without not again.
+    assert "0000h" not in [after for _, _, after in of("clock_needed", servo_profile())]
+    without = profile(clock_modes=(off,))
+    assert (clock, "0000h", "0300h") in of("clock_mode_wrong", without)
+    assert of("sync0_unsteady", without) == [("cycle", "1", "2"), ("cycle", "1", "4")]
+
+
+def test_the_shift_of_sync0_is_tried() -> None:
+    shift = "bring_up.clock_modes.sync0.shift_ns"
+    shifted = ClockMode(name="A", assign_activate=0x330, sync0=SyncSignal(shift_ns=-200_000))
+    (first, *_) = trials([Cause("sync0_unsteady", 3, ())], profile(clock_modes=(shifted,)))
+    assert (first.setting, first.before, first.after) == (shift, "-200000", "0")
+    rules = station_bring_up(first.profile, 1_000_000)
+    assert (rules.activate, rules.sync0_shift_ns) == (0x330, 0)
+    # Half of the 1 ms of a trial.
+    assert of("sync0_unsteady", servo_profile())[0] == (shift, "0", "500000")
 
 
 def test_a_setting_that_changes_nothing_is_not_tried() -> None:
@@ -78,7 +107,7 @@ def test_one_setting_differs_in_each_trial() -> None:
     assert of("watchdog_refused", known) == [("bring_up.watchdog", "20400 ns", "-")]
     assert of("assignment_locked", known) == [("bring_up.coe.pdo_assign", "-", "false")]
     assert of("mapping_locked", known) == [("pdo.remappable", "true", "false")]
-    assert of("sync0_unsteady", known) == [("cycle", "1", "2"), ("cycle", "1", "4")]
+    assert of("watchdog_expired", known) == of("watchdog_refused", known)
     fixed = ClockMode(name="A", assign_activate=0x300, sync0=SyncSignal(cycle_ns=40_000_000))
     assert of("cycle_refused", profile(clock_modes=(fixed,)))[0] == (
         "bring_up.clock_modes.sync0.cycle_ns",
@@ -147,6 +176,7 @@ async def test_trials_end_with_the_one_that_works_and_leave_the_profile_as_it_wa
     bus.attach(1, known)
     found = await tried(bus, 1, known, [Cause("clock_mode_wrong", 3, ())])  # type: ignore[arg-type]
     assert [(each["after"], each["reached"]) for each in found] == [
+        ("0000h", False),
         ("0300h", False),
         ("0700h", True),
     ]

@@ -5,6 +5,8 @@ No maker's file is copied. What is odd about each is in its comment.
 
 from __future__ import annotations
 
+import re
+
 _TYPES = {8: "SINT", 16: "UINT", 32: "DINT"}
 
 
@@ -192,7 +194,8 @@ SAMPLES: dict[str, bytes] = {
         '<CycleTimeSync1 Factor="2">0</CycleTimeSync1><ShiftTimeSync1>125000</ShiftTimeSync1>'
         "</OpMode></Dc>",
     ),
-    # No distributed clocks, other watchdog registers, control bytes with interrupts, EoE and FoE.
+    # Distributed clocks in the chip, no mode that uses them; other watchdog registers, control
+    # bytes with interrupts, EoE and FoE.
     "without_clock": esi(
         FREE_OUT + FREE_IN,
         sms=managers(control=(0x24, 0x20), box=192),
@@ -227,4 +230,67 @@ SAMPLES: dict[str, bytes] = {
         '<CycleTimeSync0 Factor="1">0</CycleTimeSync0><Sm No="2"><Pdo>#x1601</Pdo></Sm>'
         '<Sm No="3"><Pdo>#x1A01</Pdo></Sm></OpMode></Dc>',
     ),
+}  # fmt: skip
+
+
+def _of_modules(device_pdos: str, module_pdos: str, slots: str, dc: str = DC) -> str:
+    """A device that has its objects and PDOs from the module in its slots.
+
+    Objects of CiA 402 lie elsewhere in each slot, the maker's own are there once.
+    """
+    text = esi(device_pdos, dc=dc).decode()
+    described = re.search("<Profile>.*</Profile>", text)
+    assert described is not None
+    own = text.replace(described[0], "").replace("</Device>", f"{slots}</Device>")
+    module = re.sub("<Index>(?=#x[61])(?!#x1000)", '<Index DependOnSlot="1">',
+                    f"{module_pdos}{described[0]}")  # fmt: skip
+    return own.replace(
+        "</Devices>",
+        '</Devices><Modules><Module><Type ModuleIdent="#x10">AX</Type><Name>Axis</Name>'
+        f"{module}</Module></Modules>",
+    )
+
+
+def _with_notations(text: str) -> str:
+    """Numbers in every notation, remarks within values, a prefix at every tag."""
+    for before, after in (
+        ("#x6040<", "24640<"), ("#x607A<", "0x607a<"), ("#x6064<", "#x<!-- was 6063 -->6064<"),
+        ("#x1600<", "5632<"), ("#x1A00<", "#X1a00<"), ("<BitLen>16<", "<BitLen>#x10<"),
+    ):  # fmt: skip
+        assert before in text
+        text = text.replace(before, after)
+    text = re.sub(r"<(/?)(?=[A-Z])", r"<\1esi:", text)
+    return text.replace("<esi:EtherCATInfo>", '<esi:EtherCATInfo xmlns:esi="urn:esi">')
+
+
+#: Further files for the way from scan to jog alone.
+ODD: dict[str, bytes] = {
+    # Padding of 3, 10 and 14 bytes between the entries; nothing can be written.
+    "notations": _with_notations(
+        esi(
+            pdo(0x1600, 0x6040, 0x6060, pad(24), 0x607A, pad(80), 0x60FF,
+                sm=2, Fixed="true", Mandatory="TRUE")
+            + pdo(0x1A00, 0x6041, 0x6061, pad(3), pad(5), 0x6064, pad(112), 0x606C, 0x6077,
+                  sm=3, Fixed=1),
+            coe='SdoInfo="1" PdoAssign="0" PdoConfig="0"',
+        ).decode()
+    ).encode(),
+    # One Slot that stands for two: two axes, whose process data are all assigned as delivered.
+    "two_axes": _of_modules(
+        "",
+        pdo(0x1600, 0x6040, 0x6060, 0x607A, 0x60FF, sm=2, Fixed=1)
+        + pdo(0x1A00, 0x6041, 0x6061, 0x6064, 0x606C, 0x6077, sm=3, Fixed=1),
+        '<Slots MaxSlotCount="2" SlotPdoIncrement="#x10" SlotIndexIncrement="2048">'
+        '<Slot MinInstances="2" MaxInstances="2"><ModuleIdent Default="1">#x10</ModuleIdent>'
+        "</Slot></Slots>",
+    ).encode(),
+    # The module's PDOs in the place of the device's, which have too little; no clock; UTF-16.
+    "overwritten": _of_modules(
+        pdo(0x1600, 0x6040, sm=2, Fixed=1, OverwrittenByModule=1)
+        + pdo(0x1A00, 0x6041, sm=3, Fixed=1, OverwrittenByModule=1),
+        pdo(0x1600, 0x6040, 0x6060, 0x607A, 0x60FF, sm=2, Fixed=1)
+        + pdo(0x1A00, 0x6041, 0x6061, 0x6064, 0x606C, 0x6077, sm=3, Fixed=1),
+        "<Slots><Slot><ModuleIdent>#x10</ModuleIdent></Slot></Slots>",
+        dc="<Dc><OpMode><Name>FreeRun</Name><AssignActivate>#x0</AssignActivate></OpMode></Dc>",
+    ).replace('version="1.0"', 'version="1.0" encoding="utf-16"').encode("utf-16"),
 }  # fmt: skip

@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 from collections import deque
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
@@ -25,7 +26,7 @@ from drivers.virtual.wires.ethercat.slave import Slave, SlaveIdentity
 from profiles.schema import Parameter, PdoPart, PdoSet, PdoSpec, Profile
 from tests.wire.ethercat_host.servo_device import ServoDevice, servo_profile
 from tests.wire.ethercat_slave.dictionary_device import _parameter
-from tests.wire.makers_files.samples import SAMPLES
+from tests.wire.makers_files.samples import ODD, SAMPLES
 
 RULES = {
     0x8001: "a command of Init to Pre-Op or Pre-Op to Safe-Op was not written",
@@ -49,8 +50,8 @@ _SLOW = 0.6
 
 
 def number(text: str | None) -> int:
-    bare = (text or "0").strip()
-    return int(bare[2:], 16) if bare.startswith("#x") else int(bare)
+    bare = (text or "0").strip().lower()
+    return int(bare[2:], 16) if bare.startswith(("#x", "0x")) else int(bare)
 
 
 def flag(element: Element | None, name: str) -> bool:
@@ -272,7 +273,11 @@ def _profile(file: File) -> Profile:
         p.model_copy(update={"default_raw": own.get(key, p.default_raw)})
         for key, p in identity.items()
     ]
+    seen: set[int] = set()
     for item in file.device.iterfind("Profile/Dictionary/Objects/Object"):
+        if number(item.findtext("Index")) in seen:
+            continue  # of all slots together
+        seen.add(number(item.findtext("Index")))
         if (item.findtext("Type") or "").startswith("DT"):
             parameters += _record(file, item)
             continue
@@ -311,7 +316,7 @@ def _profile(file: File) -> Profile:
         max_entries=12,
         remappable=configurable,
         source="file",
-        sync_modes=("DC",) if any(m.activate for m in file.modes) else ("SM",),
+        sync_modes=("SM",) if file.device.find("Dc") is None else ("DC",),
     )
     link = base.links[0].model_copy(
         update={
@@ -467,10 +472,47 @@ def _period(cycle: tuple[int, int], base: int) -> int:
 
 
 def read(name: str) -> File:
-    root = ElementTree.fromstring(SAMPLES[name])
+    root = ElementTree.fromstring((SAMPLES | ODD)[name])
+    for element in root.iter():
+        element.tag = element.tag.rpartition("}")[2]
     device = root.find("Descriptions/Devices/Device")
     assert device is not None
+    _put_modules(root, device)
     return File(device)
+
+
+def _put_modules(root: Element, device: Element) -> None:
+    """Make the device whole: each slot has the only module of the file."""
+    slots, module = device.find("Slots"), root.find("Descriptions/Modules/Module")
+    if slots is None or module is None:
+        return
+    count = sum(number(slot.get("MinInstances", "1")) for slot in slots.iterfind("Slot"))
+    for place in range(count):
+        copied = deepcopy(module)
+        for tag in ("RxPdo", "TxPdo"):
+            for pdo in copied.findall(tag):
+                _shift(pdo, place * number(slots.get("SlotPdoIncrement")))
+                own = [p for p in device.findall(tag) if _index(p) == _index(pdo)]
+                for old in own:
+                    device.remove(old)
+                device.append(pdo)
+                for entry in pdo.iterfind("Entry"):
+                    _shift(entry, place * number(slots.get("SlotIndexIncrement")))
+        for item in copied.iterfind("Profile/Dictionary/Objects/Object"):
+            _shift(item, place * number(slots.get("SlotIndexIncrement")))
+        described = copied.find("Profile")
+        if described is not None:
+            device.append(described)
+
+
+def _index(item: Element) -> int:
+    return number(item.findtext("Index"))
+
+
+def _shift(item: Element, by: int) -> None:
+    index = item.find("Index")
+    if index is not None and flag(index, "DependOnSlot"):
+        index.text = str(number(index.text) + by)
 
 
 def make_device(

@@ -18,7 +18,7 @@ from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import Namespace, unavailable
 from profiles.importer import import_file
 from profiles.schema import DataType, Profile
-from tests.wire.makers_files.samples import SAMPLES
+from tests.wire.makers_files.samples import ODD, SAMPLES
 
 _FACTORY = "tests.wire.makers_files.strict_slave:make_device"
 _SLAVE = "tests.wire.makers_files.strict_slave:StrictSlave"
@@ -66,7 +66,7 @@ async def brought(
 
 
 def profile_of(name: str) -> Profile:
-    return import_file(SAMPLES[name], f"{name}.xml").profile
+    return import_file((SAMPLES | ODD)[name], f"{name}.xml").profile
 
 
 def signal(index: int, kind: DataType) -> CyclicSignal:

@@ -16,8 +16,7 @@ __all__ = ["namespace"]
 def _with_activate(profile: Profile, value: int) -> Profile:
     rules = profile.bring_up
     assert rules is not None
-    mode = rules.clock_mode
-    assert mode is not None
+    mode = rules.clock_mode or rules.clock_modes[0]
     wrong = mode.model_copy(update={"assign_activate": value})
     return profile.model_copy(
         update={"bring_up": rules.model_copy(update={"clock_modes": (wrong,)})}
@@ -41,6 +40,7 @@ def _as_remappable(profile: Profile) -> Profile:
     ("name", "setting", "after"),
     [
         ("two_pulses", "bring_up.clock_modes", "0700h"),
+        ("without_clock", "bring_up.clock_modes", "0000h"),
         ("two_each_way", "pdo.remappable", "false"),
     ],
 )

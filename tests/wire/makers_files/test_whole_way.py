@@ -27,7 +27,7 @@ from drivers.link import ScopeBlock
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import Namespace
 from tests.virtual.tools.rig import silent
-from tests.wire.makers_files.samples import SAMPLES
+from tests.wire.makers_files.samples import ODD, SAMPLES
 from tests.wire.makers_files.test_bring_up import brought, namespace, profile_of
 
 __all__ = ["namespace"]
@@ -139,3 +139,10 @@ async def test_scan_jog_scope_and_response_with_the_file_alone(
         await jogged(way)
         recorded(way)
         await responded(way)
+
+
+@pytest.mark.parametrize("name", ODD)
+async def test_scan_jog_and_scope_with_an_odd_file(namespace: Namespace, name: str) -> None:
+    async with begun(namespace, name) as way:
+        await jogged(way)
+        recorded(way)

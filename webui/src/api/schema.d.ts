@@ -5305,14 +5305,24 @@ export interface components {
         /**
          * DoctorFact
          * @description A piece of evidence as it is and as it should be (null: nobody says).
+         *
+         *     ``shown`` and ``shown_expected`` are the same in the notation of manuals.
          */
         DoctorFact: {
             /** Actual */
             actual: number | string;
             /** Expected */
             expected: number | string | null;
+            /** Label */
+            label: string;
+            /** Label Zh */
+            label_zh: string;
             /** Name */
             name: string;
+            /** Shown */
+            shown: string;
+            /** Shown Expected */
+            shown_expected: string | null;
         };
         /**
          * DoctorTrial

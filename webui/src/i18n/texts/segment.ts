@@ -126,13 +126,14 @@ export const segment = {
   'segment.doctorStation': ['Station {station}', '站点 {station}'],
   'segment.doctorWell': ['is in Operational', '已处于 Operational'],
   'segment.doctorFact': [
-    '{name} = {actual}, should be {expected}',
-    '{name} = {actual}，应为 {expected}',
+    '{name}: {actual}, should be {expected}',
+    '{name}：{actual}，应为 {expected}',
   ],
+  'segment.doctorFactAlone': ['{name}: {actual}', '{name}：{actual}'],
   'segment.trials': ['Settings to try', '可尝试的设置'],
   'segment.trialsHelp': [
-    'A trial takes the drive to Operational with one setting of servodeck changed, then undoes it. No parameter of the drive is written, and no axis is enabled.',
-    '尝试时仅更改 servodeck 的一项设置，使驱动器进入 Operational，随后撤销该更改。不写入驱动器参数，也不使能任何轴。',
+    'A trial takes the drive to Operational with one setting of servodeck changed, then undoes it. No parameter of the drive is written, and no axis is enabled. bring_up.clock_modes is the value of register 0980h (AssignActivate); 0000h is without distributed clocks.',
+    '尝试时仅更改 servodeck 的一项设置，使驱动器进入 Operational，随后撤销该更改。不写入驱动器参数，也不使能任何轴。bring_up.clock_modes 为寄存器 0980h（AssignActivate）的值；0000h 表示不使用分布式时钟。',
   ],
   'segment.trial': [
     '{setting}: {after} instead of {before}',

@@ -1,8 +1,8 @@
 import { Button } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../../api/client'
-import type { StationDiagnosis } from '../../../api/schema'
-import { useLanguage, useT } from '../../../i18n'
+import type { DoctorFact, StationDiagnosis } from '../../../api/schema'
+import { useLanguage, useT, type T } from '../../../i18n'
 import { ProblemNote } from '../../../widgets/ProblemNote'
 import { useAction } from '../../../widgets/useAction'
 import { TrialList } from './TrialList'
@@ -35,15 +35,7 @@ export function DoctorCard({ url }: { url: string }) {
                   <p>{chinese ? cause.remedy_zh : cause.remedy}</p>
                   <ul className="plain-list dim num">
                     {cause.facts.map((fact) => (
-                      <li key={fact.name}>
-                        {fact.expected === null
-                          ? `${fact.name} = ${fact.actual}`
-                          : t('segment.doctorFact', {
-                              name: fact.name,
-                              actual: fact.actual,
-                              expected: fact.expected,
-                            })}
-                      </li>
+                      <li key={fact.name}>{factText(t, fact, chinese)}</li>
                     ))}
                   </ul>
                 </li>
@@ -55,4 +47,11 @@ export function DoctorCard({ url }: { url: string }) {
       ))}
     </section>
   )
+}
+
+function factText(t: T, fact: DoctorFact, chinese: boolean): string {
+  const name = chinese ? fact.label_zh : fact.label
+  return fact.shown_expected === null
+    ? t('segment.doctorFactAlone', { name, actual: fact.shown })
+    : t('segment.doctorFact', { name, actual: fact.shown, expected: fact.shown_expected })
 }
