@@ -240,6 +240,6 @@ async def test_who_cancels_by_the_interface_is_named(bench: Bench, http: httpx.A
     answer = (await http.delete(f"/jobs/{job.id}")).json()
     assert answer["state"] == "cancelled"
     cause = answer["cancellation"]["cause_message"]
-    assert cause["code"] in ("work.cancelled-by", "work.cancelled-by-command")
-    if cause["code"] == "work.cancelled-by":
-        assert cause["params"]["person"]
+    assert cause == {"code": "work.cancelled-by", "params": {"person": "local user"}}
+    assert job.cancel_cause is not None
+    assert answer["cancellation"]["cause"] == "local user cancelled it"

@@ -8009,6 +8009,11 @@ export interface components {
             file: string;
             /** Parameters */
             parameters: number;
+            /**
+             * Problem Messages
+             * @description the same as codes and facts
+             */
+            problem_messages: components["schemas"]["MessageInfo"][];
             /** Problems */
             problems: string[];
         };
