@@ -40,8 +40,7 @@ export function JobNote({ id, onClose }: { id: string | null; onClose?: () => vo
   if (job.state !== 'running') {
     return (
       <p className={`note ${job.state === 'done' ? 'good' : 'warn'}`} role="status">
-        {ended(job, t, say)}{' '}
-        <span className="num">{duration(seconds(job, now))}</span>
+        {ended(job, t, say)} <span className="num">{duration(seconds(job, now))}</span>
         {onClose && (
           <button type="button" className="plain" onClick={onClose}>
             {t('close')}
