@@ -306,6 +306,20 @@ def job(known: Job) -> models.JobInfo:
         motion=known.motion,
         result=known.result and result_in_language(known.result, language()),
         problem=problem_of(known.error) if known.error else None,
+        cancellation=_cancellation(known),
+    )
+
+
+def _cancellation(known: Job) -> models.Cancellation | None:
+    cause = known.cancel_cause
+    if known.state != "cancelled" or cause is None:
+        return None
+    remedy = cause.remedy()
+    return models.Cancellation(
+        cause=cause.words(language()),
+        cause_message=message_of(cause),
+        remedy=None if remedy is None else remedy.words(language()),
+        remedy_message=message_or_none(remedy),
     )
 
 

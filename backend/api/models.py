@@ -55,6 +55,15 @@ class PlainResult(BaseModel):
     model_config = ConfigDict(extra="allow")
 
 
+class Cancellation(Message):
+    """Why a job was cancelled, and what to do about it; the sentences are for whoever asked."""
+
+    cause: str
+    cause_message: MessageInfo = Field(description="of cause, as code and facts")
+    remedy: str | None
+    remedy_message: MessageInfo | None = Field(description="of remedy, as code and facts")
+
+
 class JobInfo(Message):
     """A piece of long work."""
 
@@ -73,7 +82,10 @@ class JobInfo(Message):
     result: Annotated[ToolOutcome | PlainResult | None, Field(union_mode="left_to_right")] = Field(
         description="of a tool: its result, which its field tool names"
     )
-    problem: Problem | None
+    problem: Problem | None = Field(description="why it failed")
+    cancellation: Cancellation | None = Field(
+        default=None, description="why it was cancelled, where that is known"
+    )
 
 
 class LogEntry(Message):

@@ -153,7 +153,7 @@ class AuditRecorder:
                 "started" if job.state == "running" else job.state,
                 axis=self._name_of(job.drive) if job.drive else "",
                 target=job.id,
-                outcome=None if job.error is None else why_of(job.error),
+                outcome=_outcome(job),
                 detail=detail,
                 title=job.title_text,
             )
@@ -189,3 +189,10 @@ class AuditRecorder:
             self._audit.add(
                 Fact("stop", "pressed", axis=self._name_of(drive), detail={"drive": drive})
             )
+
+
+def _outcome(job: Job) -> Text | None:
+    """Why a job did not come to its end; None where it runs or is done."""
+    if job.error is not None:
+        return why_of(job.error)
+    return job.cancel_cause if job.state == "cancelled" else None

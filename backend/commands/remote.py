@@ -91,11 +91,7 @@ class Remote:
             await asyncio.shield(self.raw("DELETE", f"/jobs/{job.id}"))
             raise
         if job.state != "done":
-            reported = job.problem
-            raise NotAllowed(
-                reported.detail if reported else f"{job.title}: the job was {job.state}",
-                remedy=reported.remedy if reported else None,
-            )
+            raise _not_done(job)
         if isinstance(job.result, BaseModel):
             return job.result.model_dump(mode="json")
         return job.result or {}
@@ -174,6 +170,19 @@ def authorisation() -> dict[str, str]:
     """The header of the token in the environment, if there is one."""
     token = os.environ.get("SERVODECK_TOKEN")
     return {"Authorization": f"Bearer {token}"} if token else {}
+
+
+def _not_done(job: JobInfo) -> NotAllowed:
+    """Why a job of the server is not done, with the server's remedy."""
+    title = Text.from_wire(job.title_message.model_dump())
+    if job.problem is not None:
+        return NotAllowed(job.problem.detail, remedy=job.problem.remedy)
+    if job.state != "cancelled":
+        return NotAllowed("command.job-failed", title=title)
+    if (found := job.cancellation) is None:
+        return NotAllowed("command.job-cancelled-unknown", title=title)
+    why = Text.from_wire(found.cause_message.model_dump())
+    return NotAllowed("command.job-cancelled", title=title, why=why, remedy=why.remedy())
 
 
 def _problem(answer: httpx.Response) -> DriveError:

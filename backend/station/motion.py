@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+_STOP_PRESSED = text("motion.stop-was-pressed")
+
 
 class Motion:
     """For one bench: what holds an axis still, STOP for all, and switching the power off."""
@@ -108,17 +110,13 @@ class Motion:
         if not drives or not job.stoppable:
             return contextlib.nullcontext()
 
-        def ended(_why: Text) -> None:
-            if job.task is not None:
-                job.task.cancel()
-
         @contextlib.contextmanager
         def grants() -> Iterator[None]:
             with contextlib.ExitStack() as held:
                 for drive in drives:
                     held.enter_context(
                         self._bench.authority.granted(
-                            drive.id, drive.name, job.title_text, ended=ended
+                            drive.id, drive.name, job.title_text, ended=job.cancel
                         )
                     )
                 yield
@@ -151,8 +149,10 @@ class Motion:
         self._later.add(task)
         task.add_done_callback(self._later.discard)
 
-    async def stop(self, drive_ids: Sequence[str]) -> dict[str, Text | None]:
-        """Quick stop of these drives, all at once; motion jobs are cancelled.
+    async def stop(
+        self, drive_ids: Sequence[str], why: Text = _STOP_PRESSED
+    ) -> dict[str, Text | None]:
+        """Quick stop of these drives, all at once; motion jobs are cancelled because of ``why``.
 
         The write does not wait for any job's cleanup, and goes out even when whoever asked for
         it is gone by then. Returns drive id to problem, None where the drive took the stop.
@@ -165,11 +165,11 @@ class Motion:
         for connected in connected_drives:
             # Before anything else runs: nothing in progress may enable the axis from here on.
             connected.axis.forbid()
-            self._bench.authority.revoke(connected.drive.id, text("motion.stop-was-pressed"))
+            self._bench.authority.revoke(connected.drive.id, why)
             job = self._bench.jobs.moving(connected.drive.id)
-            if job is not None and job.stoppable and job.task is not None:
+            if job is not None and job.stoppable:
                 # Cancelled before the write, so that it sends nothing after it but its cleanup.
-                job.task.cancel()
+                job.cancel(why)
         task = asyncio.create_task(self._stop(connected_drives), name="stop")
         self._stops.add(task)
         task.add_done_callback(self._stops.discard)

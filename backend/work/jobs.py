@@ -13,10 +13,13 @@ from typing import Literal
 
 from backend.people.identity import Actor, acting, acting_person
 from drivers.errors import Busy, DriveError
-from drivers.texts.message import Text, as_text, prose
+from drivers.texts.message import Text, as_text, prose, text
 
 JobState = Literal["running", "done", "failed", "cancelled"]
 JobResult = dict[str, object]
+
+_BY_COMMAND = text("work.cancelled-by-command")
+_SERVER_ENDS = text("work.server-ends")
 
 
 class Progress:
@@ -47,6 +50,8 @@ class Job:
     cancels it; not so for work that holds the axis still and must not be left half done.
     ``partner`` is the other axis that it moves and holds, of a machine with two.
     ``actor`` is who began it, through which live connection; None where the program did.
+    ``cancel_cause`` is the first reason for which it was cancelled; it counts where ``state`` is
+    cancelled, as work that has just come to its end stays done.
     """
 
     id: str
@@ -65,6 +70,7 @@ class Job:
     actor: Actor | None = None
     task: asyncio.Task[None] | None = None
     partner: str | None = None
+    cancel_cause: Text | None = None
 
     @property
     def moved(self) -> tuple[str, ...]:
@@ -77,6 +83,14 @@ class Job:
     def title(self) -> str:
         """What it is, in English."""
         return self.title_text.words()
+
+    def cancel(self, why: Text) -> None:
+        """Cancel the work, which then runs its cleanup; ``why`` is kept where it is the first."""
+        if self.task is None or not _runs(self):
+            return
+        if self.cancel_cause is None:
+            self.cancel_cause = why
+        self.task.cancel()
 
     async def wait(self) -> None:
         """Until the job has ended, however it ended."""
@@ -134,12 +148,9 @@ class JobRunner:
         running = [job for job in self._jobs.values() if _runs(job) and not job.motion]
         same = sum(job.kind == kind and job.drive == drive for job in running)
         if same >= self.MOST_OF_A_KIND or len(running) >= self.MOST:
-            what, limit = (
-                ("such jobs", self.MOST_OF_A_KIND)
-                if same >= self.MOST_OF_A_KIND
-                else ("jobs", self.MOST)
-            )
-            raise Busy("work.run-already", drive=drive, limit=str(limit), bound=limit, what=what)
+            if same >= self.MOST_OF_A_KIND:
+                raise Busy("work.run-already-of-kind", drive=drive, limit=str(self.MOST_OF_A_KIND))
+            raise Busy("work.run-already", drive=drive, limit=str(self.MOST))
 
     def start(
         self,
@@ -190,15 +201,15 @@ class JobRunner:
         self._drop_old()
         return job
 
-    async def cancel(self, job: Job) -> None:
-        """Cancel and wait for the job's cleanup."""
+    async def cancel(self, job: Job, why: Text = _BY_COMMAND) -> None:
+        """Cancel because of ``why``, and wait for the job's cleanup."""
         if job.task is not None and _runs(job):
-            job.task.cancel()
+            job.cancel(why)
             await job.wait()
 
     async def close(self) -> None:
         """Cancel everything and wait for the cleanups."""
-        await asyncio.gather(*(self.cancel(job) for job in self.all()))
+        await asyncio.gather(*(self.cancel(job, _SERVER_ENDS) for job in self.all()))
 
     async def _run(self, job: Job, work: Work) -> None:
         try:

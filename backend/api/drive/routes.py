@@ -106,7 +106,14 @@ async def _alone(
     )
     await job.wait()
     if job.state == "cancelled":
-        raise NotAllowed("api-drive.stop-pressed-during", drive=drive.name, title=title)
+        why = job.cancel_cause or text("work.cancelled-by-command")
+        raise NotAllowed(
+            "api-drive.cancelled-during",
+            drive=drive.name,
+            title=title,
+            why=why,
+            remedy=why.remedy(),
+        )
     if job.error is not None:
         raise job.error
 

@@ -115,8 +115,8 @@ class Unattended:
 
     def _end(self, permission: Permission) -> None:
         job = self._running.get(permission.id)
-        if job is not None and job.task is not None:
-            job.task.cancel()
+        if job is not None:
+            job.cancel(text("health.permission-withdrawn"))
 
     async def baseline(self, connected: ConnectedDrive) -> Baseline:
         """The baseline of an axis, whose settings are what is permitted.
@@ -234,6 +234,8 @@ class Unattended:
             self._running.pop(permission.id, None)
         ends: dict[str, Outcome] = {"done": "done", "cancelled": "cancelled"}
         why = why_of(job.error) if isinstance(job.error, DriveError) else None
+        if job.state == "cancelled" and job.cancel_cause is not None:
+            why = job.cancel_cause.to_wire()
         outcome = ends.get(job.state, "failed")
         await self._note(permission, Attempt(at=at, cause=cause, outcome=outcome, why=why))
         if outcome == "done":

@@ -84,7 +84,8 @@ class PeopleControl:
             held_by.release(drive, "control was taken")
             if self._bench.jobs.moving(drive) is not None:
                 # Who watched this motion does not control it any more.
-                await self._bench.motion.stop([drive])
+                why = text("work.control-taken", person=identity.person)
+                await self._bench.motion.stop([drive], why)
         self._bench.leases.override(drive, page.id, identity.person)
         line = text("journal.overrides-control", person=identity.person)
         self._log(drive, "overrides", line, identity)

@@ -29,7 +29,7 @@ from backend.api.live.people_messages import (
 from backend.api.live.people_motion import PeopleMotions
 from backend.api.live.people_views import PeopleViews, chat_line
 from backend.api.live.shared import Shared, only
-from backend.api.live.watch import PeopleWatch
+from backend.api.live.watch import SILENT_END_S, PeopleWatch
 from backend.api.people.record import PeopleRecord
 from backend.people.errors import Forbidden, TooOften
 from backend.people.identity import Identity
@@ -73,7 +73,7 @@ class PeopleLive:
             then.callback(self.changed)
             then.callback(self._bench.leases.drop, page.id)
             then.callback(self._motions.let_go, page, text("api-live.is-gone"))
-            then.callback(self._motions.end, page, text("api-live.is-gone"))
+            then.callback(self._motions.end, page, text("api-live.is-gone"), text("work.page-gone"))
             self._talk.pop(page.id, None)
             self._support.release_all(page.id, "the connection on site closed")
 
@@ -83,7 +83,8 @@ class PeopleLive:
         if self._bench.leases.held_by(page.id):
             page.release(None, "the page fell silent")
             self._bench.leases.lose(page.id)
-        self._motions.end(page, text("api-live.fell-silent"))
+        why = text("work.page-not-reachable", silent_s=SILENT_END_S)
+        self._motions.end(page, text("api-live.fell-silent"), why)
 
     # --- requests ---------------------------------------------------------------------
 

@@ -27,8 +27,8 @@ class PeopleMotions:
         bench.on_job.append(self._job)
         self._support.on_disabled.append(self._disabled)
 
-    def end(self, page: Page, what: Text) -> None:
-        """What this page moves comes to its end; ``what`` became of it."""
+    def end(self, page: Page, what: Text, why: Text) -> None:
+        """What this page moves comes to its end because of ``why``; ``what`` became of it."""
         for job in self._bench.jobs.all():
             own = job.actor is not None and job.actor.connection == page.id
             # A jog ends by its own dead-man, with its ramp; and a second cancelling would disturb
@@ -38,7 +38,7 @@ class PeopleMotions:
             line = text("api-live.job-ended-with-page", job_title=job.title_text, what=what)
             self._bench.journal.add(line, level="warning", drive=job.drive)
             self._ending.add(job.id)
-            self._spawn(self._cancel(job))
+            self._spawn(self._cancel(job, why))
 
     def let_go(self, page: Page, what: Text) -> None:
         """Nothing stays enabled that nobody looks after: not what this page enabled and left so.
@@ -59,9 +59,9 @@ class PeopleMotions:
                 self._bench.journal.add(line, level="warning", drive=drive)
                 self._spawn(self._bench.motion.let_go(drive))
 
-    async def _cancel(self, job: Job) -> None:
+    async def _cancel(self, job: Job, why: Text) -> None:
         try:
-            await self._bench.jobs.cancel(job)
+            await self._bench.jobs.cancel(job, why)
         finally:
             self._ending.discard(job.id)
 
@@ -89,7 +89,7 @@ class PeopleMotions:
             drives |= {d for d in self._bench.leases.held_by(page.id) if self._is_enabled(d)}
             if self._support.running(invitation) is None:
                 self._bench.leases.drop(page.id)
-        self._stop(drives, f"{invitation.guest}: {why}")
+        self._stop(drives, invitation.guest, as_text(why))
 
     def _job(self, job: Job) -> None:
         """A guest's motion that began just as the button was let go."""
@@ -98,15 +98,18 @@ class PeopleMotions:
             return
         invitation = self._support.of_session(actor.identity.session)
         if invitation is None or not self._support.enabled(invitation.id):
-            self._stop({job.drive}, "the enabling button is not held")
+            why = text("people.enabling-not-held")
+            self._stop({job.drive}, actor.identity.person, why)
 
-    def _stop(self, drives: set[str], why: str) -> None:
+    def _stop(self, drives: set[str], guest: str, why: Text) -> None:
         known = [drive for drive in drives if drive in self._bench.connected_drives]
         if known:
             for drive in known:
-                line = text("api-live.stopped-why", why=why)
+                line = text("api-live.stopped-why", guest=guest, why=why)
                 self._bench.journal.add(line, level="warning", drive=drive)
-            self._spawn(self._bench.motion.stop(known))
+            self._spawn(
+                self._bench.motion.stop(known, text("work.guest-stopped", guest=guest, why=why))
+            )
 
     def _is_enabled(self, drive: str) -> bool:
         connected = self._bench.connected_drives.get(drive)

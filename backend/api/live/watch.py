@@ -18,10 +18,12 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-#: With the quarter second between looks, a silent connection loses control within 2 s, and what
-#: moves by its command ends.
+#: With the quarter second between looks, a silent connection loses control within `SILENT_END_S`,
+#: and what moves by its command ends.
 SILENCE_S = 1.7
 _LOOK_S, _HOLD_LOOK_S, _TEND_S = 0.25, 0.02, 5.0
+#: A page that was not heard for this long, in s, has lost control: what people are shown.
+SILENT_END_S = 2.0
 
 
 class PeopleWatch:

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Request, Response
 
 from backend.api.context import TheBench
-from backend.api.errors import NotFound
+from backend.api.errors import NotFound, message_of
 from backend.api.station.models_description import ImportedList
 from backend.parameters.lists import export_list, import_list
 from backend.parameters.set_file import MAX_BYTES, BadSet
@@ -97,4 +97,5 @@ async def store_list(
         file=stored,
         parameters=len(found.readings),
         problems=[each.words(language()) for each in found.problems[:200]],
+        problem_messages=[message_of(each) for each in found.problems[:200]],
     )

@@ -119,6 +119,7 @@ class ImportedList(Message):
     file: str
     parameters: int
     problems: list[str]
+    problem_messages: list[MessageInfo] = Field(description="the same as codes and facts")
 
 
 class ProfileTexts(Message):

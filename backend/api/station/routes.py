@@ -259,7 +259,9 @@ async def cancel_job(
         require_right(people, me, Right.FILES, found.drive)
         if found.drive is not None:
             bench.leases.require(found.drive, connection)
-    await bench.jobs.cancel(found)
+    person = me.person
+    why = text("work.cancelled-by", person=person) if person else text("work.cancelled-by-command")
+    await bench.jobs.cancel(found, why)
     return convert.job(found)
 
 

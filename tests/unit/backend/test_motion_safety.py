@@ -360,6 +360,7 @@ async def test_a_motion_whose_permission_ends_is_braked_and_loses_its_power(
     assert servo.number(STATUS) != ENABLED
     assert x.axis.drive.pending_restores.entries == ()
     assert job.state == "cancelled", job.error
+    assert job.cancel_cause == text("motion.session-is-over")
 
 
 async def test_a_gear_changed_by_another_program_ends_the_motion(
@@ -381,6 +382,8 @@ async def test_a_gear_changed_by_another_program_ends_the_motion(
         await x.monitor.refresh()
         await job.wait()
     assert job.state == "cancelled", (job.error, servo.words())
+    assert job.cancel_cause is not None
+    assert job.cancel_cause.code == "scales.changed-in-motion"
     assert x.axis.drive.pending_restores.entries == ()
     assert servo.number(STATUS) != ENABLED
     assert any(

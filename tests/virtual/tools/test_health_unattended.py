@@ -321,6 +321,8 @@ async def test_taken_back_during_a_run_the_run_ends(station: Station) -> None:
     await station.ok("DELETE", "/drives/x/health/permission")
     await station.ends()
     assert station.bench.jobs.all()[-1].state == "cancelled"
+    assert (why := station.bench.jobs.all()[-1].cancel_cause) is not None
+    assert why.code == "health.permission-withdrawn"
     assert station.bench.authority.grant_of("x") is None
 
 

@@ -4652,6 +4652,20 @@ export interface components {
             url: string;
         };
         /**
+         * Cancellation
+         * @description Why a job was cancelled, and what to do about it; the sentences are for whoever asked.
+         */
+        Cancellation: {
+            /** Cause */
+            cause: string;
+            /** @description of cause, as code and facts */
+            cause_message: components["schemas"]["MessageInfo"];
+            /** Remedy */
+            remedy: string | null;
+            /** @description of remedy, as code and facts */
+            remedy_message: components["schemas"]["MessageInfo"] | null;
+        };
+        /**
          * CandidateInfo
          * @description A design: what it sets, and what is predicted of it.
          */
@@ -8005,6 +8019,11 @@ export interface components {
             file: string;
             /** Parameters */
             parameters: number;
+            /**
+             * Problem Messages
+             * @description the same as codes and facts
+             */
+            problem_messages: components["schemas"]["MessageInfo"][];
             /** Problems */
             problems: string[];
         };
@@ -8310,6 +8329,8 @@ export interface components {
          * @description A piece of long work.
          */
         JobInfo: {
+            /** @description why it was cancelled, where that is known */
+            cancellation?: components["schemas"]["Cancellation"] | null;
             /** Drive */
             drive: string | null;
             /** Ended */
@@ -8320,6 +8341,7 @@ export interface components {
             kind: string;
             /** Motion */
             motion: boolean;
+            /** @description why it failed */
             problem: components["schemas"]["Problem"] | null;
             /** Progress */
             progress: number;
@@ -13830,6 +13852,7 @@ export type BundleInfo = components['schemas']['BundleInfo'];
 export type BundleList = components['schemas']['BundleList'];
 export type BundleRequest = components['schemas']['BundleRequest'];
 export type Bus = components['schemas']['Bus'];
+export type Cancellation = components['schemas']['Cancellation'];
 export type CandidateInfo = components['schemas']['CandidateInfo'];
 export type CandidatesInfo = components['schemas']['CandidatesInfo'];
 export type CandidatesRequest = components['schemas']['CandidatesRequest'];

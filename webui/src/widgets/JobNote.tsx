@@ -2,7 +2,7 @@ import { Button } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask } from '../api/client'
 import type { JobInfo } from '../api/schema'
-import { useSay, useT } from '../i18n'
+import { type Say, type T, useSay, useT } from '../i18n'
 import { setJob, useJob } from '../live/store'
 import { clock, duration } from './format'
 import { ProblemNote } from './ProblemNote'
@@ -40,8 +40,7 @@ export function JobNote({ id, onClose }: { id: string | null; onClose?: () => vo
   if (job.state !== 'running') {
     return (
       <p className={`note ${job.state === 'done' ? 'good' : 'warn'}`} role="status">
-        {t(job.state === 'done' ? 'job.done' : 'job.cancelled', { title: say.title(job) })}{' '}
-        <span className="num">{duration(seconds(job, now))}</span>
+        {ended(job, t, say)} <span className="num">{duration(seconds(job, now))}</span>
         {onClose && (
           <button type="button" className="plain" onClick={onClose}>
             {t('close')}
@@ -87,6 +86,17 @@ export function JobNote({ id, onClose }: { id: string | null; onClose?: () => vo
       <ProblemNote problem={cancel.problem} onClose={cancel.clear} />
     </div>
   )
+}
+
+/** How a job ended; where it was cancelled, why, and what to do about it. */
+function ended(job: JobInfo, t: T, say: Say): string {
+  const title = say.title(job)
+  if (job.state === 'done') return t('job.done', { title })
+  const why = job.cancellation
+  if (!why) return t('job.cancelled', { title })
+  const cause = say.message(why.cause_message, why.cause)
+  const remedy = say.message(why.remedy_message, why.remedy ?? '')
+  return t(remedy ? 'job.cancelledRemedy' : 'job.cancelledBecause', { title, cause, remedy })
 }
 
 function seconds(job: JobInfo, now: number): number {

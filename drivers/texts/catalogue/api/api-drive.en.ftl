@@ -1,4 +1,6 @@
 api-drive_back-forth = Reciprocating move: { $member_drive }
+api-drive_cancelled-during = { $drive }: cancelled during “{ $title }”: { $why }
+    .remedy = try again when it is safe
 api-drive_commands-motion-axis-enabled = { $drive }: { $parameter } commands motion and the axis is enabled
     .remedy = use the Motion page, which sets limits and a dead-man timeout; or disable the axis
 api-drive_cyclic-exchange-not-run = { $drive }: the cyclic exchange does not run
@@ -27,6 +29,4 @@ api-drive_nothing-put-back = { $drive }: there is nothing to restore
     .remedy = check its parameters; they may have been restored already
 api-drive_read = Read { $member_drive }
 api-drive_small-move = Small move by { $increments } increments: { $drive }
-api-drive_stop-pressed-during = { $drive }: STOP was pressed during “{ $title }”
-    .remedy = try again when it is safe
 api-drive_use-page-of-function = use the page of the function that the object belongs to

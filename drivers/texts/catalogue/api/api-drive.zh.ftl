@@ -1,4 +1,6 @@
 api-drive_back-forth = 往复运动：{ $member_drive }
+api-drive_cancelled-during = { $drive }：在“{ $title }”期间被取消：{ $why }
+    .remedy = 请在安全时重试
 api-drive_commands-motion-axis-enabled = { $drive }：{ $parameter } 用于指令运动，而轴已使能
     .remedy = 请使用“运动”页面，其中设有限值和手动保持开关；或断使能
 api-drive_cyclic-exchange-not-run = { $drive }：循环交换未运行
@@ -27,6 +29,4 @@ api-drive_nothing-put-back = { $drive }：没有需要恢复的内容
     .remedy = 请查看其参数；可能已经恢复
 api-drive_read = 读取 { $member_drive }
 api-drive_small-move = 小幅运动 { $increments } 个增量：{ $drive }
-api-drive_stop-pressed-during = { $drive }：在“{ $title }”期间按下了停止
-    .remedy = 请在安全时重试
 api-drive_use-page-of-function = 请使用该对象所属功能的页面

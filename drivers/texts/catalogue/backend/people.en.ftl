@@ -18,6 +18,7 @@ people_control-axis = { $person } has control of this axis
     .remedy = ask for control; STOP works for everyone
 people_control-hand-over = only who has control can hand it over
     .remedy = take control first
+people_enabling-not-held = the enabling button is not held
 people_grant-another-axis = the grant is for another axis
     .remedy = ask for this axis too
 people_grant-names-right-lasts = a grant names a right and lasts 10 s to 8 h

@@ -18,6 +18,7 @@ people_control-axis = { $person } 拥有此轴的控制权
     .remedy = 请申请控制权；任何人都可以按停止
 people_control-hand-over = 只有拥有控制权者才能移交
     .remedy = 请先取得控制权
+people_enabling-not-held = 未按住使能按钮
 people_grant-another-axis = 该授权属于另一轴
     .remedy = 也请求此轴
 people_grant-names-right-lasts = 授权须指明权限，时长为 10 s 至 8 h

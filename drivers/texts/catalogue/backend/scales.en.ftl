@@ -1,6 +1,7 @@
 scales_changed = { $drive }: its units are not those this motion was planned with: gear, feed constant, resolution or unit of the drive was changed meanwhile
     .remedy = find out who changed them (another program, the panel, a restart of the drive), check gear and units on the Parameters page, and start again
 scales_changed-in-motion = { $drive }: { $parameter } was changed while the axis moves; the motion is ended
+    .remedy = check the scales of the axis, then start it again
 scales_gear-finer-than-encoder = one user increment is finer than the encoder: { NUM($reached, format: ".6g") } user increments and { $counts } encoder increments per revolution
 scales_gear-not-exact = the ratio cannot be set exactly: over { NUM($over, format: "g") } { $unit } the axis is off by { NUM($drift, format: ".2g") } { $unit }, and a rotary axis that runs in one direction drifts
 scales_gear-pi = the ratio contains π and is rounded to a millionth of a millimetre per revolution; the real diameter has more influence: check it with a long move

@@ -1,6 +1,7 @@
 scales_changed = { $drive }：其单位与规划此运动时不同：驱动器的齿轮比、进给常数、分辨率或单位已被更改
     .remedy = 请查明更改者（其他程序、面板或驱动器重启），在“参数”页面核对齿轮比和单位，然后重新开始
 scales_changed-in-motion = { $drive }：轴运动期间 { $parameter } 被更改；运动已结束
+    .remedy = 请检查该轴的标度，然后重新启动
 scales_gear-finer-than-encoder = 一个用户增量比编码器更细：每转 { NUM($reached, format: ".6g") } 个用户增量，编码器每转 { $counts } 个增量
 scales_gear-not-exact = 齿轮比无法精确设置：每 { NUM($over, format: "g") } { $unit } 偏差 { NUM($drift, format: ".2g") } { $unit }，单方向运行的旋转轴会漂移
 scales_gear-pi = 齿轮比含 π，已取整到每转百万分之一毫米；实际直径的影响更大，请用长行程核对

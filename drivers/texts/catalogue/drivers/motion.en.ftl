@@ -1,4 +1,5 @@
 motion_account-has-another-role = the role of the person who began it was changed
+    .remedy = ask an administrator for the right to move
 motion_beyond-limit = { $quantity ->
     [position] position
     [speed] speed
@@ -52,10 +53,13 @@ motion_permission-move-ended = { $drive }: { $purpose }: the permission to move 
 motion_position = the position is beyond its limit
 motion_put-energy-motor-not = { $drive }: { $parameter } { $key } can energise the motor, so it is not written as a parameter
 motion_session-is-over = the session of the person who began it has ended
+    .remedy = log in, then start it again
 motion_skew = the skew of both axes is beyond its limit
 motion_speed = the speed is beyond its limit
 motion_stop-was-pressed = STOP was pressed
-motion_time-is-over = its time has ended
+    .remedy = find out why STOP was pressed; start again when it is safe
+motion_time-is-over = the permission to move has reached its longest time
+    .remedy = start it again; it may need fewer repeats or a shorter range
 motion_torque = the torque is beyond its limit
 motion_unfit = a setpoint does not fit its object: the axis is braked
 motion_class-fixed = { $profile_title }: { $key } { $name }: { $why }

@@ -1,4 +1,5 @@
 motion_account-has-another-role = 启动者的账户角色已更改
+    .remedy = 请向管理员申请运动权限
 motion_beyond-limit = { $quantity ->
     [position] 位置
     [speed] 速度
@@ -52,10 +53,13 @@ motion_permission-move-ended = { $drive }：{ $purpose }：运动许可已结束
 motion_position = 位置超出限值
 motion_put-energy-motor-not = { $drive }：{ $parameter } { $key } 可向电机输入能量，因此不作为参数写入
 motion_session-is-over = 启动者的会话已结束
+    .remedy = 请登录，然后重新启动
 motion_skew = 两轴的歪斜超出限值
 motion_speed = 速度超出限值
 motion_stop-was-pressed = 已按下 STOP
-motion_time-is-over = 其时间已到
+    .remedy = 查明按下 STOP 的原因，确认安全后重新启动
+motion_time-is-over = 运动许可已达最长时间
+    .remedy = 重新启动；可能需要减少重复次数或缩短范围
 motion_torque = 转矩超出限值
 motion_unfit = 设定值不适合其对象：轴已制动
 motion_class-fixed = { $profile_title }：{ $key } { $name }：{ $why }

@@ -184,6 +184,11 @@ export const frame = {
   ],
   'job.done': ['{title}: done', '{title}：完成'],
   'job.cancelled': ['{title}: cancelled', '{title}：已取消'],
+  'job.cancelledBecause': ['{title}: cancelled: {cause}.', '{title}：已取消：{cause}。'],
+  'job.cancelledRemedy': [
+    '{title}: cancelled: {cause}. Remedy: {remedy}.',
+    '{title}：已取消：{cause}。处理：{remedy}。',
+  ],
   'job.failed': ['{title}: failed', '{title}：失败'],
   'job.elapsed': ['{time} so far', '已用 {time}'],
   'job.remaining': ['about {time} left', '约剩 {time}'],

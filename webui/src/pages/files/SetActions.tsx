@@ -2,7 +2,7 @@ import { Button, Checkbox, Modal, Textarea, TextInput } from '@mantine/core'
 import { useRef, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { DriveSummary, ImportedList } from '../../api/schema'
-import { useT } from '../../i18n'
+import { useSay, useT } from '../../i18n'
 import { Icon } from '../../widgets/Icon'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
@@ -116,6 +116,7 @@ export function UploadSet({
   onStored: (file: string) => void
 }) {
   const t = useT()
+  const say = useSay()
   const input = useRef<HTMLInputElement>(null)
   const upload = useAction()
   const [list, setList] = useState<ImportedList | null>(null)
@@ -179,7 +180,7 @@ export function UploadSet({
             <>
               <p className="warn-text">{t('sets.listProblems')}</p>
               <ul>
-                {list.problems.map((problem) => (
+                {say.messages(list.problem_messages, list.problems).map((problem) => (
                   <li key={problem}>{problem}</li>
                 ))}
               </ul>
