@@ -1,6 +1,6 @@
 event_another-master = another master is talking to node { $node }: answers can be mixed up. Stop the other master before writing anything
 event_can-adapter-back = CAN adapter { $channel } is back
-event_exchange-broke-off = the cyclic exchange was interrupted: { $cause }; every axis stops, and the exchange is set up again automatically
+event_exchange-broke-off = the cyclic exchange broke off: { $cause }; every axis stops, and the exchange is set up again automatically
 event_exchange-ended-by-itself = the exchange ended without a request
 event_exchange-interrupted = cyclic exchange interrupted: { $cause }
 event_exchange-not-restored = the cyclic exchange could not be set up again: { $cause }; it is tried again automatically
