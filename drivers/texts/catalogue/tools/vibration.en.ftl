@@ -1,6 +1,6 @@
 vibration_first-short-move = a first short move
 vibration_going-back-evaluating = going back and evaluating
-vibration_no-room-for-speeds = between { NUM($slowest_rpm, format: ".3g") } rpm and { NUM($fastest_rpm, format: ".3g") } rpm, the fastest speed that the limits allow, no series of speeds fits
+vibration_no-room-for-speeds = between { NUM($slowest_rpm, format: ".3g") } rpm and { NUM($fastest_rpm, format: ".3g") } rpm, the fastest speed that the limits allow, there is no room for a ladder of speeds
     .remedy = permit more travel or speed, or a lower slowest speed
 vibration_no-speed-held = no speed was held evenly in both directions; { NUM($value, format: ".3g") } rpm was the fastest that was not
     .remedy = permit a higher speed and more torque; check the gains of the speed loop
