@@ -1,6 +1,6 @@
 """The parts of the scene on a viser server, and their movement.
 
-viser is the library of the customer's choice for 3D; its server listens on loopback only and is
+viser is the library for the 3D scene; its server listens on loopback only and is
 reached through ours (`backend.api.scope.scene`).
 """
 

@@ -1,5 +1,5 @@
 api-scope_no-snapshot-scope = { $value } is not a snapshot of the scope: { $first }: { $other_first }
-    .remedy = take it on the Scope page
+    .remedy = take the snapshot on the Scope page
 api-scope_no-viewer = there is no viewer.{ $kind }
 api-scope_not-exported-yet = { $value } has not been exported yet
     .remedy = export it first

@@ -11,6 +11,6 @@ audit_end-missing = the chain ended with entry { $ended }; the last one present 
 audit_anchor-beyond-end = the anchor names entry { $anchor }; the last one present is { $last }
 audit_entry-missing = entry { $number } is missing
 audit_entry-does-not-follow = it does not follow the entry before it
-audit_contents-altered = its contents are not those that were written
+audit_contents-altered = its contents were altered after writing
 audit_contents-unreadable = its contents are unreadable
 audit_column-altered = its column { $column } does not match its contents

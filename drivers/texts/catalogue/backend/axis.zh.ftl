@@ -1,7 +1,7 @@
 axis_606ch-6064h-opposite-signs = { $drive }：606Ch 与 6064h 符号相反
     .remedy = 请检查极性 607Eh：其位 6 和位 7 应一致；然后再次移动
 axis_bus-moves-single-axes = { $url }：此总线的循环只能单独运动每个轴
-    .remedy = 只有在 EtherCAT 上才能让同一机械的两个轴一起运动
+    .remedy = 请将两个轴连接到同一 EtherCAT 网段
 axis_cause-a-fault = 存在故障
 axis_cause-fault = 存在故障：{ $faults }
 axis_cause-input = 输入 { $terminal }（{ $function }）有效

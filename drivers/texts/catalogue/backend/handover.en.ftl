@@ -1,4 +1,4 @@
-handover_carries-no-value = nothing of { $drive } fits this format: { $key } and others are larger than it carries
+handover_carries-no-value = no value of { $drive } fits this format: { $key } and others are too large for it
     .remedy = choose another format
 handover_choose-esi = choose the maker's ESI file
 handover_damaged = { $name } is damaged: { $shorten }

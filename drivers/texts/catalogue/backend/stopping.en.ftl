@@ -15,5 +15,5 @@ stopping_still-moves = { $drive } still moves{ $speed ->
         [none] {""}
        *[other] {" "}at { $speed } { $unit }
     } after STOP: use the machine's emergency stop
-stopping_turns-with-power = { $drive } is enabled and turns at { $speed } { $unit } although nobody moves it here: press STOP
+stopping_turns-with-power = { $drive } is enabled and turns at { $speed } { $unit }, but nobody moves it with servodeck: press STOP
 stopping_turns-without-power = { $drive } turns at { $speed } { $unit } without power: by hand, by gravity or by the drive itself

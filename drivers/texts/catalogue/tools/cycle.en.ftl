@@ -4,4 +4,4 @@ cycle_recording-lacks-signal = { QUOTED($value) } has no { $parameter } of { $dr
     .remedy = record actual torque and actual speed of this drive
 cycle_title = Load of the machine's cycle
 cycle_too-few-samples = { $value } samples of torque and speed are too few: at least { $limit } are needed
-    .remedy = look at the connection, or read for longer
+    .remedy = check the connection, or read for longer

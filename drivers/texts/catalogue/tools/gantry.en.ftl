@@ -1,11 +1,11 @@
 gantry_experiment = both axes, experiment { $number } of { $count }
-gantry_few-samples = too few whole periods of both axes came
-    .remedy = measure again; where samples are lost, use a longer cycle
+gantry_few-samples = too few whole periods of both axes were received
+    .remedy = measure again; if samples are lost, use a longer cycle
 gantry_going-back-evaluating = going back and evaluating
-gantry_no-partner = { $drive }: a gantry is measured with two axes, and no second one is named
-    .remedy = name the other axis (--partner)
+gantry_no-partner = { $drive }: a gantry is measured with two axes, and no second axis was given
+    .remedy = give the other axis (--partner)
 gantry_no-room = the limits of travel and speed leave no room for a steady motion with an excitation
     .remedy = permit more travel or speed, or lines that are further apart
-gantry_no-time = the motions take { NUM($takes_s, format: ".3g") } s
+gantry_no-time = the motions take { NUM($takes_s, format: ".3g") } s, more than the time limit
     .remedy = permit more time, or lines that are further apart
 gantry_title = Gantry

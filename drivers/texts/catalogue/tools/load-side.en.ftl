@@ -1,12 +1,12 @@
-load-side_few-samples = too few samples of both positions came for backlash and stiffness
-    .remedy = measure again, with more travel or time where the limits are narrow
+load-side_few-samples = too few samples of both positions were received to compute backlash and stiffness
+    .remedy = measure again, and permit more travel or time if the limits are narrow
 load-side_first-short-move = a first short move
 load-side_going-back-evaluating = going back and evaluating
 load-side_load-stands = the load's position does not follow the motor
-    .remedy = check the second encoder, its cable and that it is switched on in the drive; check the coupling
+    .remedy = check the second encoder and its cable, whether the drive has it activated, and the coupling
 load-side_no-room = the limits of travel, speed and torque leave no room for moves that show backlash
     .remedy = permit more travel, speed or torque
-load-side_no-second-position = { $drive } reports no second position, so that nothing is known of the load side
+load-side_no-second-position = { $drive } reports no second position, so the load side cannot be measured
     .remedy = backlash and stiffness need a drive that reports a second encoder, such as object 60E4h of CiA 402
 load-side_no-time = slow passes over { NUM($range_rev, format: ".3g") } rev take longer than the time limit allows
     .remedy = allow more time, less travel or a higher speed

@@ -1,13 +1,13 @@
 measuring_check-then-widen = check load, limits and gains, then widen the envelope only if the machine allows it
 measuring_cyclic-exchange-ended-during = { $drive }: the cyclic exchange ended during the measurement
-    .remedy = check the cable and at the drive's supply
+    .remedy = check the cable and the drive's supply
 measuring_cyclic-exchange-not-run = { $url }: the cyclic exchange does not run
     .remedy = start it on the Connect page
 measuring_look-why-it-ended = see the Alarms page; without an alarm check the emergency stop, the drive's supply and other controllers that may disable it, then measure again
 measuring_not-come-rest-within = { $drive } does not reach standstill within { NUM($timeout_s, format: "g") } s
-    .remedy = stop what moves it, or lower the gains if it oscillates
+    .remedy = remove the cause of the motion, or lower the gains if the axis oscillates
 measuring_not-part-cyclic-data = { $drive }: { $replace } is not part of the cyclic data
-    .remedy = measure over a bus and a profile that carry it with every cycle
+    .remedy = measure over a bus and with a profile that transmit it in every cycle
 measuring_not-restored = { $drive }: not restored: { $failed }
     .remedy = a running server restores them, or offers to, once the drive answers and the axis is at standstill; without a server write these values by hand before the next motion
 measuring_not-restored-2 = { $cause }; not restored: { $left }

@@ -1,10 +1,10 @@
 shaping_evaluating = evaluating
 shaping_move-beyond-envelope = the move needs { NUM($needed_rpm, format: "g") } rpm and { NUM($needed_rev, format: ".3g") } rev, more than the envelope of { NUM($speed_rpm, format: "g") } rpm and { NUM($travel_rev, format: "g") } rev
-    .remedy = take a shorter or slower move, or a wider envelope
+    .remedy = choose a shorter or slower move, or a wider envelope
 shaping_no-cyclic-position = { $drive } takes no position with every cycle (CSP), so that no shaped move can be played
-    .remedy = measure the frequency of the vibration by another way, and put the shaper into the controller that makes the setpoints
+    .remedy = measure the frequency of the vibration in another way, and set the shaper in the controller that generates the setpoints
 shaping_shaped = moving with the shaper
 shaping_takes-too-long = a move out and back takes { NUM($needed_s, format: ".3g") } s, more than the time limit of { NUM($time_s, format: "g") } s
-    .remedy = take less time at the ends, a shorter move, or a longer time limit
+    .remedy = choose a shorter hold time, a shorter move, or a longer time limit
 shaping_title = Command shaping
 shaping_unshaped = moving without a shaper

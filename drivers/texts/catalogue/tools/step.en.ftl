@@ -1,4 +1,4 @@
 step_step-needs-rev-more = the step needs { NUM($highest, format: ".4g") } { $name } and { NUM($travelled_rev, format: ".3g") } rev, more than the envelope of { NUM($speed_rpm, format: "g") } rpm and { NUM($travel_rev, format: "g") } rev
-    .remedy = take a smaller step or a wider envelope
+    .remedy = choose a smaller step or a wider envelope
 step_stepping = stepping
 step_title = Step response
