@@ -11,6 +11,7 @@ const SAME = new Set([
   'language.en',
   'language.zh',
   'connect.kind.can',
+  'segment.doctorFactAlone',
   'help.ethercat.title',
   'help.can.title',
   'scope.csv',

@@ -1,6 +1,6 @@
 axis_606ch-6064h-opposite-signs = { $drive }: 606Ch and 6064h have opposite signs
     .remedy = check the polarity 607Eh: set its bits 6 and 7 to the same value; then move again
-axis_bus-moves-single-axes = { $url }: the loop of this bus moves each axis independently
+axis_bus-moves-single-axes = { $url }: the loop of this bus moves each axis independently; it cannot stop the other axis in the next cycle when one stops, or when the skew is too large
     .remedy = connect both axes to one EtherCAT segment
 axis_cause-a-fault = a fault is present
 axis_cause-fault = fault present: { $faults }

@@ -1,6 +1,6 @@
 axis_606ch-6064h-opposite-signs = { $drive }：606Ch 与 6064h 符号相反
     .remedy = 请检查极性 607Eh：其位 6 和位 7 应一致；然后再次移动
-axis_bus-moves-single-axes = { $url }：此总线的循环只能单独运动每个轴
+axis_bus-moves-single-axes = { $url }：此总线的循环只能单独运动每个轴；当一轴停止或歪斜过大时，它无法在下一周期停止另一轴
     .remedy = 请将两个轴连接到同一 EtherCAT 网段
 axis_cause-a-fault = 存在故障
 axis_cause-fault = 存在故障：{ $faults }
