@@ -192,7 +192,8 @@ def _sizes(e: Evidence) -> Iterator[Sign]:
 
 def _clock(e: Evidence) -> Iterator[Sign]:
     planned, activate = e.planned_activate, e.activate
-    if planned is not None and activate is not None and activate != planned:
+    # A refused object ends the bring-up before the clock is set.
+    if planned is not None and activate is not None and not e.refused_key and activate != planned:
         yield "clock_mode_wrong", 2, Fact("register_980", activate, planned)
     if e.sync0_pending and e.al_code in (0, 0x001B, 0x002D):
         yield "sync0_missing", 4, Fact("sync0_begun", 0, 1)

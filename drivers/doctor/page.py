@@ -29,10 +29,10 @@ nodes, 1000h, 1005h, 1018h, 603Fh and 6041h.
 cause: the assignment or contents of the process data, the refused command of the maker's file, the
 clock, the watchdog of the file, or the cycle. Of the clock it tries another AssignActivate, none at
 all, and another shift or cycle of SYNC0. It changes one setting at a time, at most four, and takes
-the drive up again. Each is undone before the next, also the one that works: what it names is then set in the
-profile by hand. It opens the bus itself, so no server may hold it. The sizes of the mailbox are
-those of the drive's EEPROM, and the watchdog that stops the axis when this computer dies is never
-made longer: neither is tried.
+the drive up again. Each is undone before the next, also the one that works: what it names is then
+set in the profile by hand. It opens the bus itself, so no server may hold it. The sizes of the
+mailbox are those of the drive's EEPROM, and the watchdog that stops the axis when this computer
+dies is never made longer: neither is tried.
 
 On the page *Connect*, *Settings to try* below the causes does the same for a connected drive,
 while no exchange runs and no drive of the bus is enabled. A setting that reached Operational can

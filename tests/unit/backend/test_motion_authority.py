@@ -130,7 +130,7 @@ async def test_a_motion_whose_time_is_over_is_ended(bench: Bench) -> None:
         await asyncio.sleep(0.05)
         assert ended == [text("motion.time-is-over")]
         assert authority.grant_of("x") is None
-        with pytest.raises(NotGranted, match="its time has ended"):
+        with pytest.raises(NotGranted, match="reached its longest time"):
             authority.require(grant, "x", "X", TARGET)
 
 
