@@ -25,7 +25,7 @@ from drivers.link import Address
 from tests.support.granted import set_mode
 from tests.virtual.tools.direct import STATION, DirectBench, direct
 from tests.virtual.tools.rig import WIDE
-from tests.virtual.tools.test_load_side import DRIVE as LOAD_SIDE_DRIVE
+from tests.virtual.tools.set_ups.load_side import DRIVE as LOAD_SIDE_DRIVE
 from tests.virtual.tools.test_scales_of_every_tool import begun, spec_of
 
 URL = "ethercat://eth0"
