@@ -14,8 +14,8 @@ _MARKS = (
 )
 _DECLARED = re.compile(rb"^\s*<\?xml[^>]*?encoding\s*=\s*[\"']([A-Za-z0-9._-]{1,40})[\"'][^>]*\?>")
 _DECLARATION = re.compile(r"^\s*<\?xml[^>]*\?>")
-#: Of Western languages in code page 850, with the signs for degrees and for the square.
-_DOS_LETTERS = "äöüÄÖÜßéèêàâçñ°²".encode("cp850")
+#: "äöüÄÖÜßéèêàâçñ°²" in code page 850: letters of Western languages, degrees and the square.
+_DOS_LETTERS = bytes.fromhex("8494818e999ae1828a88858387a4f8fd")
 #: By the names that Python gives them; a file may use any alias.
 _KNOWN_ENCODINGS = {
     "utf-8", "ascii", "utf-16", "utf-16-le", "utf-16-be", "gb2312", "gbk", "gb18030", "big5",
