@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import asyncio
 import base64
-import contextlib
 import json
 import pickle
 import sys
@@ -22,6 +21,7 @@ from backend.response_import.errors import BadRecording
 from backend.response_import.evaluation import ImportSettings, evaluate_signals, prepared
 from backend.response_import.preview import preview
 from backend.response_import.stored import pack_import
+from backend.work.apart import answer_of
 from drivers.computer.processes import limit_memory, yield_processor
 from drivers.texts.message import Text, prose, text
 
@@ -55,17 +55,8 @@ async def import_in_process(task: ImportTask, limit_s: float = LIMIT_S) -> dict[
     Raises:
         BadRecording: what is wrong with the file, or it takes too long.
     """
-    process = await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-m",
-        "backend.response_import.process",
-        stdin=asyncio.subprocess.PIPE,
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.PIPE,
-    )
     try:
-        async with asyncio.timeout(limit_s):
-            out, said = await process.communicate(await asyncio.to_thread(pickle.dumps, task))
+        given = await answer_of("backend.response_import.process", task=task, limit_s=limit_s)
     except TimeoutError:
         raise BadRecording(
             "import.evaluation-ended-after",
@@ -73,20 +64,14 @@ async def import_in_process(task: ImportTask, limit_s: float = LIMIT_S) -> dict[
             limit=f"{limit_s:g} s",
             limit_s=limit_s,
         ) from None
-    finally:
-        if process.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-            await asyncio.shield(process.wait())
     try:
-        answer: dict[str, Any] = await asyncio.to_thread(json.loads, out)
+        answer: dict[str, Any] = await asyncio.to_thread(json.loads, given.out)
     except ValueError:
-        last = said.decode("utf-8", "replace").strip().splitlines()[-1:] or ["it said nothing"]
         raise BadRecording(
             "import.evaluation-failed-exit-code",
             value=task.name,
-            returncode=process.returncode,
-            last=last[0],
+            returncode=given.exit_code,
+            last=given.last_line,
         ) from None
     if "error" in answer:
         refused = answer["error"]

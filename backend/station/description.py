@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import json
-import pickle
-import sys
 from collections.abc import Sequence
 from typing import Any, Protocol
 
+from backend.work.apart import answer_of
 from drivers.dictionary import Described, ObjectInfo
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address, Found, Link, Progress
@@ -66,31 +64,17 @@ async def import_in_process(
 
 
 async def _imported_apart(task: Work, limit_s: float, limit_mib: int) -> dict[str, Any]:
-    process = await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-m",
-        "backend.station.import_process",
-        str(limit_mib),
-        stdin=asyncio.subprocess.PIPE,
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.PIPE,
-    )
     try:
-        async with asyncio.timeout(limit_s):
-            out, said = await process.communicate(await asyncio.to_thread(pickle.dumps, task))
+        given = await answer_of(
+            "backend.station.import_process", str(limit_mib), task=task, limit_s=limit_s
+        )
     except TimeoutError:
         raise BadDescription("station.import-ended-after", limit_s=limit_s) from None
-    finally:
-        if process.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-            await asyncio.shield(process.wait())
     try:
-        answer: dict[str, Any] = await asyncio.to_thread(json.loads, out)
+        answer: dict[str, Any] = await asyncio.to_thread(json.loads, given.out)
     except ValueError:
-        last = said.decode("utf-8", "replace").strip().splitlines()[-1:] or ["it said nothing"]
         raise BadDescription(
-            "station.import-failed-exit-code", returncode=process.returncode, last=last[0]
+            "station.import-failed-exit-code", returncode=given.exit_code, last=given.last_line
         ) from None
     if "refused" in answer:
         raise BadDescription(

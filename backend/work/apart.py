@@ -13,7 +13,7 @@ import os
 import pickle
 import sys
 from collections.abc import Callable
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 from drivers.computer.processes import limit_memory, yield_processor
 from drivers.errors import NotAllowed
@@ -51,11 +51,14 @@ async def read_apart(
         return await asyncio.to_thread(work, *arguments, **named)
     loop = asyncio.get_running_loop()
     async with _at_once.setdefault(loop, asyncio.Semaphore(AT_ONCE)):
-        task = await asyncio.to_thread(pickle.dumps, (work, arguments, named))
-        out = await _answered(task)
+        task = (work, arguments, named)
+        try:
+            answer = await answer_of("backend.work.apart", task=task, limit_s=LIMIT_S)
+        except TimeoutError:
+            raise ReadingEnded("work.reading-time", limit_s=LIMIT_S) from None
     result: T
     try:
-        result, error = await asyncio.to_thread(_loaded, out)
+        result, error = await asyncio.to_thread(_loaded, answer.out)
     except (EOFError, pickle.UnpicklingError):
         raise ReadingEnded("work.reading-memory", limit=limits.size(LIMIT_MIB << 20)) from None
     if error is not None:
@@ -63,20 +66,41 @@ async def read_apart(
     return result
 
 
-async def _answered(task: bytes) -> bytes:
+class Answer(NamedTuple):
+    """What a process printed until its end, and its exit code."""
+
+    out: bytes
+    said: bytes
+    exit_code: int
+
+    @property
+    def last_line(self) -> str:
+        """The last line of its error output."""
+        return (self.said.decode("utf-8", "replace").strip().splitlines() or ["it said nothing"])[
+            -1
+        ]
+
+
+async def answer_of(module: str, *arguments: str, task: object, limit_s: float) -> Answer:
+    """Run a module of ours in a process that reads ``task``, pickled; it ends with the caller.
+
+    Raises:
+        TimeoutError: it takes longer than ``limit_s``.
+    """
+    sent = await asyncio.to_thread(pickle.dumps, task)
     process = await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",
-        "backend.work.apart",
+        module,
+        *arguments,
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.DEVNULL,
+        stderr=asyncio.subprocess.PIPE,
     )
     try:
-        async with asyncio.timeout(LIMIT_S):
-            return (await process.communicate(task))[0]
-    except TimeoutError:
-        raise ReadingEnded("work.reading-time", limit_s=LIMIT_S) from None
+        async with asyncio.timeout(limit_s):
+            out, said = await process.communicate(sent)
+        return Answer(out, said, process.returncode or 0)
     finally:
         if process.returncode is None:
             with contextlib.suppress(ProcessLookupError):
