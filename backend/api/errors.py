@@ -10,6 +10,7 @@ from fastapi.encoders import jsonable_encoder
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 
 from backend.api.models import Problem
 from backend.people.errors import Forbidden, NoSuchPerson, NotLoggedIn, TooOften
@@ -192,6 +193,14 @@ def install(app: FastAPI) -> None:
                 status=error.status_code,
                 detail=str(error.detail),
             )
+        )
+
+    @app.exception_handler(ClientDisconnect)
+    async def client_gone(request: Request, _error: ClientDisconnect) -> JSONResponse:
+        # No defect: a page was closed while it sent a file. Nobody reads this answer.
+        log.info("%s %s: the client went within its request", request.method, request.url.path)
+        return answer(
+            Problem(type="urn:servodeck:http", title="Request failed", status=400, detail="")
         )
 
     @app.exception_handler(Exception)

@@ -111,6 +111,19 @@ class SpeedWatch:
         """The last look showed motion, or nothing certain."""
         return self._still_since is None
 
+    def stayed_since(self, before: Sample) -> bool:
+        """Whether the last look found the position of then, within the travel of a standing axis.
+
+        Of looks that lie far apart the speed between them says little: an axis that swings, or
+        has just begun to move, is near its old place too.
+        """
+        now = self.newest
+        if now is None or now.position is None or before.position is None:
+            return False
+        counts = None if self.units is None else self.units.counts_per_rev
+        most = _STILL_INC if counts is None else STANDS_BY_POSITION_RPM / 60 * WINDOW_S * counts
+        return abs(_difference(now.position, before.position)) <= most
+
     def stands(self, dwell_s: float = DWELL_S) -> bool:
         """Both have said so for this long."""
         now = self.newest

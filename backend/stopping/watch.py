@@ -82,7 +82,11 @@ class StopWatch:
         except DriveError as error:
             return await self._silent(problem or error.text)
         if problem is None and before is not None and self._stood(before, first):
-            return self._verdict(Verdict.STOPPED)
+            try:
+                if await self._stands_still(before):
+                    return self._verdict(Verdict.STOPPED)
+            except DriveError as error:
+                return await self._silent(error.text)
         self._until_s = self._began_s + SHORTEST_S
         await self._read_ramp()
         return await self._follow(problem)
@@ -118,7 +122,17 @@ class StopWatch:
             return False
         self._watch.take(replace(before, velocity=now.velocity))
         self._watch.take(now)
-        return self._watch.stands(0.0)
+        return self._watch.stands(0.0) and self._watch.stayed_since(before)
+
+    async def _stands_still(self, before: Sample) -> bool:
+        """A second look: what turns round has no speed for a moment, near its old place or not."""
+        await asyncio.sleep(_LOOK_EVERY_S)
+        sample = await self._watch.look()
+        return (
+            sample.state not in _POWERED
+            and self._watch.stands(0.0)
+            and self._watch.stayed_since(before)
+        )
 
     async def _silent(self, problem: Text) -> AxisStop:
         """The first look failed: another within the time, then it is not reached."""
