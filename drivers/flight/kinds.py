@@ -6,7 +6,7 @@ import struct
 from collections.abc import Iterator
 
 from drivers.flight.pcapng import CAN_SOCKETCAN, ETHERNET, SERIAL_USER
-from drivers.flight.ring import FrameRing
+from drivers.flight.ring import FrameRing, Unpack, one_frame
 
 _ETHERTYPE, _FIRST_STATION = 0x88A4, 0x1000
 _NODE_COMMANDS = (4, 5, 6, 14)
@@ -17,9 +17,9 @@ _CAN_REMOTE = 1 << 30
 _BROADCAST_IDS = (0x000, 0x080, 0x100)
 
 
-def ethercat_ring(interface: str) -> FrameRing:
-    """Ethernet frames of a segment."""
-    return FrameRing(ETHERNET, interface, _of_slave)
+def ethercat_ring(interface: str, unpack: Unpack = one_frame) -> FrameRing:
+    """Ethernet frames of a segment; ``unpack`` says how they are put in."""
+    return FrameRing(ETHERNET, interface, _of_slave, unpack=unpack)
 
 
 def can_ring(channel: str) -> FrameRing:

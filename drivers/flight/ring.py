@@ -6,7 +6,7 @@ import struct
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from drivers.flight.pcapng import Frame, Note, file_of
 
@@ -14,11 +14,20 @@ KEPT_NS = 60_000_000_000
 MAX_BYTES = 64 << 20
 _MAX_NOTES = 2000
 _HEAD = struct.Struct("<qB")
-_OVERHEAD = 48
-"""Bytes of a Python object and its place in the ring, next to the frame itself."""
+_OVERHEAD = 152
+"""Bytes of the Python objects and their place in the ring, next to the frames themselves."""
 
 Belongs = Callable[[bytes, int], bool]
 """Whether a frame has to do with a station."""
+
+Unpack = Callable[[bytes], Iterator[Frame]]
+"""The frames of what `FrameRing.put_packed` was given."""
+
+
+def one_frame(packed: bytes) -> Iterator[Frame]:
+    """The frame that `FrameRing.put` packed."""
+    time_ns, sent = _HEAD.unpack_from(packed)
+    yield Frame(time_ns, bool(sent), packed[_HEAD.size :])
 
 
 class FrameRing:
@@ -28,7 +37,12 @@ class FrameRing:
     """
 
     def __init__(
-        self, link_type: int, name: str, belongs: Belongs, max_bytes: int = MAX_BYTES
+        self,
+        link_type: int,
+        name: str,
+        belongs: Belongs,
+        max_bytes: int = MAX_BYTES,
+        unpack: Unpack = one_frame,
     ) -> None:
         self.link_type = link_type
         self.name = name
@@ -36,7 +50,9 @@ class FrameRing:
         """Frames that went before a minute was over, because memory is bounded."""
         self._belongs = belongs
         self._max_bytes = max_bytes
-        self._frames: deque[bytes] = deque()
+        self._unpack = unpack
+        self._held: deque[tuple[int, int, bytes]] = deque()
+        """Time of the last frame, number of frames, the frames."""
         self._bytes = 0
         self._notes: deque[Note] = deque(maxlen=_MAX_NOTES)
         self._lock = threading.Lock()
@@ -47,18 +63,19 @@ class FrameRing:
         return self._bytes
 
     def put(self, time_ns: int, sent: bool, data: bytes) -> None:
-        """Keep a frame; ``time_ns`` since the Unix epoch."""
-        packed = _HEAD.pack(time_ns, sent) + data
+        """Keep a frame; ``time_ns`` since the Unix epoch. For a ring of single frames."""
+        self.put_packed(time_ns, 1, _HEAD.pack(time_ns, sent) + data)
+
+    def put_packed(self, last_ns: int, frames: int, packed: bytes) -> None:
+        """Keep ``frames`` that this ring's ``unpack`` reads, the last of ``last_ns``."""
         with self._lock:
-            self._frames.append(packed)
+            self._held.append((last_ns, frames, packed))
             self._bytes += len(packed) + _OVERHEAD
-            oldest_ns = time_ns - KEPT_NS
-            while self._frames and (
-                self._bytes > self._max_bytes or _HEAD.unpack_from(self._frames[0])[0] < oldest_ns
-            ):
-                first = self._frames.popleft()
+            oldest_ns = last_ns - KEPT_NS
+            while self._held and (self._bytes > self._max_bytes or self._held[0][0] < oldest_ns):
+                first_ns, lost, first = self._held.popleft()
                 self._bytes -= len(first) + _OVERHEAD
-                self.dropped += _HEAD.unpack_from(first)[0] >= oldest_ns
+                self.dropped += lost if first_ns >= oldest_ns else 0
 
     def note(self, text: str, station: int | None = None, time_ns: int | None = None) -> None:
         """Keep a remark for the next frame."""
@@ -68,13 +85,13 @@ class FrameRing:
     def file(self, station: int | None = None) -> bytes:
         """What is held now as a pcapng file; of one station only what has to do with it."""
         with self._lock:
-            held, notes = list(self._frames), list(self._notes)
-        frames = []
-        for packed in held:
-            time_ns, sent = _HEAD.unpack_from(packed)
-            data = packed[_HEAD.size :]
-            if station is None or self._belongs(data, station):
-                frames.append(Frame(time_ns, bool(sent), data))
+            held, notes = list(self._held), list(self._notes)
+        frames = [
+            frame
+            for _, _, packed in held
+            for frame in self._unpack(packed)
+            if station is None or self._belongs(frame.data, station)
+        ]
         oldest_ns = time.time_ns() - KEPT_NS
         chosen = [
             note
