@@ -1,43 +1,19 @@
-"""Frames of a network interface, collected by the kernel into memory that is shared with it.
+"""Frames of the blocks that `drivers.computer.packet_ring` collects: pure, no I/O.
 
-The kernel writes each frame with its time into a block of the shared memory and closes the block
-when it is full or ``_CLOSED_MS`` old. So the recording process does nothing per frame: it copies
-closed blocks away, a few times a second. Received one by one, 2000 frames/s took 3 % of a core,
-next to the cycle of an EtherCAT exchange.
-
-Source: packet(7); ``Documentation/networking/packet_mmap.rst`` (TPACKET_V3) and
-``include/uapi/linux/if_packet.h`` of Linux; filters: ``networking/filter.rst``.
+Source: ``include/uapi/linux/if_packet.h`` of Linux (TPACKET_V3); packet(7).
 """
 
 from __future__ import annotations
 
-import ctypes
-import mmap
-import socket
 import struct
 from collections.abc import Iterator
 
-from drivers.computer.sockets import AF_PACKET
 from drivers.flight.pcapng import Frame
 
-_ALL, _ETHERCAT = 0x0003, 0x88A4
-_SOL_PACKET, _RX_RING, _STATISTICS, _VERSION, _TPACKET_V3 = 263, 5, 6, 10, 2
-_SO_ATTACH_FILTER = 26
 _OUTGOING = 4
-"""sll_pkttype of packet(7): sent by this computer."""
-
-BLOCK_BYTES, BLOCKS = 1 << 15, 256
-"""8 MiB: at 4000 cycles/s with frames of 1500 bytes in both directions two thirds of a second;
-with few frames ``BLOCKS`` times ``_CLOSED_MS``, 7.7 s."""
-_CLOSED_MS = 30
-CLOSED_S = _CLOSED_MS / 1000
-_LONGEST = 2048
-"""Most bytes of a frame with its head, which the kernel asks for; blocks hold as many as fit."""
-
-_OF_KERNEL, _OF_USER, _STATUS_AT = 0, 1, 8
-_BLOCK = struct.Struct("=IIIIIIQIIII")
-"""tpacket_block_desc: version, private, status, frames, first frame, bytes, number, first and last
-time in s and ns."""
+"""sll_pkttype: sent by this computer."""
+_BLOCK = struct.Struct("=12xII")
+"""tpacket_block_desc: number of frames, offset of the first."""
 _FRAME = struct.Struct("=IIIIIIHH")
 """tpacket3_hdr: offset of the next, s, ns, bytes kept, bytes, status, offsets of the frame."""
 _FRAME_HEAD = 48
@@ -45,87 +21,11 @@ _FRAME_HEAD = 48
 _TYPE_AT = _FRAME_HEAD + 10
 
 
-class PacketCapture:
-    """All EtherCAT frames of an interface, sent and received.
-
-    Raises:
-        OSError: no permission for raw sockets, no such interface, or another system than Linux.
-    """
-
-    def __init__(self, interface: str) -> None:
-        self._socket = socket.socket(AF_PACKET, socket.SOCK_RAW, 0)
-        try:
-            _only_ethercat(self._socket)
-            self._socket.setsockopt(_SOL_PACKET, _VERSION, _TPACKET_V3)
-            size = BLOCK_BYTES * BLOCKS
-            request = (BLOCK_BYTES, BLOCKS, _LONGEST, size // _LONGEST, _CLOSED_MS, 0, 0)
-            self._socket.setsockopt(_SOL_PACKET, _RX_RING, struct.pack("=7I", *request))
-            self._memory = mmap.mmap(self._socket.fileno(), size)
-            # Frames that this computer sends come only to sockets of all protocols.
-            self._socket.bind((interface, _ALL))
-        except OSError:
-            self._socket.close()
-            raise
-        self._next = 0
-
-    def close(self) -> None:
-        """Give the shared memory back; frames that were not taken are lost."""
-        self._memory.close()
-        self._socket.close()
-
-    def take(self) -> Iterator[tuple[int, bytes]]:
-        """Closed blocks that were not yet taken: time of the last frame (ns, Unix), the block."""
-        for _ in range(BLOCKS):
-            at = self._next * BLOCK_BYTES
-            head = _BLOCK.unpack_from(self._memory, at)
-            _, _, status, frames, _, held, _, _, _, last_s, last_ns = head
-            if not status & _OF_USER:
-                return
-            block = self._memory[at : at + held]
-            struct.pack_into("=I", self._memory, at + _STATUS_AT, _OF_KERNEL)
-            self._next = (self._next + 1) % BLOCKS
-            if frames:
-                yield last_s * 1_000_000_000 + last_ns, block
-
-    def lost(self) -> int:
-        """Frames since the last call that found no room, as blocks were not taken in time.
-
-        Raises:
-            OSError: the interface went down or away.
-        """
-        error = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
-        if error:
-            raise OSError(error, "the interface of the recording is down")
-        counted = self._socket.getsockopt(_SOL_PACKET, _STATISTICS, 12)
-        return int(struct.unpack("=III", counted)[1])
-
-
 def frames_of_block(block: bytes) -> Iterator[Frame]:
-    """The frames of a block that `PacketCapture.take` gave, in the order of their times."""
-    _, _, _, frames, at, *_ = _BLOCK.unpack_from(block)
+    """The frames of a block, in the order of their times."""
+    frames, at = _BLOCK.unpack_from(block)
     for _ in range(frames):
         following, seconds, nanoseconds, kept, _, _, frame_at, _ = _FRAME.unpack_from(block, at)
         data = block[at + frame_at : at + frame_at + kept]
         yield Frame(seconds * 1_000_000_000 + nanoseconds, block[at + _TYPE_AT] == _OUTGOING, data)
         at += following
-
-
-def frame_count(block: bytes) -> int:
-    """How many frames a block has."""
-    return int(_BLOCK.unpack_from(block)[3])
-
-
-def _only_ethercat(wire: socket.socket) -> None:
-    """Have the kernel leave out other frames, so that they take no room."""
-    program = b"".join(
-        struct.pack("=HBBI", *line)
-        for line in (
-            (0x28, 0, 0, 12),  # load the half word at 12, the EtherType
-            (0x15, 0, 1, _ETHERCAT),  # if it is another, pass over one line
-            (0x06, 0, 0, 0xFFFF),  # keep up to 64 kB of the frame
-            (0x06, 0, 0, 0),  # keep nothing
-        )
-    )
-    held = ctypes.create_string_buffer(program, len(program))
-    filter_ = struct.pack("@HP", len(program) // 8, ctypes.addressof(held))
-    wire.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, filter_)

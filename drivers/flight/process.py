@@ -21,9 +21,10 @@ import sys
 import threading
 import time
 
+from drivers.computer.packet_ring import CLOSED_S, PacketRing
 from drivers.computer.processes import yield_processor
 from drivers.computer.signals import ignore_interrupt
-from drivers.flight.capture import CLOSED_S, PacketCapture, frame_count, frames_of_block
+from drivers.flight.capture import frames_of_block
 from drivers.flight.kinds import ethercat_ring
 
 _NICE = 10
@@ -39,7 +40,7 @@ class Recorder:
         self._control = control
         self._ring = ethercat_ring(interface, frames_of_block)
         self._line = b""
-        self._wire: PacketCapture | None = None
+        self._wire: PacketRing | None = None
         self._sending = threading.Lock()
 
     def run(self) -> None:
@@ -76,9 +77,9 @@ class Recorder:
         if lost:
             self._ring.note(f"{lost} frames before this one were not recorded: computer busy")
 
-    def _keep(self, wire: PacketCapture) -> None:
-        for last_ns, block in wire.take():
-            self._ring.put_packed(last_ns, frame_count(block), block)
+    def _keep(self, wire: PacketRing) -> None:
+        for last_ns, frames, block in wire.take():
+            self._ring.put_packed(last_ns, frames, block)
 
     def _commands(self) -> bool:
         data = self._control.recv(1 << 16)
@@ -103,10 +104,10 @@ class Recorder:
             self._control.sendall(struct.pack("<Q", len(data)) + data)
 
 
-def open_wire(interface: str) -> PacketCapture | None:
+def open_wire(interface: str) -> PacketRing | None:
     """The frames of the interface; None where they cannot be had."""
     try:
-        return PacketCapture(interface)
+        return PacketRing(interface)
     except OSError:
         return None
 

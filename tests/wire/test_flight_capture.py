@@ -16,7 +16,8 @@ from drivers.virtual.wires.netns import Namespace, unavailable
 _BEGIN = """
 import json, socket, sys, time
 from drivers.computer.sockets import interface_flags, set_interface_flags
-from drivers.flight.capture import CLOSED_S, PacketCapture, frame_count, frames_of_block
+from drivers.computer.packet_ring import CLOSED_S, PacketRing
+from drivers.flight.capture import frames_of_block
 
 def frame(kind, number, size=60):
     head = bytes.fromhex("ffffffffffff020000000001") + kind.to_bytes(2, "big")
@@ -28,13 +29,13 @@ def play(interface, frames):
 
 def held():
     time.sleep(3 * CLOSED_S)
-    return [frame for _, block in capture.take() for frame in frames_of_block(block)]
+    return [frame for _, _, block in capture.take() for frame in frames_of_block(block)]
 
 wires = {}
 for interface in ("ec0m", "ec0s"):
     wires[interface] = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, 0)
     wires[interface].bind((interface, 0))
-capture = PacketCapture("ec0m")
+capture = PacketRing("ec0m")
 """
 _BOTH_WAYS = """
 began = time.time_ns()
