@@ -1,7 +1,7 @@
 stopping_coasts = STOP 后 { $drive } 无电且{ $speed ->
         [none] {""}
        *[other] 以 { $speed } { $unit }{" "}
-    }惯性滑行：停稳前请勿靠近
+    }自由停车：停稳前请勿靠近
 stopping_ended-unwatched = 在确认停稳之前已从轴列表移除
 stopping_mode-not-changed = 驱动器未切换模式
 stopping_no-answer = 无应答
