@@ -57,5 +57,5 @@ store_state-version-unreadable = 无法从 { $file } 读取状态文件夹的版
     .remedy = 请恢复备份（`servodeck restore BACKUP --replace`）；如果没有更新的 servodeck 用过此文件夹，可删除该文件。未写入任何内容
 store_written-newer-servodeck = { $value } 由更新的 servodeck 写出（版本 { $have }）
     .remedy = 请更新本站点的 servodeck；未作任何更改
-store_folder-gone = 状态文件夹 { $folder } 缺失
+store_folder-gone = 状态文件夹 { $folder } 已不存在
 store_database-replaced = 数据库 { $database } 在 servodeck 运行期间被移除或替换

@@ -1,9 +1,9 @@
 work_axis-already-moved = 轴已由 { QUOTED($other_title) } 驱动
     .remedy = 请等待其结束，或将其停止
 work_cancelled-by = { $person } 取消了它
-    .remedy = 确认无碍后重新启动
+    .remedy = 确认安全后重新启动
 work_cancelled-by-command = 已由命令取消
-    .remedy = 确认无碍后重新启动
+    .remedy = 确认安全后重新启动
 work_control-taken = { $person } 接管了该轴的控制权
     .remedy = 请向 { $person } 请求控制权，然后重新启动
 work_guest-stopped = { $guest } 现在不得驱动任何轴：{ $why }

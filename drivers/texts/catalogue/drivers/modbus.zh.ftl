@@ -27,7 +27,7 @@ modbus_note-register-holds = 寄存器 0 的值为 { $value }
 modbus_note-register-refused = 该站拒绝读取寄存器 0
 modbus_nothing-answered-settings = 所有这些设置下均无应答
 modbus_parity-must-none-even = parity={ $value } 须为 N（无）、E（偶）或 O（奇）
-modbus_register-holds-no = 寄存器 { NUM($start, format: "#06x") } 为 { $registers }h，不是 { $type }
+modbus_register-holds-no = 寄存器 { NUM($start, format: "#06x") } 为 { $registers }h，不是有效的 { $type }
     .remedy = 驱动器固件可能为其他版本：请将参数类型与驱动器文档比较
 modbus_registers-not-fit-request = 从 { NUM($start, format: "#06x") } 起的 { $value } 个寄存器超出一次请求（1 至 { $longest }，最高到寄存器 0xffff）
 modbus_serial-port-gone = 串口 { $device } 已断开{ $detail }

@@ -1,6 +1,6 @@
 safety-check_enabled = { $drive } 已使能
     .remedy = 请先断开该轴的使能
-safety-check_no-limited-speed = 测试速度须高于速度限值五分之一，才能看出限速不起作用
+safety-check_no-limited-speed = 测试速度必须比速度限值至少高 20 %，这样记录才能表明限速是否起作用
     .remedy = 请给出速度限值，且测试速度不低于 { $limit }
 safety-check_no-room = 该运动在每侧需要 { NUM($needed_rev, format: ".3g") } 圈行程
     .remedy = 请允许更大行程，或选择更低速度或更短时间
