@@ -10,7 +10,7 @@ station_box-name = { $value } 不能用作网络名称
 station_box-no-port = 本计算机没有可用于此用途的网口 { $value }
     .remedy = 请选择列出的网口之一
 station_box-office-port = { $value }：该网口用于办公网络；EtherCAT 帧会干扰其中的所有计算机
-    .remedy = 请使用 EtherCAT 网口，或先更改网口用途（“连接”页，“本站”）
+    .remedy = 请使用 EtherCAT 网口，或先更改网口用途（“连接”页面，“本站”）
 station_box-one-port-for-both = { $value } 不能同时用作 EtherCAT 网口和办公网口
     .remedy = 请选择两个网口，或将其中一个留空
 station_box-port-of-this-page = 本页面正通过 { $value } 连接：在此使用 EtherCAT 会中断连接
@@ -34,7 +34,7 @@ station_enabled-drive = { $drive } 已使能
 station_exchange-being-changed = { $drive }：{ $url }：正在更改周期数据交换
     .remedy = 结束后请重试
 station_exchange-not-set-up = { $drive }：测量所需的过程数据交换未能在 { NUM($limit_s, format: "g") } s 内建立；没有任何运动
-    .remedy = 请在“总线”页面查看总线状态；如果驱动器确实这么慢，请先在那里启动交换再测量
+    .remedy = 请在“连接”页面查看总线状态；如果驱动器确实这么慢，请先在该页面启动循环交换，再测量
 station_fault = { $kind ->
         [fault] 故障
        *[other] 警告
