@@ -1,10 +1,10 @@
 event_another-master = 另一个主站正在与节点 { $node } 通信：应答可能混淆。写入任何值之前，请先停止另一个主站
 event_can-adapter-back = CAN 适配器 { $channel } 已恢复
-event_exchange-broke-off = 循环交换中断：{ $cause }。所有轴停止，循环交换将自动重新建立
-event_exchange-ended-by-itself = 交换自行结束
-event_exchange-interrupted = 循环交换中断：{ $cause }
-event_exchange-not-restored = 循环交换未能重新建立：{ $cause }；将自动重试
-event_exchange-runs-again = 循环交换已恢复运行；所有轴保持断使能，需手动使能
+event_exchange-broke-off = 周期通信中断：{ $cause }。所有轴停止，周期通信将自动重新建立
+event_exchange-ended-by-itself = 周期通信自行结束
+event_exchange-interrupted = 周期通信中断：{ $cause }
+event_exchange-not-restored = 周期通信未能重新建立：{ $cause }；将自动重试
+event_exchange-runs-again = 周期通信已恢复运行；所有轴保持断使能，需手动使能
 event_guarding-answer-repeated = 节点 { $node } 重复了节点保护应答：有应答丢失，或两个节点使用同一编号
 event_heartbeat-stopped = 节点 { $node } 已停止发送心跳 { NUM($silent_s, format: ".1f") } s
 event_interface-back = 接口 { $interface } 已恢复

@@ -10,7 +10,7 @@ modbus_cannot-set = { $device } 不能设置为 { $value }：{ $text }
 modbus_check-when-silent = 电源、电缆、波特率、校验位和地址
 modbus_found = 找到 { $count } 个
 modbus_found-and-damaged = 找到 { $count } 个；{ $places } 的应答已损坏：两台驱动器地址相同，或线路设置错误
-modbus_line-never-falls-silent = 线路 { $device } 从不静默
+modbus_line-never-falls-silent = 线路 { $device } 始终不空闲
     .remedy = 有其他主站在通信，或波特率错误
 modbus_must-whole-number = { $name }={ $value } 须为 { $low } 至 { $high } 的整数
 modbus_no-modbus-register = { $address } 没有 Modbus 寄存器
@@ -22,7 +22,7 @@ modbus_no-serial-port = 没有串口 { $device }
 modbus_not-fit-16-bit = { $value } 超出 16 位寄存器范围
 modbus_not-open = { $url } 未打开
     .remedy = 请先连接总线
-modbus_note-no-identity = Modbus RTU 没有标识：请选择驱动器的描述文件
+modbus_note-no-identity = Modbus RTU 没有标识：请选择驱动器的配置文件
 modbus_note-register-holds = 寄存器 0 的值为 { $value }
 modbus_note-register-refused = 该站拒绝读取寄存器 0
 modbus_nothing-answered-settings = 所有这些设置下均无应答

@@ -1,6 +1,6 @@
 gantry_experiment = 两轴，第 { $number } / { $count } 次试验
 gantry_few-samples = 两轴的完整周期太少
-    .remedy = 请重新测量；若有样本丢失，请使用更长的周期
+    .remedy = 请重新测量；若有采样丢失，请使用更长的周期
 gantry_going-back-evaluating = 正在返回并评估
 gantry_no-partner = { $drive }：龙门需要两个轴一起测量，但未指定另一轴
     .remedy = 请指定另一轴（--partner）

@@ -5,6 +5,6 @@ shaping_no-cyclic-position = { $drive } 不支持每周期给定位置设定值�
     .remedy = 请用其他方法测量振动频率，并将整形器置于生成设定值的控制器中
 shaping_shaped = 带整形器移动
 shaping_takes-too-long = 一次往返移动需要 { NUM($needed_s, format: ".3g") } s，超过时间限值 { NUM($time_s, format: "g") } s
-    .remedy = 请缩短终点保持时间或移动行程，或延长时间限值
+    .remedy = 请缩短保持时间或移动行程，或延长时间限值
 shaping_title = 指令整形
 shaping_unshaped = 不带整形器移动
