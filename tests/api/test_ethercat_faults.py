@@ -404,8 +404,10 @@ def test_killed_host_ends_the_motion_and_is_replaced(running: Segment) -> None:
         os.kill(first, signal.SIGKILL)
         ended = page.wait("jog_ended", drive=running.b, timeout_s=20)
     assert reason(ended).strip()
-    running.reported("the EtherCAT process died", after=before)
-    running.reported("the cyclic exchange broke off: the EtherCAT process died", after=before)
+    running.reported("the EtherCAT process ended unexpectedly", after=before)
+    running.reported(
+        "the cyclic exchange was interrupted: the EtherCAT process ended unexpectedly", after=before
+    )
     running.reported("the EtherCAT process runs again", after=before)
     running.reported(
         "the cyclic exchange runs again; every axis is disabled until you enable it",

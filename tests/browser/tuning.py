@@ -132,8 +132,8 @@ def keep_exchanging(page: Page, axis: str) -> None:
 #: What a computer that is too busy for its buses makes the product say. The product is right
 #: to end a measurement then; here the page is tested, so it is measured again, but not often:
 #: what fails three times is not the computer.
-BUSY = ("in time", "no longer answers", "does not answer", "came back", "EtherCAT communication",
-        "heartbeat", "Operation enabled: Fault")  # fmt: skip
+BUSY = ("in time", "no longer answers", "does not answer", "were received from the bus",
+        "EtherCAT communication", "heartbeat", "Operation enabled: Fault")  # fmt: skip
 _TRIES = 3
 
 

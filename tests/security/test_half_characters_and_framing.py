@@ -184,7 +184,7 @@ def test_a_state_folder_that_is_gone_is_reported(tmp_path: Path) -> None:
         me = Caller(server)
         assert me.ok("GET", "/audit/status")["problem"] == ""
         shutil.rmtree(tmp_path / "station")
-        assert "is gone" in me.ok("GET", "/audit/status")["problem"]
+        assert "no longer exists" in me.ok("GET", "/audit/status")["problem"]
         assert me.ask("POST", "/stop", json={}).status_code == 200
         status = me.ok("GET", "/audit/status")
         assert str(tmp_path / "station") in status["problem"]

@@ -136,8 +136,8 @@ def test_a_state_folder_is_gone_only_after_it_was_there(database: str, tmp_path:
         assert store.missing() is None
         folder.rmdir()
         for _ in range(2):  # as well after it was opened again
-            assert "is gone" in str(store.missing())
-            with pytest.raises(DatabaseFailed, match="is gone"), store.writing():
+            assert "no longer exists" in str(store.missing())
+            with pytest.raises(DatabaseFailed, match="no longer exists"), store.writing():
                 pass
             store.close()
             store.open()

@@ -133,19 +133,22 @@ TEXTS: dict[str, tuple[str, str]] = {
     "obstacle.stayed_enabled": (
         "The drive stayed in Operation enabled all the time: it does not say that its torque is "
         "off. Look at how this function is wired and set.",
-        "驱动器始终处于“操作使能”：未表明其转矩已关断。请检查该功能的接线和设置。",
+        "驱动器始终处于“运行使能（Operation enabled）”：未表明其转矩已关断。"
+        "请检查该功能的接线和设置。",
     ),
     "obstacle.quick_stop_cut": (
         "The drive braked in its state Quick stop active, and the exchange of this program then "
         "took its power away, as it does with every axis that leaves Operation enabled. SS1 of "
         "this drive is not shown here: record it under the machine's controller.",
-        "驱动器在“快速停止激活”状态下制动，随后本程序的数据交换切断了其动力（对每个离开“操作使能”的轴都如此）。"
+        "驱动器在“快速停止有效（Quick stop active）”状态下制动，随后本程序的周期通信使其断电"
+        "（对每个离开“运行使能（Operation enabled）”的轴都如此）。"
         "此处无法证实该驱动器的 SS1：请在机器控制器下记录。",
     ),
     "sign.state": (
         "Times count from when the drive was first seen to leave Operation enabled. What passed "
         "from the hand to that is not on the bus and not in them.",
-        "时间从首次看到驱动器离开“操作使能”起算。从手动触发到此刻的时间不在总线上，也未计入。",
+        "时间从首次检测到驱动器离开“运行使能（Operation enabled）”起算。"
+        "从手动触发到此刻的时间总线上无法得知，也未计入。",
     ),
     "sign.speed": (
         "Times count from when the speed first left the commanded one: the drive stayed enabled. "

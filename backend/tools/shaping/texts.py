@@ -118,7 +118,7 @@ TEXTS: dict[str, tuple[str, str]] = {
         "The drive has a filter of its own against this; the table shows its values. They were not "
         "tried, and the manual does not say whether it acts on cyclic positions: set them, and "
         "repeat the unshaped move.",
-        "驱动器自带相应滤波器，数值见表。这些值未经试验，手册也未说明其是否作用于循环位置指令："
+        "驱动器自带相应滤波器，数值见表。这些值未经试验，手册也未说明其是否作用于周期位置设定值："
         "设定后请重复未整形的移动。",
     ),
     "finding.drive_filter_range": (

@@ -152,7 +152,7 @@ def test_no_object_is_cut_between_two_batches_on_ethercat(link: MemoryLink) -> N
 async def test_wrong_length_from_newer_firmware_is_reported(drive: Drive, link: MemoryLink) -> None:
     link.objects[0x2005, 3] = b"\1\2\3\4"
     readings = await drive.read_many(["2005:03"])
-    assert "4 bytes came for a UINT16" in readings["2005:03"].error
+    assert "4 bytes were received for a UINT16" in readings["2005:03"].error
 
 
 async def test_forgetting_leaves_nothing_to_believe(drive: Drive) -> None:

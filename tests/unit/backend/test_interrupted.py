@@ -24,7 +24,7 @@ from drivers.halt import HaltCause, Halted, LoopState
 from tests.unit.backend.test_tune_hum import GOALS, design
 
 STOPPED = Interrupted("station 1: the drive left Operation enabled: Quick stop active")
-LOST = LinkLost("only 12 of 800 samples came back from the bus")
+LOST = LinkLost("only 12 of 800 samples were received from the bus")
 TOO_FAR = motion_halted("station 1", Halted.beyond("position", 9000, 8000))
 HELD, MEANT = {"2005:03": 700}, {"2005:03": 200}
 

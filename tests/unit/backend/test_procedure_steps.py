@@ -31,7 +31,7 @@ def test_each_step_is_a_message_in_both_languages() -> None:
         "write again what was changed since the last save",
         "write 0x65766173 to 2005:03",
         "write save to 2005:10",
-        "leave the drive alone for 1.5 s",
+        "do not access the drive for 1.5 s",
         "wait until 2005:03 is 1 (≤ 10 s)",
         "wait until the drive answers again (≤ 30 s)",
     ]

@@ -203,7 +203,7 @@ async def test_a_command_says_what_is_pending_and_stores_nothing_of_it(
     assert "`servodeck sweep` was cut off" in reported
     assert f"{TORQUE} (was 3000)" in reported
     assert "servodeck params restore ethercat://eth0 --station 1" in reported
-    with pytest.raises(NotAllowed, match=f"would be stored: {TORQUE} .was 3000"):
+    with pytest.raises(NotAllowed, match=f"would be saved: {TORQUE} .was 3000"):
         restoring.require_own_values(x.drive)
     assert list((left / "restore").iterdir())
 

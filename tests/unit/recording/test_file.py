@@ -279,7 +279,7 @@ def test_slow_disk_fails_it_rather_than_dropping(
     writer.put(0, block(11))
     free.set()
     wait_for(lambda: failures, "it fails")
-    assert "does not keep up" in failures[0].message
+    assert "is too slow" in failures[0].message
     with pytest.raises(StorageFailed):
         writer.close({})
     with RecordingReader(tmp_path / "a.sdrec") as reader:

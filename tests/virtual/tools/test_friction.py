@@ -144,7 +144,7 @@ async def test_a_torque_that_does_not_change_is_refused() -> None:
 async def test_limits_that_leave_nothing_are_refused_before_the_map() -> None:
     asked = ASKED.model_copy(update={"slowest_rpm": 1000.0})
     async with direct(SMOOTH) as b:
-        with pytest.raises(OutOfRange, match="no speed is left to map"):
+        with pytest.raises(OutOfRange, match="lowest speed of the friction map"):
             await mapped(b.axis, b.session, asked)
 
 

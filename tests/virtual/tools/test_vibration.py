@@ -106,7 +106,7 @@ async def test_limits_without_room_or_time_are_refused() -> None:
     async with direct(CHAIN) as bench:
         with pytest.raises(OutOfRange, match="more than the time limit"):
             await asked(bench, VIBRATION, MAP.model_copy(update={"time_limit_s": 10.0}))
-        with pytest.raises(OutOfRange, match="no room for a ladder"):
+        with pytest.raises(OutOfRange, match="too narrow for a series of speeds"):
             await asked(bench, VIBRATION, MAP.model_copy(update={"slowest_rpm": 790.0}))
 
 
@@ -150,11 +150,11 @@ async def test_a_dwell_that_friction_holds_is_not_called_a_vibration() -> None:
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"frequency_hz": 400.0}, "carry no sine above"),
+        ({"frequency_hz": 400.0}, "form a sine of at most"),
         ({"turn_rpm": 290.0}, "more than the"),
         ({"amplitude_percent": 55.0}, "of the torque limit"),
         ({"time_limit_s": 3.0}, "more than the time limit"),
-        ({"by": "speed", "amplitude_rpm": 1e-6}, "steps of the setpoint"),
+        ({"by": "speed", "amplitude_rpm": 1e-6}, "resolution of the setpoint"),
     ],
 )
 async def test_a_dwell_beyond_the_envelope_is_refused(changed: dict[str, Any], words: str) -> None:

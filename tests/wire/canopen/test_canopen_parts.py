@@ -379,7 +379,7 @@ def test_a_fixed_mapping_is_reported_as_such_and_leaves_nothing_behind() -> None
 
     setup = DriveSetup(read, write, own_id=127)
     signal = CyclicSignal(5, Address(0x6064, 0, "INT32"), "position")
-    with pytest.raises(NotAllowed, match="does not let 6064:00 be mapped to PDO 1"):
+    with pytest.raises(NotAllowed, match="does not accept 6064:00 in the mapping of PDO 1"):
         setup.map_pdos([PdoPlan(5, "tx", 0, (signal,))])
     setup.undo()
     assert objects == before

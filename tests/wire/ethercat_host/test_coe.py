@@ -257,7 +257,7 @@ def test_a_missing_part_of_a_description_is_not_passed_over() -> None:
 
     slave = ScriptedSlave(react)
     box = slave.box()
-    with pytest.raises(ProtocolError, match="a part of the drive's description of itself"):
+    with pytest.raises(ProtocolError, match="list of its objects is incomplete"):
         slave.run(information.list_objects(box))
     assert box.unsettled, "the next question is asked after what may still come"
 

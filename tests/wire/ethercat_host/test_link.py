@@ -306,7 +306,7 @@ async def test_a_hung_host_is_killed_and_replaced(rig: Rig) -> None:
         assert first is not None
         os.kill(first, signal.SIGSTOP)
         waiting = asyncio.create_task(bus.link.read(1, STATUS))
-        await bus.reported("hung while", "killed")
+        await bus.reported("did not respond while", "was ended")
         with pytest.raises(LinkLost):
             await waiting
         await bus.reported("runs again")
@@ -383,4 +383,4 @@ def test_hazards_of_pysoem_are_guarded(namespace: Namespace, rig: Rig) -> None:
     lines = result.stdout.splitlines()
     assert "no process data before they are mapped" in lines[0]
     assert "4096 are possible" in lines[1]
-    assert "500 bytes of outputs for" in lines[2]
+    assert "bytes of outputs, 500 were given" in lines[2]

@@ -87,8 +87,8 @@ async def test_killing_the_host_in_motion_stops_the_axis_and_recovers_disabled(r
         os.kill(host, signal.SIGKILL)
         took = await until(lambda: rig.truth(0, 0x606C) == 0, 1.0)
         assert took < 0.2
-        await bus.reported("died", "started again")
-        await bus.reported("the cyclic exchange broke off")
+        await bus.reported("ended unexpectedly", "started again")
+        await bus.reported("the cyclic exchange was interrupted")
         await bus.reported("the cyclic exchange runs again; every axis is disabled", within_s=15)
         assert bus.link.process_data.running
         assert not bus.link.process_data.trouble

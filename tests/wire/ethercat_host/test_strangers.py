@@ -238,7 +238,7 @@ def test_a_mailbox_that_a_search_missed_is_distinguished_from_none_at_all(
         _ = station.box
 
 
-@pytest.mark.parametrize(("filling", "says"), [(0, "in part"), (4200, "behind 4096 bytes")])
+@pytest.mark.parametrize(("filling", "says"), [(0, "in part"), (4200, "more than 4096 bytes")])
 def test_sync_managers_too_far_back_in_the_eeprom_are_reported_as_such(
     filling: int, says: str
 ) -> None:

@@ -95,7 +95,7 @@ def test_the_remedy_is_an_example_of_that_bus(text: str, kinds: list[str]) -> No
 
 
 def test_virtual_wires_need_a_demo() -> None:
-    with pytest.raises(NotAllowed, match="only a running demo has"):
+    with pytest.raises(NotAllowed, match="exists only while the demo runs"):
         link_for("mlink://virtual0")
 
 

@@ -1,6 +1,6 @@
 library_another-station-already = another { $value } is on this station already
     .remedy = delete that one first
-library_cannot-kept = { $entry } cannot be kept: { $cause }
+library_cannot-kept = { $entry } cannot be stored: { $cause }
 library_contents-missing-damaged = the contents of { $label } are missing or damaged
     .remedy = restore them from a backup
 library_damaged-no-measurement = { $value } is damaged, or no measurement: { $cause }

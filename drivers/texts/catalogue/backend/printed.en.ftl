@@ -129,7 +129,7 @@ printed_server-cut-off = note: { $drive }: a server was cut off on { $since } an
 printed_server-is-at = servodeck is at { $url }  (Ctrl+C ends it)
 printed_set-bit-rate = set { $node } to { $kbit } kbit/s?
 printed_set-loaded = written { $written }, failed { $failed }
-printed_setting-left = { $setting }: left, as it was changed since
+printed_setting-left = { $setting }: not restored, because it was changed since
 printed_setup-code = {"  "}there is no administrator yet; the page asks for this code:
 printed_should-be = {""}, should be { $expected }
 printed_starting-virtual = starting the virtual drives …
@@ -137,7 +137,7 @@ printed_station = station { $station }
 printed_stored-version = { $name } version { $version }
 printed_then = then
 printed_trial-does-not = {"  "}tried { $setting } { $before } -> { $after }: { $refusal }; undone
-printed_trial-reaches = {"  "}tried { $setting } { $before } -> { $after }: reaches Operational; undone, to keep it set { $setting } in the profile
+printed_trial-reaches = {"  "}tried { $setting } { $before } -> { $after }: reaches Operational; undone. To keep it, set { $setting } in the profile
 printed_tuning-in-force = in force: { $count ->
         [one] { $count } parameter was changed; it is
        *[other] { $count } parameters were changed; they are
@@ -146,7 +146,7 @@ printed_tuning-not-applied = nothing was written; --apply verifies a design, --k
 printed_tuning-taken-back = undone: all parameters are as before
 printed_type-digest = type the digest to confirm this change
 printed_value-differs = { $key }  { $name }: drive { $drive } → file { $file }
-printed_value-stays = { $drive }: { $key } (was { $was }) stays as it is
+printed_value-stays = { $drive }: { $key } keeps its present value (was { $was })
 printed_values-before = the values before are in { $file }
 printed_versions-deleted = { $kind } { $name }: { $count } versions deleted
 printed_virtual-answers = { $drive } answers at { $url } station { $station }  (Ctrl+C ends it)

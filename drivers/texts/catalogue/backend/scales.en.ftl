@@ -1,4 +1,4 @@
-scales_changed = { $drive }: its units are not those this motion was planned with: gear, feed constant, resolution or unit of the drive was changed meanwhile
+scales_changed = { $drive }: gear, feed constant, resolution or unit of the drive was changed since this motion was planned
     .remedy = find out who changed them (another program, the panel, a restart of the drive), check gear and units on the Parameters page, and start again
 scales_changed-in-motion = { $drive }: { $parameter } was changed while the axis moves; the motion is ended
     .remedy = check the scales of the axis, then start it again
@@ -35,7 +35,7 @@ scales_speed-sign-wrong = one of the two has the wrong sign
 scales_teach-or-import = teach it under “Scales” on the Overview page, or by “servodeck scales teach”, or import the drive's own description
 scales_travel-needs-mechanics-say = { $drive }: travel in { $value } needs mechanics that state the travel per revolution
     .remedy = enter the mechanics on the Mechanics page, or use revolutions
-scales_units-tool-hold = { $drive }: { $parameter_number } { $key } is { $value }; the units of this tool apply to { $raw }
+scales_units-tool-hold = { $drive }: { $parameter_number } { $key } is { $value }; the units of this tool are valid only for { $raw }
     .remedy = set it back to { $raw }. { $help }
 scales_why-behind-gear = it counts turns, and 6091h holds a gear ratio: the shaft it refers to is not stated
 scales_why-factor = 6090h is another resolution than 608Fh, or 6096h or 6097h holds a factor: how the drive uses it is not stated

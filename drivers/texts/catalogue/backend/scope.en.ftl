@@ -1,4 +1,4 @@
-scope_already = there are { $most } already
+scope_already = { $most } are stored already, the permitted maximum
     .remedy = delete some that are not needed
 scope_no = there is no { $value }
     .remedy = choose from the list

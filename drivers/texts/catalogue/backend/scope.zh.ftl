@@ -1,4 +1,4 @@
-scope_already = 已有 { $most } 个
+scope_already = 已存储 { $most } 个，达到上限
     .remedy = 请删除不需要的
 scope_no = 没有 { $value }
     .remedy = 请从列表中选择

@@ -25,7 +25,7 @@ station_drive-list-entry-unusable = { $file }, drive { $number }: { $place }: { 
 station_drive-list-not-read = { $file } cannot be read: { $cause }
 station_drive-station-cannot-list = the drive at station { $station } cannot list its own objects: CANopen has no such service, and it carries no EDS (1021h: { $cause })
 station_drive-station-carries-eds = the drive at station { $station } carries its EDS in the maker's own format (1022h = { $packed })
-station_drive-station-not-hold = the drive at station { $station } of { $url } does not hold the settings of { $drive }: { $parameter } { $key } is { $value } there and { $here } here ({ $different_count } of { $shared_count } differ)
+station_drive-station-not-hold = the settings of the drive at station { $station } of { $url } differ from those of { $drive }: { $parameter } { $key } is { $value } there and { $here } here ({ $different_count } of { $shared_count } differ)
     .remedy = check which drive each cable goes to; if it is the same drive, accept the difference
 station_drives-being-searched = { $drive }: { $url }: a scan is running, which may reset the drives
     .remedy = try again when that has ended
@@ -70,7 +70,7 @@ station_no-drive-bench = there is no drive { QUOTED($drive) } on this bench
 station_no-drive-to-try = no drive is connected at station { $station }
     .remedy = connect it first: the settings are those of its profile
 station_no-partner = { $drive }: no other connected drive of its bus is named { QUOTED($value) }
-    .remedy = name the other axis as the page does
+    .remedy = give the name of the other axis as the page shows it
 station_no-port = { $profile_title } has no { $kind } port
     .remedy = choose one of its links
 station_no-port-must-drive = a { $profile_title } has no { $kind } port: the drive belongs to another family

@@ -1,8 +1,8 @@
-stopping_coasts = STOP 后 { $drive } 无电且{ $speed ->
+stopping_coasts = STOP 后 { $drive } 未得电且{ $speed ->
         [none] {""}
        *[other] 以 { $speed } { $unit }{" "}
-    }惯性滑行：停稳前请勿靠近
-stopping_ended-unwatched = 在确认停稳之前已从轴列表移除
+    }自由停车：静止之前请勿靠近
+stopping_ended-unwatched = 在确认静止之前已从轴列表移除
 stopping_mode-not-changed = 驱动器未切换模式
 stopping_no-answer = 无应答
 stopping_not-on-bench = 不在此轴列表上
@@ -16,4 +16,4 @@ stopping_still-moves = STOP 后 { $drive } 仍{ $speed ->
        *[other] 以 { $speed } { $unit }{" "}
     }运动：请使用机器的急停
 stopping_turns-with-power = { $drive } 已使能并以 { $speed } { $unit } 转动，但此处无人操作：请按 STOP
-stopping_turns-without-power = { $drive } 在无电状态下以 { $speed } { $unit } 转动：由人手、重力或驱动器自身引起
+stopping_turns-without-power = { $drive } 在未得电时以 { $speed } { $unit } 转动：由人手、重力或驱动器自身引起

@@ -57,5 +57,5 @@ store_state-version-unreadable = the version of the state folder cannot be read 
     .remedy = restore a backup (`servodeck restore BACKUP --replace`); where no newer servodeck has used this folder, remove that file. Nothing was written
 store_written-newer-servodeck = { $value } was written by a newer servodeck (it has { $have })
     .remedy = update servodeck on this station; nothing was changed
-store_folder-gone = the state folder { $folder } is gone
-store_database-replaced = the database { $database } was removed or replaced while servodeck runs
+store_folder-gone = the state folder { $folder } no longer exists
+store_database-replaced = the database { $database } was removed or replaced while servodeck was running

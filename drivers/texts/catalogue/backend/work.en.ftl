@@ -1,9 +1,9 @@
 work_axis-already-moved = the axis is already moved by { QUOTED($other_title) }
     .remedy = wait for it to end, or stop it
 work_cancelled-by = { $person } cancelled it
-    .remedy = start it again when nothing speaks against it
+    .remedy = start it again when it is safe
 work_cancelled-by-command = it was cancelled by a command
-    .remedy = start it again when nothing speaks against it
+    .remedy = start it again when it is safe
 work_control-taken = { $person } took control of the axis
     .remedy = ask { $person } for control, then start it again
 work_guest-stopped = { $guest } may not move anything now: { $why }

@@ -1,6 +1,6 @@
 conformance_assignment = 每个已分配的 PDO 均可读取，映射到其中的每个对象均存在
 conformance_drive-device-type = 1000h 的低字为 402，即驱动器行规的编号
-conformance_drive-mode-objects = 6502h 列出的每种模式的给定值和实际值对象均存在
+conformance_drive-mode-objects = 6502h 列出的每种模式的设定值和实际值对象均存在
 conformance_drive-mode-shown = 6061h 显示无模式，或显示 6502h 列出的模式
 conformance_drive-state = 状态字显示八种状态之一
 conformance_drive-words = 控制字和状态字存在，且各为两个字节

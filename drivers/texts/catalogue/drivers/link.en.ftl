@@ -1,4 +1,4 @@
-link_bytes-came-bytes = { $bytes } bytes came for a { $data_type } of { $calcsize_bytes } bytes
+link_bytes-came-bytes = { $bytes } bytes were received for a { $data_type } of { $calcsize_bytes } bytes
     .remedy = the drive's firmware may be of another version: compare with its dictionary
 link_check-when-silent = power, cable and address
 link_drive-cannot-list-objects = a drive on { $kind } cannot list its own objects
@@ -32,6 +32,6 @@ link_not-whole-number-needs = { $value } is not a whole number, { $data_type } n
 link_open = open
 link_terminal-servodeck-itself-runs = { $value } is the terminal that servodeck itself runs in
     .remedy = give the device of the adapter, as /dev/ttyUSB0
-link_wire-running-demo = { $bus } is a wire that only a running demo has
+link_wire-running-demo = { $bus } exists only while the demo runs
     .remedy = start 'servodeck demo', or give the path of a real or virtual port
 link_write-it-like = write it like { $example }

@@ -32,6 +32,6 @@ link_not-whole-number-needs = { $value } 不是整数，{ $data_type } 需要整
 link_open = 已打开
 link_terminal-servodeck-itself-runs = { $value } 是 servodeck 自身运行的终端
     .remedy = 请给出适配器的设备，如 /dev/ttyUSB0
-link_wire-running-demo = { $bus } 是只有运行中的演示才有的线路
+link_wire-running-demo = { $bus } 仅在演示运行时存在
     .remedy = 请启动 'servodeck demo'，或给出真实或虚拟端口的路径
 link_write-it-like = 请写成 { $example }

@@ -27,7 +27,7 @@ modbus_note-register-holds = register 0 holds { $value }
 modbus_note-register-refused = the station refuses register 0
 modbus_nothing-answered-settings = nothing answered at any of these settings
 modbus_parity-must-none-even = parity={ $value } must be N (none), E (even) or O (odd)
-modbus_register-holds-no = register { NUM($start, format: "#06x") } holds { $registers }h, which is no { $type }
+modbus_register-holds-no = register { NUM($start, format: "#06x") } holds { $registers }h, which is not a valid { $type }
     .remedy = the drive's firmware may be of another version: compare the parameter's type with the drive's own documentation
 modbus_registers-not-fit-request = { $value } registers from { NUM($start, format: "#06x") } do not fit one request (1 to { $longest }, up to register 0xffff)
 modbus_serial-port-gone = the serial port { $device } has disappeared{ $detail }

@@ -10,7 +10,7 @@ modbus_cannot-set = { $device } 不能设置为 { $value }：{ $text }
 modbus_check-when-silent = 电源、电缆、波特率、校验位和地址
 modbus_found = 找到 { $count } 个
 modbus_found-and-damaged = 找到 { $count } 个；{ $places } 的应答已损坏：两台驱动器地址相同，或线路设置错误
-modbus_line-never-falls-silent = 线路 { $device } 从不静默
+modbus_line-never-falls-silent = 线路 { $device } 始终不空闲
     .remedy = 有其他主站在通信，或波特率错误
 modbus_must-whole-number = { $name }={ $value } 须为 { $low } 至 { $high } 的整数
 modbus_no-modbus-register = { $address } 没有 Modbus 寄存器
@@ -22,12 +22,12 @@ modbus_no-serial-port = 没有串口 { $device }
 modbus_not-fit-16-bit = { $value } 超出 16 位寄存器范围
 modbus_not-open = { $url } 未打开
     .remedy = 请先连接总线
-modbus_note-no-identity = Modbus RTU 没有标识：请选择驱动器的描述文件
+modbus_note-no-identity = Modbus RTU 没有标识：请选择驱动器的配置文件
 modbus_note-register-holds = 寄存器 0 的值为 { $value }
 modbus_note-register-refused = 该站拒绝读取寄存器 0
 modbus_nothing-answered-settings = 所有这些设置下均无应答
 modbus_parity-must-none-even = parity={ $value } 须为 N（无）、E（偶）或 O（奇）
-modbus_register-holds-no = 寄存器 { NUM($start, format: "#06x") } 为 { $registers }h，不是 { $type }
+modbus_register-holds-no = 寄存器 { NUM($start, format: "#06x") } 为 { $registers }h，不是有效的 { $type }
     .remedy = 驱动器固件可能为其他版本：请将参数类型与驱动器文档比较
 modbus_registers-not-fit-request = 从 { NUM($start, format: "#06x") } 起的 { $value } 个寄存器超出一次请求（1 至 { $longest }，最高到寄存器 0xffff）
 modbus_serial-port-gone = 串口 { $device } 已断开{ $detail }

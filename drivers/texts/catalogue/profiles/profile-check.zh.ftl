@@ -1,6 +1,6 @@
 profile-check_chapter-begin = 该章应从第 { $line } 行开始
 profile-check_chapter-empty = 没有任何记录引用该章的行，也没有给出原因
-profile-check_common-translation-of-nothing = 通用译文所译的文本在描述文件中不存在
+profile-check_common-translation-of-nothing = 通用译文所译的文本在配置文件中不存在
 profile-check_default-outside = 默认值 { $default } 超出 { $limits }
 profile-check_does-not-fit = { $name } { $value } 超出类型 { $type } 的范围
 profile-check_enum-outside = 枚举值 { $values } 超出 { $limits }
@@ -12,6 +12,6 @@ profile-check_no-chapters = 未列出手册的章节
 profile-check_no-motion-class = { $name } 可写，但没有运动类别：请添加运动规则
 profile-check_number = { $number } 的键应为 { $expected }
 profile-check_other-manual = 来源 { QUOTED($source) } 不属于手册 { $manual }
-profile-check_translation-of-nothing = 译文所译的内容在描述文件中不存在
+profile-check_translation-of-nothing = 译文所译的内容在配置文件中不存在
 profile-check_two-motion-rules = 多条运动规则涉及该对象
 profile-check_two-translations = { QUOTED($english) } 在别处有不同的译文

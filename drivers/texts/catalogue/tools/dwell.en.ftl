@@ -1,10 +1,10 @@
-dwell_amplitude-too-small = an amplitude of { NUM($value, format: ".3g") } { $unit } is less than the steps of the setpoint can form
+dwell_amplitude-too-small = an amplitude of { NUM($value, format: ".3g") } { $unit } is too small for the resolution of the setpoint
     .remedy = choose at least { NUM($least, format: ".3g") } { $unit }
 dwell_beyond-envelope = the vibration needs { NUM($needed_rpm, format: ".3g") } rpm and { NUM($way_rev, format: ".3g") } rev, more than the permitted { NUM($permitted_rpm, format: ".3g") } rpm and { NUM($travel_rev, format: ".3g") } rev
     .remedy = choose a smaller amplitude, a lower slow speed, a higher frequency or wider limits
 dwell_few-samples = too few samples were received to evaluate the vibration
     .remedy = choose a longer time, or a slow speed with longer strokes
-dwell_frequency-too-high = setpoints with every cycle carry no sine above { NUM($highest_hz, format: "g") } Hz
+dwell_frequency-too-high = with this cycle time the setpoints can form a sine of at most { NUM($highest_hz, format: "g") } Hz
     .remedy = choose a lower frequency or a shorter cycle
 dwell_going-back-evaluating = going back and evaluating
 dwell_no-torque-offset = { $drive } accepts no cyclic torque offset (60B2h) ahead of its speed loop

@@ -1,13 +1,13 @@
-dwell_amplitude-too-small = 幅值 { NUM($value, format: ".3g") } { $unit } 小于设定值分辨率所能形成的正弦
+dwell_amplitude-too-small = 幅值 { NUM($value, format: ".3g") } { $unit } 过小，低于设定值的分辨率
     .remedy = 请至少取 { NUM($least, format: ".3g") } { $unit }
 dwell_beyond-envelope = 该振动需要 { NUM($needed_rpm, format: ".3g") } rpm 和 { NUM($way_rev, format: ".3g") } 圈，超过限值中允许使用的 { NUM($permitted_rpm, format: ".3g") } rpm 和 { NUM($travel_rev, format: ".3g") } 圈
     .remedy = 请减小幅值、降低叠加的低速、提高频率或放宽限值
-dwell_few-samples = 到达的样本太少，无法说明振动情况
+dwell_few-samples = 收到的采样太少，无法评估振动
     .remedy = 请延长激振时间，或在行程更长的低速下激振
-dwell_frequency-too-high = 循环设定值无法形成高于 { NUM($highest_hz, format: "g") } Hz 的正弦
+dwell_frequency-too-high = 按此周期时间，设定值最高只能形成 { NUM($highest_hz, format: "g") } Hz 的正弦
     .remedy = 请降低频率或缩短周期
 dwell_going-back-evaluating = 正在返回并评估
-dwell_no-torque-offset = { $drive } 不接受速度环之前的循环转矩偏置 (60B2h)
+dwell_no-torque-offset = { $drive } 不接受速度环之前的周期转矩偏置（60B2h）
     .remedy = 请用速度设定值激振
 dwell_takes-too-long = 连同渐入渐出，激振需要 { NUM($takes_s, format: ".3g") } s，超过时间限值 { NUM($time_s, format: "g") } s
     .remedy = 请缩短满幅时间或延长时间限值

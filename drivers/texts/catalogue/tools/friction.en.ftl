@@ -1,7 +1,7 @@
 friction_actual-torque-not-change = { $drive }: its actual torque ({ $parameter }) does not change during a reciprocating move; friction cannot be computed from it
     .remedy = use a drive or a bus that reports the actual torque with every cycle
-friction_between-rpm-rpm-fastest = no speed is left to map between { NUM($slowest_rpm, format: ".3g") } rpm and { NUM($fastest_rpm, format: ".3g") } rpm, the fastest speed that the limits of travel and speed permit
-    .remedy = permit more travel or speed, or ask for a lower slowest speed
+friction_between-rpm-rpm-fastest = the lowest speed of the friction map, { NUM($slowest_rpm, format: ".3g") } rpm, is too close to or above { NUM($fastest_rpm, format: ".3g") } rpm, the highest speed that the limits of travel and speed permit
+    .remedy = permit more travel or speed, or choose a lower speed to begin with
 friction_first-short-move = a first short move
 friction_going-back-evaluating = going back and evaluating
 friction_no-speed-held-evenly = no speed was held evenly in both directions, so there is no friction to map

@@ -1,12 +1,12 @@
 friction_actual-torque-not-change = { $drive }：轴往复运动时其实际转矩（{ $parameter }）不变，因此无法得知摩擦
     .remedy = 请使用每个周期都上报实际转矩的驱动器或总线
-friction_between-rpm-rpm-fastest = 在 { NUM($slowest_rpm, format: ".3g") } rpm 与 { NUM($fastest_rpm, format: ".3g") } rpm（行程和速度限值所允许的最高速度）之间，没有可测的范围
-    .remedy = 允许更大的行程或速度，或要求更低的最低速度
+friction_between-rpm-rpm-fastest = 摩擦图谱的最低速度 { NUM($slowest_rpm, format: ".3g") } rpm 过于接近或高于行程和速度限值所允许的最高速度 { NUM($fastest_rpm, format: ".3g") } rpm
+    .remedy = 请允许更大的行程或更高的速度，或选择更低的最低速度
 friction_first-short-move = 首次短距离运动
 friction_going-back-evaluating = 正在返回并计算
-friction_no-speed-held-evenly = 两个方向上都没有保持均匀的速度，因此没有可绘制的摩擦
+friction_no-speed-held-evenly = 两个方向上都没有保持均匀的速度，因此无法绘制摩擦图谱
     .remedy = 请先整定速度环，或允许更高的速度
-friction_speeds-friction-map-take = 摩擦图的各个速度所需时间超过 { NUM($time_s, format: "g") } s
+friction_speeds-friction-map-take = 摩擦图谱的各个速度所需时间超过 { NUM($time_s, format: "g") } s
     .remedy = 允许更长时间，或要求更少的速度
 friction_speed-both-directions = { NUM($speed_rpm, format: ".3g") } rpm，两个方向
 friction_title = 摩擦图谱

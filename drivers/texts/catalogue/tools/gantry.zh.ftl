@@ -1,11 +1,11 @@
 gantry_experiment = 两轴，第 { $number } / { $count } 次试验
 gantry_few-samples = 两轴的完整周期太少
-    .remedy = 请重新测量；若有样本丢失，请使用更长的周期
+    .remedy = 请重新测量；若有采样丢失，请使用更长的周期
 gantry_going-back-evaluating = 正在返回并评估
 gantry_no-partner = { $drive }：龙门需要两个轴一起测量，但未指定另一轴
     .remedy = 请指定另一轴（--partner）
-gantry_no-room = 行程和速度限制不足以进行带激励的匀速运动
-    .remedy = 请允许更大的行程或速度，或更大的谱线间隔
+gantry_no-room = 行程和速度限值过小，无法进行带激励的基础运动
+    .remedy = 请允许更大的行程或更高的速度，或选择更大的谱线间隔
 gantry_no-time = 运动需要 { NUM($takes_s, format: ".3g") } s，超过时间限制
     .remedy = 请允许更长时间，或更大的谱线间隔
 gantry_title = 龙门

@@ -1,12 +1,12 @@
-load-side_few-samples = 两个位置的样本太少，无法求得间隙与刚度
+load-side_few-samples = 收到的两个位置的采样太少，无法求得间隙与刚度
     .remedy = 请重新测量；限制较窄时请允许更大行程或更长时间
 load-side_first-short-move = 首次短距离运动
 load-side_going-back-evaluating = 正在返回并评估
 load-side_load-stands = 负载位置未跟随电机
     .remedy = 请检查第二编码器、其电缆以及驱动器中是否已启用；请检查联轴器
-load-side_no-room = 行程、速度和转矩限制不足以进行能显示间隙的运动
+load-side_no-room = 行程、速度和转矩限值过小，无法进行能显示间隙的运动
     .remedy = 请允许更大的行程、速度或转矩
-load-side_no-second-position = { $drive } 不报告第二位置，因此无法得知负载侧的情况
+load-side_no-second-position = { $drive } 不报告第二位置，因此无法测量负载侧
     .remedy = 测量间隙与刚度需要能报告第二编码器的驱动器，例如 CiA 402 对象 60E4h
 load-side_no-time = 以低速走过 { NUM($range_rev, format: ".3g") } 圈所需时间超过时间限制
     .remedy = 请允许更长时间、更小行程或更高速度

@@ -1,6 +1,6 @@
 safety-check_enabled = { $drive } is enabled already
     .remedy = disable the axis first
-safety-check_no-limited-speed = the test speed must be above the speed limit by a fifth, so that the record shows a limit that does not act
+safety-check_no-limited-speed = the test speed must be at least 20 % above the speed limit, so that the record shows whether the limit acts
     .remedy = give the speed limit, and a test speed of { $limit } or more
 safety-check_no-room = the motion needs { NUM($needed_rev, format: ".3g") } rev of travel to each side
     .remedy = permit more travel, or choose a lower speed or less time

@@ -1,7 +1,7 @@
 shaping_evaluating = evaluating
 shaping_move-beyond-envelope = the move needs { NUM($needed_rpm, format: "g") } rpm and { NUM($needed_rev, format: ".3g") } rev, more than the envelope of { NUM($speed_rpm, format: "g") } rpm and { NUM($travel_rev, format: "g") } rev
     .remedy = choose a shorter or slower move, or a wider envelope
-shaping_no-cyclic-position = { $drive } takes no position with every cycle (CSP), so that no shaped move can be played
+shaping_no-cyclic-position = { $drive } does not accept a position setpoint in every cycle (CSP), so the shaped move cannot be made
     .remedy = measure the frequency of the vibration in another way, and set the shaper in the controller that generates the setpoints
 shaping_shaped = moving with the shaper
 shaping_takes-too-long = a move out and back takes { NUM($needed_s, format: ".3g") } s, more than the time limit of { NUM($time_s, format: "g") } s

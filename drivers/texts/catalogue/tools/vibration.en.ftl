@@ -1,8 +1,8 @@
 vibration_first-short-move = a first short move
 vibration_going-back-evaluating = going back and evaluating
-vibration_no-room-for-speeds = between { NUM($slowest_rpm, format: ".3g") } rpm and { NUM($fastest_rpm, format: ".3g") } rpm, the fastest speed that the limits allow, there is no room for a ladder of speeds
-    .remedy = permit more travel or speed, or a lower slowest speed
-vibration_no-speed-held = no speed was held evenly in both directions; { NUM($value, format: ".3g") } rpm was the fastest that was not
+vibration_no-room-for-speeds = the range from { NUM($slowest_rpm, format: ".3g") } rpm to { NUM($fastest_rpm, format: ".3g") } rpm, the highest speed that the limits permit, is too narrow for a series of speeds
+    .remedy = permit more travel or a higher speed, or choose a lower speed to begin with
+vibration_no-speed-held = no speed up to { NUM($value, format: ".3g") } rpm was held evenly in both directions
     .remedy = permit a higher speed and more torque; check the gains of the speed loop
 vibration_speed-both-directions = { NUM($speed_rpm, format: ".3g") } rpm in both directions
 vibration_takes-too-long = { $speeds } speeds take { NUM($takes_s, format: ".0f") } s, more than the time limit of { NUM($time_s, format: "g") } s

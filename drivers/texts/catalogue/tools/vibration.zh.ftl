@@ -1,8 +1,8 @@
 vibration_first-short-move = 首次短距离运动
 vibration_going-back-evaluating = 正在返回并评估
-vibration_no-room-for-speeds = 在 { NUM($slowest_rpm, format: ".3g") } rpm 与限制允许的最高速度 { NUM($fastest_rpm, format: ".3g") } rpm 之间，无法安排一系列速度
-    .remedy = 请允许更大的行程或更高的速度，或降低最低速度
-vibration_no-speed-held = 没有任何速度能在两个方向上均匀保持；未能保持的最高速度为 { NUM($value, format: ".3g") } rpm
+vibration_no-room-for-speeds = 从 { NUM($slowest_rpm, format: ".3g") } rpm 到限值允许的最高速度 { NUM($fastest_rpm, format: ".3g") } rpm 的范围过窄，无法测量一系列速度
+    .remedy = 请允许更大的行程或更高的速度，或选择更低的最低速度
+vibration_no-speed-held = { NUM($value, format: ".3g") } rpm 以下没有任何速度能在两个方向上均匀保持
     .remedy = 请允许更高的速度和更大的转矩；检查速度环增益
 vibration_speed-both-directions = { NUM($speed_rpm, format: ".3g") } rpm，双向
 vibration_takes-too-long = { $speeds } 个速度需要 { NUM($takes_s, format: ".0f") } s，超过时间限值 { NUM($time_s, format: "g") } s

@@ -154,7 +154,7 @@ export const bench = {
   'help.can.title': ['CAN', 'CAN'],
   'help.can.text': [
     'Two wires and ground, 120 Ω at both ends, the same bit rate everywhere, every node number only once. For SocketCAN bring the interface up first: sudo ip link set can0 up type can bitrate 1000000. Adapters with SLCAN appear as serial ports.',
-    '两线加地，两端各 120 Ω，各处比特率一致，节点号不重复。使用 SocketCAN 时先启动接口：sudo ip link set can0 up type can bitrate 1000000。SLCAN 适配器显示为串口。',
+    '两线加地，两端各 120 Ω，各处位速率一致，节点号不重复。使用 SocketCAN 时先启动接口：sudo ip link set can0 up type can bitrate 1000000。SLCAN 适配器显示为串口。',
   ],
   'help.nothing.title': ['The adapter is not in the list', '列表中没有适配器'],
   'help.nothing.text': [

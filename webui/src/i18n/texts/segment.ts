@@ -152,7 +152,7 @@ export const segment = {
   'segment.trialNoReason': ['the drive reports no reason', '驱动器未报告原因'],
   'segment.trialCycle': [
     'Choose this multiple of the cycle where the exchange is started: it is not a setting of the profile.',
-    '请在启动交换时选择该倍数的周期：它不属于配置文件的设置。',
+    '请在启动周期通信时选择该倍数的周期：它不属于配置文件的设置。',
   ],
   'segment.trialKeep': ['Keep', '保留'],
   'segment.trialUndo': ['Undo', '撤销'],

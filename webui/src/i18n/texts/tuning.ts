@@ -6,7 +6,7 @@ export const tuning = {
   'page.response': ['Response', '频率响应'],
   'tune.needsCyclic': [
     'Measuring needs a bus with process data in every cycle (EtherCAT, CANopen with SYNC). Connect the drive over such a bus; notches and gains can be written over this one.',
-    '测量需要每周期交换过程数据的总线（EtherCAT、带 SYNC 的 CANopen）。请用此类总线连接驱动器；当前总线可写入陷波和增益。',
+    '测量需要每周期通信过程数据的总线（EtherCAT、带 SYNC 的 CANopen）。请用此类总线连接驱动器；当前总线可写入陷波和增益。',
   ],
   'sweep.title': ['Measure', '测量'],
   'sweep.what': ['What to measure', '测量对象'],
@@ -332,7 +332,7 @@ export const tuning = {
   'tune.ok.cyclic': ['Its bus can exchange process data.', '总线可交换过程数据。'],
   'tune.no.cyclic': [
     'Its bus cannot exchange process data in every cycle, so nothing can be measured.',
-    '总线无法周期交换过程数据，因此无法测量。',
+    '总线无法周期通信过程数据，因此无法测量。',
   ],
   'tune.ok.exchange': ['The cyclic exchange runs.', '周期通信正在运行。'],
   'tune.no.exchange': [
@@ -574,11 +574,11 @@ export const tuning = {
   ],
   'autotune.verification': ['Verification', '验证'],
   'autotune.predicted': ['predicted', '预测'],
-  'autotune.predictedBefore': ['predicted without the loop', '未考虑回路的预测'],
-  'autotune.predictedAgain': ['predicted from the loop', '根据回路测量的预测'],
+  'autotune.predictedBefore': ['predicted without the loop', '未考虑环路的预测'],
+  'autotune.predictedAgain': ['predicted from the loop', '根据环路测量的预测'],
   'autotune.bandwidthsBefore': [
     'Before that: {predicted} predicted, {measured} measured. The design was then based on the axis as identified from the loop.',
-    '此前：预测 {predicted}，测得 {measured}。随后以回路中测得的特性作为该轴的依据。',
+    '此前：预测 {predicted}，测得 {measured}。随后以环路中测得的特性作为该轴的依据。',
   ],
   'verdict.band': ['Margins by band', '各频段裕度'],
   'verdict.measured': ['measured', '测得'],
@@ -590,11 +590,11 @@ export const tuning = {
   ],
   'verdict.coverage.gain_steps': [
     'The loop may cross 0 dB up to {last}, above the measured band: it was stable with {gain} more gain, which limits the uncertainty there.',
-    '回路最高可能在 {last} 穿越 0 dB，高于所测频段：增益提高 {gain} 时仍稳定，由此限定该处的裕度。',
+    '环路最高可能在 {last} 穿越 0 dB，高于所测频段：增益提高 {gain} 时仍稳定，由此限定该处的裕度。',
   ],
   'verdict.coverage.predicted': [
     'The loop may cross 0 dB up to {last}, above the measured band: the margins there are only predicted.',
-    '回路最高可能在 {last} 穿越 0 dB，高于所测频段：该处的裕度仅为预测。',
+    '环路最高可能在 {last} 穿越 0 dB，高于所测频段：该处的裕度仅为预测。',
   ],
   'autotune.bandwidths': [
     'Bandwidth: {predicted} predicted, {measured} measured.',
