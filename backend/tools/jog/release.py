@@ -11,6 +11,7 @@ from drivers.texts.message import Text, text
 Release = Literal[
     "released", "pointer-cancelled", "focus-lost", "page-hidden", "page-left", "page-silent",
     "escape", "another-key", "another-jog", "another-guest", "axis-changed", "connection-lost",
+    "stop",
 ]  # fmt: skip
 _KNOWN: frozenset[object] = frozenset(get_args(Release))
 
@@ -36,6 +37,7 @@ END_OF_JOG: dict[Release, Text] = {
     "another-guest": text("jog.end-another-guest"),
     "axis-changed": text("jog.end-axis-changed"),
     "connection-lost": text("jog.end-connection-lost"),
+    "stop": text("motion.stop-was-pressed"),
 }
 #: The same of the enabling button, which the person on site holds for a guest.
 END_OF_ENABLING: dict[Release, Text] = {

@@ -5773,7 +5773,7 @@ export interface components {
              * @default released
              * @enum {string}
              */
-            reason: "released" | "pointer-cancelled" | "focus-lost" | "page-hidden" | "page-left" | "page-silent" | "escape" | "another-key" | "another-jog" | "another-guest" | "axis-changed" | "connection-lost";
+            reason: "released" | "pointer-cancelled" | "focus-lost" | "page-hidden" | "page-left" | "page-silent" | "escape" | "another-key" | "another-jog" | "another-guest" | "axis-changed" | "connection-lost" | "stop";
             /**
              * Type
              * @default enable_release
@@ -8568,7 +8568,7 @@ export interface components {
              * @default released
              * @enum {string}
              */
-            reason: "released" | "pointer-cancelled" | "focus-lost" | "page-hidden" | "page-left" | "page-silent" | "escape" | "another-key" | "another-jog" | "another-guest" | "axis-changed" | "connection-lost";
+            reason: "released" | "pointer-cancelled" | "focus-lost" | "page-hidden" | "page-left" | "page-silent" | "escape" | "another-key" | "another-jog" | "another-guest" | "axis-changed" | "connection-lost" | "stop";
             /**
              * Type
              * @default jog_stop

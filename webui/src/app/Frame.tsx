@@ -346,8 +346,7 @@ function Refused() {
   return (
     <div className="note fault" role="alert">
       <p>
-        <strong>{problemTitle(t, refused.problem)}</strong>{' '}
-        {say.detail(refused.problem)}
+        <strong>{problemTitle(t, refused.problem)}</strong> {say.detail(refused.problem)}
       </p>
       {refused.problem.remedy && (
         <p>

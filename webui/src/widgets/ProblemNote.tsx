@@ -23,9 +23,7 @@ export function ProblemNote({
     <div className="note fault" role="alert">
       {about && <p className="dim">{about}</p>}
       <p>
-        <strong>
-          {unreachable ? t('problem.unreachable') : problemTitle(t, problem)}
-        </strong>{' '}
+        <strong>{unreachable ? t('problem.unreachable') : problemTitle(t, problem)}</strong>{' '}
         {forgotten ? t('problem.forgotten') : say.detail(problem)}
       </p>
       {problem.limit && (

@@ -35,7 +35,7 @@ export function ForcingPanel({
   const act = useAction()
   const job = useJob(mine?.job ?? forcing.job ?? null)
   const path = { drive_id: drive, name: forcing.name }
-  const plain = plainResult(job?.result)
+  const plain = plainResult(job?.result) as { reason?: string; reason_message?: MessageInfo | null }
   const over = mine !== null && job !== null && job.state !== 'running'
   useEffect(() => {
     if (!mine || over) return
@@ -99,7 +99,7 @@ export function ForcingPanel({
       {over && job?.problem && <ProblemNote problem={job.problem} onClose={() => setMine(null)} />}
       {over && !job?.problem && (
         <p className="note info" role="status">
-          {speak.message(plain.reason_message as MessageInfo | null, String(plain.reason ?? ''))}
+          {speak.message(plain.reason_message, plain.reason)}
         </p>
       )}
       {!holding && forcing.running && !mine ? (
