@@ -50,7 +50,7 @@ from backend.audit.asked import Asked, asked
 from backend.people.identity import Actor, Identity, acting, arrived_s
 from backend.people.station import People
 from backend.station.bench import Bench
-from backend.tools.jog.release import END_OF_JOG
+from backend.tools.jog.release import end_of_jog
 from drivers.errors import DriveError
 from drivers.texts.message import Text, text
 
@@ -223,7 +223,7 @@ class Connection:
             case JogRenew():
                 self.jogs.renew(request)
             case JogStop():
-                self.jogs.release(request.drive, END_OF_JOG[request.reason], request.press)
+                self.jogs.release(request.drive, end_of_jog(request.reason), request.press)
             case JogStart():
                 self.jogs.start(request, self.identity.person)
             case WatchState():

@@ -36,7 +36,7 @@ from backend.people.identity import Identity
 from backend.people.station import People
 from backend.people.throttle import Bucket
 from backend.station.bench import Bench
-from backend.tools.jog.release import END_OF_ENABLING
+from backend.tools.jog.release import END_OF_ENABLING, end_of_enabling
 from drivers.texts.message import prose, text
 
 #: Lines of a page's chat at once, and a second: nobody talks the log full.
@@ -103,7 +103,7 @@ class PeopleLive:
             case EnableRenew():
                 self._support.renew(request.invitation, page.id)
             case EnableRelease():
-                why = END_OF_ENABLING[request.reason]
+                why = end_of_enabling(request.reason)
                 self._support.release(request.invitation, page.id, why)
             case Chat():
                 self._say(page, identity, request.text)

@@ -46,3 +46,13 @@ END_OF_ENABLING: dict[Release, Text] = {
     "connection-lost": text("people.end-site-connection"),
     "page-silent": text("people.end-site-silent"),
 }
+
+
+def end_of_jog(release: Release) -> Text:
+    """Why a jog ended whose button was released like this."""
+    return END_OF_JOG[release]
+
+
+def end_of_enabling(release: Release) -> Text:
+    """Why a guest may move nothing any more, as the enabling button was released like this."""
+    return END_OF_ENABLING[release]

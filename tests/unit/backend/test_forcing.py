@@ -16,6 +16,7 @@ from backend.functions.forcing import ForcingSessions
 from backend.people.lease import Leases
 from backend.work.jobs import JobRunner
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, OutOfRange, Rejected
+from drivers.texts.answers import sentence
 from drivers.texts.message import text
 from profiles.functions import Forcing, Functions, Probe, TerminalBits, TerminalFacts, TouchProbe
 from profiles.schema import IoFunction, IoTerminal, Parameter, Profile, Quirk
@@ -162,7 +163,7 @@ async def test_everything_is_put_back_at_the_end(
     assert outputs(io_link) == (0x1, 0)
     assert sessions.get("x", "outputs") is None
     assert session.job is not None
-    assert session.job.result == {"reason": "ended"}
+    assert session.job.result == sentence("reason", text("functions.end-by-page"))
 
 
 @pytest.mark.parametrize(
