@@ -202,11 +202,23 @@ class Regeneration(Frozen):
     notes: str = ""
 
 
+IdentificationState = Literal[
+    "idle", "preparation", "resistance", "ready_for_inductance", "inductance_d", "inductance_q",
+    "sensor_bias", "torque_constant", "torque_constant_limited", "inertia", "inertia_again",
+    "inertia_limited", "complete", "homing", "acceleration_design", "error_handling", "error",
+    "waiting", "jog_homing",
+]  # fmt: skip
+"""What a drive does while it identifies; ``limited`` is within a range of travel."""
+
+
 class DriveIdentification(Frozen):
     """Identification that a bit of the control word starts, while an object counts its states."""
 
     control_bit: int = Field(ge=0, le=15)
     status_key: str
+    states: dict[int, IdentificationState] = Field(
+        default_factory=dict, description="what each value of the status means"
+    )
     done: tuple[int, ...]
     failed: tuple[int, ...] = ()
     keys: tuple[str, ...] = Field(description="results, and parameters that the drive changes")

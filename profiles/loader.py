@@ -13,6 +13,7 @@ import os
 import pickle
 import sys
 import tempfile
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -37,7 +38,19 @@ CLASS_FIELDS = frozenset({"motion", "safe_in_motion", "motion_origin", "motion_r
 
 
 class ProfileError(Exception):
-    """A profile file is wrong; the message names the file or drive, the place and the remedy."""
+    """A profile file is wrong: a code of the catalogue, and facts that name file and place.
+
+    Words are made where it is shown (`drivers.texts.profile_errors`).
+    """
+
+    def __init__(self, code: str, /, **params: str | int) -> None:
+        super().__init__(code, params)
+        self.code = code
+        self.params: Mapping[str, str | int] = params
+
+    def __str__(self) -> str:
+        facts = ", ".join(f"{name}={fact}" for name, fact in self.params.items())
+        return f"{self.code} ({facts})"
 
 
 def user_folder() -> Path:
@@ -59,7 +72,7 @@ def load_profile(drive: str) -> Profile:
         ProfileError: unknown drive, broken YAML, or a record that the schema refuses.
     """
     if drive not in drive_names():
-        raise ProfileError(f"no profile named {drive!r}; there are: {', '.join(drive_names())}")
+        raise ProfileError("profile.unknown", name=drive, known=", ".join(drive_names()))
     own = is_own(drive)
     files = sorted(((user_folder() if own else _HERE) / drive).glob("*.yaml"))
     return _load(drive, tuple(_Version(p, p.stat().st_mtime_ns if own else 0) for p in files))
@@ -94,17 +107,24 @@ def load_all() -> dict[str, Profile]:
     return {name: load_profile(name) for name in drive_names() if name not in broken}
 
 
-def broken_profiles() -> dict[str, str]:
+def broken_profiles() -> dict[str, ProfileError]:
     """The user's own profiles that cannot be used, and why.
 
     One slip in an edited file must not keep every other drive from being found.
     """
-    found: dict[str, str] = {}
+    found: dict[str, ProfileError] = {}
     for name in filter(is_own, drive_names()):
         try:
             load_profile(name)
-        except (ProfileError, OSError, UnicodeDecodeError) as error:
-            found[name] = str(error)
+        except ProfileError as error:
+            found[name] = error
+        except OSError as error:
+            detail = error.strerror or str(error)
+            found[name] = ProfileError(
+                "profile.not-readable", file=str(error.filename or name), detail=detail
+            )
+        except UnicodeDecodeError as error:
+            found[name] = ProfileError("profile.not-utf8", name=name, detail=error.reason)
     return found
 
 
@@ -119,14 +139,14 @@ def parse_profile(texts: dict[str, str]) -> Profile:
         try:
             data = yaml.load(text, Loader=_SafeLoader)  # noqa: S506 - both loaders are safe
         except yaml.YAMLError as error:
-            raise ProfileError(f"{name}: {error}") from error
+            raise ProfileError("profile.no-yaml", file=name, detail=str(error)) from error
         if not isinstance(data, dict):
-            raise ProfileError(f"{name}: the file must hold a mapping of profile fields")
+            raise ProfileError("profile.no-mapping", file=name)
         for field, value in data.items():
             if isinstance(value, list) and isinstance(merged.get(field), list):
                 merged[field] = merged[field] + value
             elif field in merged:
-                raise ProfileError(f"{name}: {field!r} is already given by another file")
+                raise ProfileError("profile.field-twice", file=name, field=str(field))
             else:
                 merged[field] = value
     _refuse_own_classes(merged)
@@ -134,7 +154,12 @@ def parse_profile(texts: dict[str, str]) -> Profile:
     try:
         return classified(with_standard_help(Profile.model_validate(merged)))
     except ValidationError as error:
-        raise ProfileError(_explain(merged, error)) from error
+        raise ProfileError(
+            "profile.refused",
+            name=str(merged.get("drive", "?")),
+            errors=error.error_count(),
+            detail=_explain(merged, error),
+        ) from error
 
 
 #: Kinds of quirks of version 0.2.0 that no code acted upon: notes since.
@@ -170,14 +195,16 @@ def _refuse_own_classes(merged: dict[str, Any]) -> None:
     for row in rows if isinstance(rows, list) else ():
         if isinstance(row, dict) and (given := CLASS_FIELDS & row.keys()):
             raise ProfileError(
-                f"profile {merged.get('drive', '?')}: {row.get('key', '?')} gives "
-                f"{', '.join(sorted(given))} in its row; write a rule in motion_rules, with its "
-                "reason"
+                "profile.class-in-row",
+                name=str(merged.get("drive", "?")),
+                key=str(row.get("key", "?")),
+                given=", ".join(sorted(given)),
             )
 
 
 def _explain(merged: dict[str, Any], error: ValidationError) -> str:
-    lines = [f"profile {merged.get('drive', '?')}: {error.error_count()} errors"]
+    """Of each error its place in the file, and what the schema's library says to it."""
+    lines: list[str] = []
     for item in error.errors()[:20]:
         record: Any = merged
         for step in item["loc"][:2]:
@@ -186,8 +213,8 @@ def _explain(merged: dict[str, Any], error: ValidationError) -> str:
             except (KeyError, IndexError, TypeError):
                 break
         label = record.get("key") or record.get("code") or "" if isinstance(record, dict) else ""
-        lines.append(f"  {'.'.join(map(str, item['loc']))} ({label}): {item['msg']}")
-    return "\n".join(lines)
+        lines.append(f"{'.'.join(map(str, item['loc']))} ({label}): {item['msg']}")
+    return "; ".join(lines)
 
 
 def _cache_path(drive: str, files: list[Path]) -> Path:

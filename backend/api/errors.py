@@ -24,6 +24,7 @@ from drivers.errors import (
     OutOfRange,
     ProtocolError,
     Rejected,
+    internal_error,
 )
 from drivers.texts.message import Param, Text, as_text, language, text
 
@@ -44,19 +45,29 @@ STATUS: dict[type[DriveError], int] = {
     LinkTimeout: 504,
 }
 
-_TITLES = {
+#: By the kind of error, in English and the same for every occurrence (RFC 9457, section 3.1.3). The
+#: page has its own words for each (`problemTitle` in `webui/src/i18n/texts/drive.ts`).
+TITLES = {
+    "drive-error": "Drive error",
     "link-timeout": "No answer in time",
     "link-lost": "The link is gone",
     "protocol-error": "The answer makes no sense",
     "rejected": "The drive refused",
     "out-of-range": "Value out of range",
     "not-allowed": "Not possible now",
+    "not-in-use": "Not in use",
     "busy": "In use",
     "bad-description": "Not a usable description",
     "bad-parameter-set": "Not a usable parameter set",
     "bad-recording": "Not a usable recording",
+    "bad-measurement": "Not a usable measurement",
     "bad-snapshot": "Not a usable snapshot",
     "storage-failed": "Could not be stored",
+    "backup-failed": "Not backed up",
+    "state-refused": "State folder refused",
+    "accounts-gone": "Accounts are missing",
+    "scale-unknown": "Scale unknown",
+    "scale-changed": "Scale changed",
     "restore-failed": "Not everything was restored",
     "not-found": "Not found",
     "not-logged-in": "Not logged in",
@@ -64,6 +75,10 @@ _TITLES = {
     "forbidden": "Forbidden",
     "too-often": "Too often",
     "wrong-method": "Wrong method",
+    "internal": "Internal error",
+    "bad-request": "Bad request",
+    "body": "Body refused",
+    "http": "Request failed",
 }
 
 
@@ -90,18 +105,22 @@ def problem_of(error: Exception) -> Problem:
     """
     spoken = language()
     if not isinstance(error, DriveError):
+        defect, report = internal_error(error), text("error.defect")
         return Problem(
             type="urn:servodeck:internal",
-            title="Internal error",
+            title=TITLES["internal"],
             status=500,
-            detail=f"{type(error).__name__}: {error}",
-            remedy=text("error.defect").words(spoken),
+            detail=defect.words(spoken),
+            remedy=report.words(spoken),
+            code=defect.code,
+            params=message_of(defect).params,
+            advice=message_of(report),
         )
     status = _status(error)
     value, advice = _scalar(error.value), error.advice_text
     return Problem(
         type=f"urn:servodeck:{error.kind}",
-        title=_TITLES.get(error.kind, "Drive error"),
+        title=TITLES.get(error.kind, TITLES["drive-error"]),
         status=status,
         detail=error.text.words(spoken),
         drive=error.drive,
@@ -172,15 +191,17 @@ def install(app: FastAPI) -> None:
     async def bad_request(_request: Request, error: RequestValidationError) -> JSONResponse:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
+        advice = text("api.see-interface")
         return answer(
             Problem(
                 type="urn:servodeck:bad-request",
-                title="Bad request",
+                title=TITLES["bad-request"],
                 status=422,
                 detail=f"{place}: {first['msg']}",
                 parameter=place,
                 value=_scalar(jsonable_encoder(first.get("input"), custom_encoder={bytes: repr})),
-                remedy="see /api/v1/openapi.json for what this address takes",
+                remedy=advice.words(language()),
+                advice=message_of(advice),
             )
         )
 
@@ -189,7 +210,7 @@ def install(app: FastAPI) -> None:
         return answer(
             Problem(
                 type="urn:servodeck:http",
-                title="Request failed",
+                title=TITLES["http"],
                 status=error.status_code,
                 detail=str(error.detail),
             )
@@ -200,7 +221,7 @@ def install(app: FastAPI) -> None:
         # No defect: a page was closed while it sent a file. Nobody reads this answer.
         log.info("%s %s: the client went within its request", request.method, request.url.path)
         return answer(
-            Problem(type="urn:servodeck:http", title="Request failed", status=400, detail="")
+            Problem(type="urn:servodeck:http", title=TITLES["http"], status=400, detail="")
         )
 
     @app.exception_handler(Exception)

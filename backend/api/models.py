@@ -30,7 +30,7 @@ class Problem(BaseModel):
     """RFC 9457 problem details, with what a person needs to act."""
 
     type: str = Field(examples=["urn:servodeck:out-of-range"])
-    title: str
+    title: str = Field(description="of the type, in English, the same for every occurrence")
     status: int
     detail: str
     drive: str | None = None

@@ -39,9 +39,9 @@ class Fact:
     """One event. ``person`` is filled in from who is acting where it is None.
 
     ``target`` is what it was done to (a parameter's key, a file's name, a person), ``old`` and
-    ``new`` are raw values, ``outcome`` is what went wrong, None for success, and ``title`` what a
-    job was called. An entry keeps messages as code and facts, and in English for whoever searches
-    or reads it without a catalogue.
+    ``new`` are raw values, ``outcome`` is what went wrong, None for success, ``title`` what a job
+    was called and ``reason`` why a motion by hand ended. An entry keeps messages as code and facts,
+    and in English for whoever searches or reads it without a catalogue.
     """
 
     kind: Kind
@@ -53,12 +53,14 @@ class Fact:
     outcome: Text | None = None
     person: str | None = None
     title: Text | None = None
+    reason: Text | None = None
     detail: Mapping[str, Value] = field(default_factory=dict)
 
 
 def body_of(fact: Fact, *, moment: datetime, station: str, person: str) -> str:
     """Canonical JSON: sorted keys, no spaces, UTF-8, numbers as Python writes them."""
-    detail = dict(fact.detail) if fact.title is None else {**fact.detail, "title": str(fact.title)}
+    shown = {"title": fact.title, "reason": fact.reason}
+    detail = dict(fact.detail) | {n: str(each) for n, each in shown.items() if each is not None}
     content: dict[str, object] = {
         "time": stamp(moment),
         "station": station,
@@ -72,7 +74,7 @@ def body_of(fact: Fact, *, moment: datetime, station: str, person: str) -> str:
         "outcome": "" if fact.outcome is None else _plain(str(fact.outcome)),
         "detail": {str(key): _plain(value) for key, value in detail.items()},
     }
-    messages = {"outcome": fact.outcome, "title": fact.title}
+    messages = {"outcome": fact.outcome, **shown}
     known = {name: each for name, each in messages.items() if each is not None and each.code}
     if known:
         content["messages"] = {name: _wire(each.to_wire()) for name, each in known.items()}

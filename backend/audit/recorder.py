@@ -12,6 +12,7 @@ from backend.drive.readings import CommandRecord, Refusal, WriteRecord
 from backend.people.lease import Holder
 from backend.work.jobs import Job
 from drivers.errors import why_of
+from drivers.texts.answers import message_in
 from drivers.texts.message import Text, text
 
 #: Jobs that only read what the pages show anyway.
@@ -130,6 +131,7 @@ class AuditRecorder:
         if job.kind in _UNREMARKABLE:
             return
         detail: dict[str, Value] = {}
+        reason: Text | None = None
         if job.drive is not None:
             detail["drive"] = job.drive
         if job.partner is not None:
@@ -143,9 +145,7 @@ class AuditRecorder:
             return
         else:
             detail |= {key: str(sent) for key, sent in sorted(ended.sent.items())}
-            reason = (job.result or {}).get("reason")
-            if isinstance(reason, str):
-                detail["reason"] = reason
+            reason = message_in(job.result or {}, "reason")
             self._forget_commands(job.moved or (job.drive,))
         self._audit.add(
             Fact(
@@ -156,6 +156,7 @@ class AuditRecorder:
                 outcome=_outcome(job),
                 detail=detail,
                 title=job.title_text,
+                reason=reason,
             )
         )
 

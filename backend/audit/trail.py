@@ -83,15 +83,15 @@ class Event:
     new: Value
     outcome: Text | None
     title: Text | None
+    reason: Text | None
     detail: dict[str, Value]
 
     def detail_in(self, language: Language) -> dict[str, Value]:
-        """Its details, the title of a job in this language."""
-        return (
-            self.detail
-            if self.title is None
-            else self.detail | {"title": self.title.words(language)}
-        )
+        """Its details; the title of a job, and why a motion by hand ended, in this language."""
+        messages = {"title": self.title, "reason": self.reason}
+        return self.detail | {
+            name: each.words(language) for name, each in messages.items() if each is not None
+        }
 
 
 class Trail:
@@ -192,6 +192,7 @@ def _event(entry: AuditEntry) -> Event:
         new=content["new"],
         outcome=_message(content, "outcome", content["outcome"]),
         title=_message(content, "title", detail.get("title", "")),
+        reason=_message(content, "reason", detail.get("reason", "")),
         detail=detail,
     )
 

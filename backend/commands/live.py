@@ -29,6 +29,7 @@ from backend.commands.remote import authorisation, remote
 from backend.commands.samples import Samples, decode
 from backend.commands.session import run
 from drivers.errors import DriveError, LinkLost, NotAllowed
+from drivers.texts.message import Text, language, prose
 
 _RENEW_S, _END_S, _OPEN_S = 0.04, 20.0, 10.0
 _LONGEST_JOG_S, _MERGE_S = 60.0, 2.0
@@ -76,7 +77,7 @@ def jog(
                 ended = await _hold(page, request, seconds)
         if ended.problem is not None:
             raise NotAllowed(ended.problem.detail, remedy=ended.problem.remedy)
-        print_text("printed.jog-ended", reason=str(ended.reason))
+        print_text("printed.jog-ended", reason=_why(ended))
 
     run(work)
 
@@ -107,6 +108,13 @@ def scope(
     run(work)
 
 
+def _why(ended: JogEnded) -> Text:
+    """Why a jog ended, in whatever language this command answers."""
+    if (message := ended.reason_message) is None:
+        return prose(ended.reason)
+    return Text.from_wire(message.model_dump())
+
+
 def _needed(url: str, server: str | None) -> str:
     at = server_for(url, server)
     if at is None:
@@ -118,9 +126,10 @@ def _needed(url: str, server: str | None) -> str:
 async def _page(server: str) -> AsyncIterator[ClientConnection]:
     """The live connection of a page, greeted."""
     address = server.rstrip("/").replace("http", "ws", 1) + "/api/v1/live"
+    headers = {**authorisation(), "Accept-Language": language()}
     try:
         async with connect(
-            address, additional_headers=authorisation(), open_timeout=_OPEN_S, max_size=None
+            address, additional_headers=headers, open_timeout=_OPEN_S, max_size=None
         ) as page:
             await _next(page, Hello)
             yield page

@@ -25,6 +25,7 @@ from drivers.texts.checks import check_line
 from drivers.texts.imports import failure_text, finding_line, summary_text
 from drivers.texts.message import language, reason_of, text
 from drivers.texts.motion_classes import refusal_text
+from drivers.texts.profile_errors import profile_error_text
 from profiles import drive_names, load_profile
 from profiles.check import check as check_profile
 from profiles.check import coverage, motion_counts, unclassified
@@ -277,7 +278,7 @@ def check(drive: Annotated[str | None, typer.Argument()] = None) -> None:
             profile = load_profile(name)
             overlays = {language: load_overlay(name, language) for language in LANGUAGES}
         except ProfileError as error:
-            print(error)
+            print(profile_error_text(error).words(language()))
             failed = True
             continue
         findings = check_profile(profile)

@@ -190,4 +190,6 @@ def _problem(answer: httpx.Response) -> DriveError:
         reported = Problem.model_validate_json(answer.content)
     except ValidationError:
         return DriveError("command.server-says", status_code=answer.status_code)
-    return DriveError(reported.detail or reported.title, remedy=reported.remedy)
+    if not reported.detail:
+        return DriveError("command.server-says", status_code=answer.status_code)
+    return DriveError(reported.detail, remedy=reported.remedy)

@@ -12,7 +12,7 @@ from typing import ParamSpec, TypeVar
 
 import typer
 
-from backend.commands.printing import note, words_of
+from backend.commands.printing import note
 from backend.commands.restoring import recall
 from backend.drive.drive import Drive
 from backend.drive.ports import Port
@@ -23,6 +23,7 @@ from drivers.computer import signals
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import Found, Link
 from drivers.texts.message import Text, language
+from drivers.texts.profile_errors import profile_error_text
 from drivers.urls import link_for
 from profiles.loader import ProfileError
 
@@ -40,7 +41,10 @@ def reported(code: int = 1) -> Iterator[None]:
         remedy = None if advice is None else advice.words(spoken)
         raise _reported(error.text.words(spoken), remedy, code) from error
     except ProfileError as error:
-        raise _reported(str(error), words_of("printed.see-profile-check"), code) from error
+        spoken, why = language(), profile_error_text(error)
+        advice = why.remedy()
+        remedy = None if advice is None else advice.words(spoken)
+        raise _reported(why.words(spoken), remedy, code) from error
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
         raise _reported(f"{place}{error.strerror or error}", None, code) from error

@@ -23,6 +23,7 @@ from backend.work.jobs import Job, JobResult, JobRunner, Progress
 from drivers.cia402 import State
 from drivers.errors import NotAllowed, OutOfRange, Rejected
 from drivers.texts import limits
+from drivers.texts.answers import sentence
 from drivers.texts.message import Text, text
 from profiles.functions import Forcing, TerminalBits
 
@@ -31,6 +32,7 @@ SILENT_S = 5.0
 _LOOK_S = 0.05
 #: Pause after "write settings"; the procedure of the one family that has it waits as long.
 _APPLY_S = 0.1
+_ENDED = text("functions.end-by-page")
 
 
 @dataclass(slots=True, eq=False)
@@ -43,7 +45,7 @@ class ForcingSession:
     job: Job | None = None
     values: dict[str, bool] = field(default_factory=dict)
     renewed: float = field(default_factory=time.monotonic)
-    reason: str = ""
+    reason: Text | None = None
     before: dict[str, int] = field(default_factory=dict)
     over: bool = False
     grant: Grant | None = None
@@ -83,7 +85,7 @@ class ForcingSession:
     def _require_open(self) -> None:
         """What came too late must not be written after all has been restored."""
         if self.over:
-            why = self.reason or "cancelled"
+            why = self.reason or text("functions.end-cancelled")
             raise NotAllowed(
                 "functions.ended", drive=self.axis.drive.name, spec_title=self.spec.title, why=why
             )
@@ -259,7 +261,7 @@ class ForcingSessions:
             raise session.job.error
         return session
 
-    async def end(self, drive: str, name: str, reason: str = "ended") -> None:
+    async def end(self, drive: str, name: str, reason: Text = _ENDED) -> None:
         """Release everything; returns when it is restored.
 
         Raises:
@@ -305,7 +307,7 @@ class ForcingSessions:
         finally:
             # The real terminals must count again even if somebody enabled the axis meanwhile.
             await shielded(lambda: self._act(session), CLEANUP_TIMEOUT_S, axis.drive.name)
-        return {"reason": session.reason}
+        return sentence("reason", session.reason)
 
     async def _act(self, session: ForcingSession) -> None:
         """Make what was restored act; where that fails it is pending like the values themselves."""
@@ -319,23 +321,23 @@ class ForcingSessions:
     async def _watch(self, session: ForcingSession, progress: Progress) -> None:
         """Until there is a reason to end."""
         stopped = session.axis.stopped
-        while not session.reason:
+        while session.reason is None:
             progress(0.0, _words(session))
             await asyncio.sleep(_LOOK_S)
             session.reason = session.reason or self._why_end(session, stopped)
             stopped = session.axis.stopped
 
-    def _why_end(self, session: ForcingSession, was_stopped: bool) -> str:
+    def _why_end(self, session: ForcingSession, was_stopped: bool) -> Text | None:
         if session.axis.stopped and not was_stopped:
-            return "STOP was pressed"
+            return text("motion.stop-was-pressed")
         if time.monotonic() - session.renewed > SILENT_S:
-            return "the page fell silent"
+            return text("work.page-not-reachable", silent_s=SILENT_S)
         person = self._taken_by(session.axis.drive.id, session.connection)
-        return "" if person is None else f"{person} took control"
+        return None if person is None else text("work.control-taken", person=person)
 
 
 def _end_for(session: ForcingSession, why: Text) -> None:
-    session.reason = session.reason or why.words()
+    session.reason = session.reason or why
 
 
 def _words(session: ForcingSession) -> Text:

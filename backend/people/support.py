@@ -22,7 +22,7 @@ from backend.people.rights import GRANTABLE, MOVING, RIGHTS, Right, Role
 from backend.people.throttle import Throttle
 from drivers.errors import NotAllowed
 from drivers.texts import limits
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 
 #: The enabling button counts as released this long after the last sign of life. With the 20 ms
 #: between looks (`backend.api.live.watch`) a silent page stops the motion within 200 ms.
@@ -69,7 +69,7 @@ class Invitation:
     """Hash of the guest's cookie, once joined."""
     grant: Grant | None = None
     tries: int = 0
-    why_ended: str = ""
+    why_ended: Text | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +98,7 @@ class Support:
         self.on_change: list[Callable[[], None]] = []
         #: Called with a guest's session when it is over, and when their grant or hold is.
         self.on_ended: list[Callable[[str], None]] = []
-        self.on_disabled: list[Callable[[Invitation, str], None]] = []
+        self.on_disabled: list[Callable[[Invitation, Text], None]] = []
 
     # --- invitations ------------------------------------------------------------------
 
@@ -175,14 +175,14 @@ class Support:
             self._throttle.failed(address)
             found.tries += 1
             if found.tries >= CODE_TRIES:
-                self._end(found, "too many wrong codes")
+                self._end(found, text("people.end-too-many-codes"))
             raise NotLoggedIn("people.code-wrong-ask-person")
         secret = new_secret()
         found.state, found.session = "joined", digest(secret)
         self._changed()
         return secret, found
 
-    def revoke(self, invitation_id: str, why: str) -> Invitation:
+    def revoke(self, invitation_id: str, why: Text) -> Invitation:
         """End an invitation; its guest is out at once."""
         found = self.find(invitation_id)
         self._end(found, why)
@@ -265,7 +265,7 @@ class Support:
             before.rights & MOVING - rights or drive not in (None, before.drive)
         ):
             # What moves now may be what the new grant does not contain.
-            why = "the grant was replaced by another"
+            why = text("people.end-grant-replaced")
             if found.id in self._holds:
                 self._drop_hold(found.id, why)
             else:
@@ -273,7 +273,7 @@ class Support:
         self._changed()
         return found
 
-    def withdraw(self, invitation_id: str, why: str) -> Invitation:
+    def withdraw(self, invitation_id: str, why: Text) -> Invitation:
         """End a grant; what the guest moves is stopped."""
         found = self.find(invitation_id)
         if found.grant is not None:
@@ -308,13 +308,13 @@ class Support:
         if hold is not None and hold[0] == connection and self.enabled(invitation_id):
             self._holds[invitation_id] = (connection, self._ticks())
 
-    def release(self, invitation_id: str, connection: str, why: str) -> None:
+    def release(self, invitation_id: str, connection: str, why: Text) -> None:
         """The button was let go, or what amounts to it."""
         hold = self._holds.get(invitation_id)
         if hold is not None and hold[0] == connection:
             self._drop_hold(invitation_id, why)
 
-    def release_all(self, connection: str, why: str) -> None:
+    def release_all(self, connection: str, why: Text) -> None:
         """The on-site page is gone."""
         for invitation_id, (holder, _) in list(self._holds.items()):
             if holder == connection:
@@ -334,9 +334,9 @@ class Support:
         """Every 20 ms while a button is held: notice that its page has fallen silent."""
         for invitation_id in list(self._holds):
             if not self.enabled(invitation_id):
-                self._drop_hold(invitation_id, "no sign of life from the page on site")
+                self._drop_hold(invitation_id, text("people.end-site-silent"))
 
-    def _drop_hold(self, invitation_id: str, why: str) -> None:
+    def _drop_hold(self, invitation_id: str, why: Text) -> None:
         if self._holds.pop(invitation_id, None) is not None:
             self._disable(self._invitations[invitation_id], why)
             self._changed()
@@ -368,11 +368,11 @@ class Support:
         now = self._ticks()
         for found in list(self._invitations.values()):
             if found.state != "ended" and now >= found.expires:
-                self._end(found, "expired")
+                self._end(found, text("people.end-expired"))
             elif found.grant is not None and now >= found.grant.until:
-                self.withdraw(found.id, "the grant is over")
+                self.withdraw(found.id, text("people.end-grant-expired"))
 
-    def _end(self, found: Invitation, why: str) -> None:
+    def _end(self, found: Invitation, why: Text) -> None:
         if found.state == "ended":
             return
         session, found.state, found.why_ended, found.grant = found.session, "ended", why, None
@@ -383,7 +383,7 @@ class Support:
                 listener(session)
         self._changed()
 
-    def _disable(self, found: Invitation, why: str) -> None:
+    def _disable(self, found: Invitation, why: Text) -> None:
         for listener in self.on_disabled:
             listener(found, why)
 

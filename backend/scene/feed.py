@@ -21,14 +21,14 @@ from drivers.errors import DriveError
 from drivers.link import ScopeBlock
 
 if TYPE_CHECKING:
-    from backend.scene.view import AxisLook, SceneView
+    from backend.scene.view import AxisLook, Look, SceneView
 
 #: Pictures a second; viser takes about 2 % of a core for them and 1 % for each page.
 PERIOD_S = 1 / 30
 #: Polled drives: as often as the pictures change.
 POLL_S = 1 / 30
-#: How often words and limits are looked at again.
-_WORDS_S = 0.25
+#: How often labels and limits are looked at again.
+_LABELS_S = 0.25
 _LIMITS_S = 2.0
 
 
@@ -116,16 +116,16 @@ class SceneFeed:
     async def _follow(self, view: SceneView, axes: dict[str, _Axis], arrangement: object) -> None:
         """Until the bench is another one, or limits changed."""
         loop = asyncio.get_running_loop()
-        words_at = limits_at = loop.time()
+        labels_at = limits_at = loop.time()
         while True:
             await asyncio.sleep(PERIOD_S)
             now = loop.time()
-            if now >= words_at:
-                words_at = now + _WORDS_S
+            if now >= labels_at:
+                labels_at = now + _LABELS_S
                 if self._arrangement() != arrangement:
                     return
                 for drive, axis in axes.items():
-                    view.tell(drive, *_words(axis))
+                    view.show(drive, *_shown(axis))
                 if _grow(axes):
                     await asyncio.to_thread(view.arrange, _looks(axes))
             if now >= limits_at:
@@ -210,20 +210,29 @@ def _grow(axes: dict[str, _Axis]) -> bool:
     return grown
 
 
-def _words(axis: _Axis) -> tuple[str, str]:
-    """State for the colour, and what is above the axis."""
+def look_of(state: State, *, fresh: bool) -> Look:
+    """What the scene shows of a state: a fault, whether the motor has torque (CiA 402-2, states of
+    the FSA and supported functions), or that neither is known."""
+    if not fresh:
+        return "unknown"
+    match state:
+        case State.OPERATION_ENABLED | State.QUICK_STOP_ACTIVE:
+            return "on"
+        case State.FAULT | State.FAULT_REACTION:
+            return "fault"
+        case State.UNKNOWN:
+            return "unknown"
+        case _:
+            return "off"
+
+
+def _shown(axis: _Axis) -> tuple[Look, str]:
+    """The look of an axis, and its place; empty where that is not known."""
     snapshot = axis.connected.monitor.snapshot
-    state = "other"
-    if snapshot.state is State.OPERATION_ENABLED:
-        state = "enabled"
-    elif snapshot.state in (State.FAULT, State.FAULT_REACTION):
-        state = "fault"
-    if not snapshot.fresh:
-        return "other", "no data"
-    if axis.position_rev is None:
-        return state, snapshot.state.value
-    place = axis.position_rev * axis.travel.per_rev
-    return state, f"{snapshot.state.value}, {place:.2f} {axis.travel.unit}"
+    look = look_of(snapshot.state, fresh=snapshot.fresh)
+    if not snapshot.fresh or axis.position_rev is None:
+        return look, ""
+    return look, f"{axis.position_rev * axis.travel.per_rev:.2f} {axis.travel.unit}"
 
 
 async def _software_limits(

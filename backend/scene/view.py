@@ -10,6 +10,7 @@ import logging
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Literal
 
 import viser
 
@@ -24,8 +25,16 @@ _MOTOR_X = -1.25
 _HEIGHT = 0.2
 _DARK, _STEEL, _MARK = (60, 64, 72), (150, 158, 168), (235, 120, 30)
 _ROD, _LIMIT, _HOME = (190, 196, 204), (200, 40, 40), (40, 120, 210)
-#: Colours that the page uses for the same states, never alone: the label says it too.
-STATE_COLOURS = {"enabled": (40, 150, 70), "fault": (200, 40, 40), "other": (120, 126, 136)}
+#: What an axis shows of its state, without words: viser gives all viewers one label, whatever their
+#: language. The page lists the axes with the same signs and the words of their states
+#: (webui/src/pages/scene/SceneStates.tsx). I and O are the marks of a switch (IEC 60417: 5007 and
+#: 5008).
+Look = Literal["on", "off", "fault", "unknown"]
+#: Colours that the page uses for the same states, never alone: the sign shows it too.
+COLOURS: dict[Look, tuple[int, int, int]] = {
+    "on": (40, 150, 70), "off": (120, 126, 136), "fault": (200, 40, 40), "unknown": (120, 126, 136),
+}  # fmt: skip
+SIGNS: dict[Look, str] = {"on": "I", "off": "O", "fault": "!", "unknown": "?"}
 _ALONG_X = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
 _ALONG_Y = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
 
@@ -107,12 +116,12 @@ class SceneView:
                     x = look.track.place(revolutions * look.travel.per_rev)
                     parts.sliding.position = (x, 0.0, 0.0)
 
-    def tell(self, drive: str, state: str, text: str) -> None:
-        """Colour of the motor and the words above it."""
+    def show(self, drive: str, look: Look, place: str) -> None:
+        """Colour of the motor; above it the axis's name, the sign of its state, and its place."""
         parts = self._axes.get(drive)
         if parts is not None:
-            parts.colour(STATE_COLOURS.get(state, STATE_COLOURS["other"]))
-            parts.label(f"{parts.look.name}: {text}")
+            parts.colour(COLOURS[look])
+            parts.label(" ".join(filter(None, (parts.look.name, f"[{SIGNS[look]}]", place))))
 
     def close(self) -> None:
         """End the server and its thread."""
@@ -128,7 +137,7 @@ class SceneView:
         kind = look.mechanics.kind if look.mechanics is not None else None
         motor = scene.add_box(
             f"{root_name}/motor",
-            color=STATE_COLOURS["other"],
+            color=COLOURS["unknown"],
             dimensions=(0.34, 0.26, 0.26),
             position=(_MOTOR_X, 0.0, _HEIGHT),
         )

@@ -40,6 +40,7 @@ from backend.work.journal import Journal, Level
 from drivers.errors import Busy, DriveError, NotAllowed, why_of
 from drivers.link import Found, Link
 from drivers.texts.message import Text, text
+from drivers.texts.profile_errors import profile_error_text
 from profiles.loader import ProfileError
 
 log = logging.getLogger(__name__)
@@ -392,7 +393,10 @@ class Bench:
                 for other in others:
                     await self.add_port(connected.drive.id, other.url, other.station)
             except (DriveError, ProfileError) as error:
-                line = text("journal.not-connected", drive=item.name, cause=why_of(error))
+                why = (
+                    profile_error_text(error) if isinstance(error, ProfileError) else why_of(error)
+                )
+                line = text("journal.not-connected", drive=item.name, cause=why)
                 self.journal.add(line, level="warning")
                 continue
             if item.serial is not None:

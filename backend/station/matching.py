@@ -8,7 +8,8 @@ from typing import Literal
 
 from drivers.errors import NotAllowed
 from drivers.link import Found
-from drivers.texts.message import Text, reason_of, text
+from drivers.texts.message import Text, text
+from drivers.texts.profile_errors import profile_error_text
 from profiles import load_all, load_profile
 from profiles.loader import ProfileError
 from profiles.schema import LinkSpec, Profile
@@ -65,7 +66,7 @@ def profile_for(kind: str, name: str) -> tuple[Profile, LinkSpec]:
         profile = load_profile(name)
     except ProfileError as error:
         raise NotAllowed(
-            reason_of(error), value=name, remedy="station.choose-listed-profile"
+            profile_error_text(error), value=name, remedy="station.choose-listed-profile"
         ) from error
     spec = profile.link(kind)
     if spec is None:

@@ -33,6 +33,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts import limits
+from drivers.texts.message import Text, joined
+from drivers.texts.profile_errors import profile_error_text
 from drivers.urls import parse_url
 from drivers.virtual.defects import (
     DEFECTS,
@@ -202,7 +204,7 @@ def _no_place(path: Path, name: str, defect: Defect, lacks: str) -> NotAllowed:
     )
 
 
-def _wrong(path: Path, why: str) -> NotAllowed:
+def _wrong(path: Path, why: Text | str) -> NotAllowed:
     return NotAllowed("virtual.bench-file", value=str(path), path=str(path), why=why)
 
 
@@ -236,12 +238,12 @@ def _check_ports(axis: AxisSpec, path: Path) -> None:
     try:
         profile = load_profile(axis.drive)
     except ProfileError as error:
-        raise _wrong(path, f"{axis.name}: {error}") from error
+        raise _wrong(path, joined((axis.name, profile_error_text(error)), ": ")) from error
     for url, station in axis.ports:
         try:
             bus = parse_url(url)
         except OutOfRange as error:
-            raise _wrong(path, f"{axis.name}: {error.message}") from error
+            raise _wrong(path, joined((axis.name, error.text), ": ")) from error
         kinds = ", ".join(link.kind for link in profile.links)
         if profile.link(bus.scheme) is None:
             raise NotAllowed(

@@ -137,7 +137,7 @@ def load_shared(language: Language) -> dict[str, str]:
     folder = Path(__file__).parent / language
     shared = _load(f"language/{language}", _versions(folder))
     if shared.placed():
-        raise ProfileError(f"{folder} may hold common texts only: records belong to a family")
+        raise ProfileError("profile.shared-record", folder=str(folder))
     return shared.common
 
 
@@ -164,23 +164,31 @@ def parse_overlay(label: str, texts: dict[str, str]) -> Overlay:
         try:
             data = yaml.load(text, Loader=_SafeLoader)  # noqa: S506 - both loaders are safe
         except yaml.YAMLError as error:
-            raise ProfileError(f"{label}/{name}: {error}") from error
+            raise ProfileError(
+                "profile.no-yaml", file=f"{label}/{name}", detail=str(error)
+            ) from error
         if not isinstance(data, dict):
-            raise ProfileError(f"{label}/{name}: the file must hold a mapping of overlay fields")
+            raise ProfileError("profile.no-overlay-mapping", file=f"{label}/{name}")
         for field, value in data.items():
             before = merged.setdefault(field, {})
             if field == "shared":
-                raise ProfileError(f"{label}/{name}: shared is no field of a file; use common")
+                raise ProfileError("profile.shared-field", file=f"{label}/{name}")
             if not isinstance(value, dict) or not isinstance(before, dict):
-                raise ProfileError(f"{label}/{name}: {field} must hold a mapping")
+                raise ProfileError(
+                    "profile.field-no-mapping", file=f"{label}/{name}", field=str(field)
+                )
             if twice := before.keys() & value.keys():
                 raise ProfileError(
-                    f"{label}/{name}: {field} gives {', '.join(map(str, sorted(twice)))} again; "
-                    "keep one of the two"
+                    "profile.text-twice",
+                    file=f"{label}/{name}",
+                    field=str(field),
+                    keys=", ".join(map(str, sorted(twice))),
                 )
             merged[field] = before | value
     try:
         return Overlay.model_validate(merged)
     except ValidationError as error:
         lines = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()[:20]]
-        raise ProfileError(f"overlay {label}: " + "; ".join(lines)) from error
+        raise ProfileError(
+            "profile.overlay-refused", name=label, detail="; ".join(lines)
+        ) from error

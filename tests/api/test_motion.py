@@ -65,7 +65,7 @@ def test_jog_moves_at_speed_and_stops_on_release(station: Station, x: str, page:
     ended = page.wait("jog_ended", drive=x)
     assert max(speeds) < 300 * 1.05
     assert ended["problem"] is None
-    assert ended["reason"] == "released"
+    assert ended["reason_message"]["code"] == "jog.end-released"
     now = station.state(x)
     assert abs(now["velocity"]) < 2
     assert now["state"] == "Switch on disabled", "the power state is as it was"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Iterator
 from importlib.metadata import version
@@ -90,8 +91,11 @@ def test_parts_follow_the_motor(station: Station, x: str) -> None:
         sign = math.copysign(1, wanted[0] * seen_as[0] + wanted[1] * seen_as[1])
         assert [sign * value for value in seen_as] == pytest.approx(wanted, abs=0.02)
     # 10 mm for two revolutions of the motor; the track shows ±25 mm around zero to begin with.
-    shown = seen.of("/name")["updates"]["text"].removesuffix(" mm").split(", ")[-1]
-    assert float(shown) == pytest.approx(turns * 5, abs=0.1)
+    # The name, the sign of the state and the place; words of the state are in no language here.
+    label = re.fullmatch(r"X \[([IO])\] (-?[0-9.]+) mm", seen.of("/name")["updates"]["text"])
+    assert label is not None
+    assert label[1] == ("I" if station.state(x)["state"] == "Operation enabled" else "O")
+    assert float(label[2]) == pytest.approx(turns * 5, abs=0.1)
     assert seen.of("/carriage")["position"][0] == pytest.approx(0.9 * turns * 5 / 25, abs=0.01)
 
 

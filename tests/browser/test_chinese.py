@@ -58,6 +58,20 @@ def chinese(browser: Browser, station: Station) -> Iterator[Page]:
         yield page
 
 
+@pytest.mark.parametrize("place", ["scene", "axis/x/overview"])
+def test_states_of_the_scene_are_chinese_with_the_english_in_brackets(
+    station: Station, x: str, chinese: Page, place: str
+) -> None:
+    """The frame itself has signs alone, as viser shows the same to everybody."""
+    chinese.route("**/viser/**", lambda route: route.abort())
+    chinese.evaluate("localStorage.setItem('servodeck.overview.scene', '1')")
+    chinese.goto(f"{station.url}#/{place}")
+    state = chinese.locator(".scene .scene-states [data-drive=x]")
+    expect(state).to_have_text("X [O] 禁止接通（Switch on disabled）")
+    # The frame can be turned under it: what is clicked there is the scene.
+    assert state.evaluate("(each) => getComputedStyle(each).pointerEvents") == "none"
+
+
 @pytest.mark.parametrize("name", [*AXIS_PAGES, *BENCH_PAGES])
 def test_no_phrase_stays_english(station: Station, x: str, chinese: Page, name: str) -> None:
     place = f"axis/{x}/{name}" if name in AXIS_PAGES else name

@@ -45,9 +45,9 @@ def test_jog_by_mouse(laptop: Page, bench: Bench) -> None:
     open_axis(laptop, bench.drive, "motion")
     laptop.mouse.move(*_centre(laptop, PLUS))
     start = bench.state()["position"]
-    assert bench.jog(laptop.mouse.down, laptop.mouse.up, says_no(laptop)) == "released"
+    assert bench.jog(laptop.mouse.down, laptop.mouse.up, says_no(laptop)) == "jog.end-released"
     assert bench.state()["position"] > start
-    expect(laptop.get_by_text("Ended: released")).to_be_visible()
+    expect(laptop.get_by_text("Ended: the button was released")).to_be_visible()
 
 
 def test_sliding_off_the_button_still_ends_with_the_release(laptop: Page, bench: Bench) -> None:
@@ -72,12 +72,12 @@ def _touch(page: Page, end: str) -> tuple[Callable[[], None], Callable[[], None]
 
 def test_jog_by_finger(phone: Page, bench: Bench) -> None:
     open_axis(phone, bench.drive, "motion")
-    assert bench.jog(*_touch(phone, "touchEnd"), says_no(phone)) == "released"
+    assert bench.jog(*_touch(phone, "touchEnd"), says_no(phone)) == "jog.end-released"
 
 
 def test_cancelled_touch_stops(phone: Page, bench: Bench) -> None:
     open_axis(phone, bench.drive, "motion")
-    assert bench.jog(*_touch(phone, "touchCancel"), says_no(phone)) == "pointer cancelled"
+    assert bench.jog(*_touch(phone, "touchCancel"), says_no(phone)) == "jog.end-pointer-cancelled"
 
 
 def test_jog_by_key(laptop: Page, bench: Bench) -> None:
@@ -171,7 +171,7 @@ def test_the_jog_ends_when_page_and_worker_are_frozen(laptop: Page, bench: Bench
         for process in frozen:
             os.kill(process, signal.SIGSTOP)
         bench.wait_standing()
-        assert "no sign of life" in bench.jog_job()["result"]["reason"]
+        assert bench.jog_end() == "jog.end-no-sign-of-life"
     finally:
         for process in frozen:
             os.kill(process, signal.SIGCONT)

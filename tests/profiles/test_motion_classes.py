@@ -208,7 +208,7 @@ def test_the_first_rule_counts_and_files_come_in_name_order() -> None:
 
 
 def test_a_class_in_a_row_is_refused() -> None:
-    with pytest.raises(ProfileError, match="motion_rules"):
+    with pytest.raises(ProfileError, match=r"profile\.class-in-row"):
         parse_profile({"p.yaml": SAMPLE.replace("access: ro", "access: ro, motion: none")})
 
 

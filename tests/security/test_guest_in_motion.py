@@ -8,9 +8,14 @@ import pytest
 
 from backend.people.identity import Actor, Identity, acting
 from backend.people.rights import Right, Role
+from backend.tools.jog.release import END_OF_ENABLING
 from backend.work.jobs import Job
 from drivers.cia402 import Mode, State
+from drivers.texts.message import text
 from tests.support.guarded import GuardedServer, begin_motion
+
+_ENDED = text("people.end-by-person", person="Olaf")
+_RELEASED = END_OF_ENABLING["released"]
 
 MOVES = frozenset({Right.MEASURE, Right.MOTION})
 
@@ -87,7 +92,7 @@ def test_a_longer_or_larger_grant_lets_it_go_on(guarded: GuardedServer, invitati
 
 def test_a_visit_that_ends_in_a_dwell_ends_it(guarded: GuardedServer, invitation: str) -> None:
     job = begin_motion(guarded, identity_of(guarded, invitation))
-    guarded.call(lambda: guarded.people.support.revoke(invitation, "Olaf ended it"))
+    guarded.call(lambda: guarded.people.support.revoke(invitation, _ENDED))
     require_ended(guarded, job)
 
 
@@ -98,7 +103,7 @@ def test_an_axis_that_a_guest_left_enabled_loses_its_power_with_the_button(
     """Whether or not the guest took control of the axis: nobody else had it."""
     leave_enabled(guarded, identity_of(guarded, invitation), connection)
     support = guarded.people.support
-    guarded.call(lambda: support.release(invitation, "page on site", "let go"))
+    guarded.call(lambda: support.release(invitation, "page on site", _RELEASED))
     require_power_off(guarded)
 
 
@@ -110,6 +115,6 @@ def test_an_axis_that_somebody_else_left_enabled_keeps_its_power(
     assert identity is not None
     leave_enabled(guarded, identity, None)
     support = guarded.people.support
-    guarded.call(lambda: support.release(invitation, "page on site", "let go"))
+    guarded.call(lambda: support.release(invitation, "page on site", _RELEASED))
     guarded.run(asyncio.sleep(0.3))
     assert guarded.run(guarded.connected.axis.state()) is State.OPERATION_ENABLED

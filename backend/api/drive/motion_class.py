@@ -15,8 +15,9 @@ from backend.audit.asked import note_before
 from backend.people.rights import Right
 from backend.station.bench import Bench
 from drivers.errors import NotAllowed
-from drivers.texts.message import reason_of, text
+from drivers.texts.message import text
 from drivers.texts.motion_classes import fixed_text, refusal_text
+from drivers.texts.profile_errors import profile_error_text
 from profiles import load_profile
 from profiles.loader import ProfileError
 from profiles.motion.decisions import CannotClassify, classify, forget
@@ -34,7 +35,7 @@ def _known(profile: str, key: str) -> tuple[Profile, Parameter]:
         known = load_profile(profile)
     except ProfileError as error:
         raise NotFound(
-            reason_of(error), value=profile, remedy="api-station.see-profiles"
+            profile_error_text(error), value=profile, remedy="api-station.see-profiles"
         ) from error
     parameter = known.parameter(key)
     if parameter is None:

@@ -19,7 +19,7 @@ from starlette.websockets import WebSocketState
 
 import backend
 from backend.api.drive.convert_stop import stop_result
-from backend.api.errors import problem_of
+from backend.api.errors import message_of, problem_of, words_of
 from backend.api.live import news as live_news
 from backend.api.live.jog import Jogs
 from backend.api.live.messages import (
@@ -50,8 +50,9 @@ from backend.audit.asked import Asked, asked
 from backend.people.identity import Actor, Identity, acting, arrived_s
 from backend.people.station import People
 from backend.station.bench import Bench
+from backend.tools.jog.release import end_of_jog
 from drivers.errors import DriveError
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 
 #: Messages that wait for a slow page; states, values and drive lists coalesce and do not count.
 QUEUE = 500
@@ -101,7 +102,7 @@ class Connection:
         tasks = (sender, receiver, scoper)
         done, pending = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         # Before anything is waited for: nobody holds a button here any more.
-        self.release(None, "the page's connection closed")
+        self.release(None, text("work.page-gone"))
         for task in pending:
             task.cancel()
         await asyncio.wait(tasks)
@@ -118,7 +119,7 @@ class Connection:
 
     async def close(self) -> None:
         """Release everything that lived by this connection; a jog ends at once."""
-        self.release(None, "the page's connection closed")
+        self.release(None, text("work.page-gone"))
         for drive in self.watched:
             if (connected := self._bench.connected_drives.get(drive)) is not None:
                 connected.monitor.watchers.discard(self.id)
@@ -127,7 +128,7 @@ class Connection:
             task.cancel()
         await self.scopes.close()
 
-    def release(self, drive: str | None, reason: str) -> None:
+    def release(self, drive: str | None, reason: Text) -> None:
         """End jogs of this page: of one axis, or all."""
         self.jogs.release(drive, reason)
 
@@ -222,7 +223,7 @@ class Connection:
             case JogRenew():
                 self.jogs.renew(request)
             case JogStop():
-                self.jogs.release(request.drive, request.reason or "released", request.press)
+                self.jogs.release(request.drive, end_of_jog(request.reason), request.press)
             case JogStart():
                 self.jogs.start(request, self.identity.person)
             case WatchState():
@@ -242,10 +243,14 @@ class Connection:
         problems = await self._bench.motion.stop(known)
         self._bench.journal.add(text("station.stop-pressed"), level="warning", drive=request.drive)
         failed = {drive: why for drive, why in problems.items() if why is not None}
-        problems_of = {drive: why.words() for drive, why in failed.items()}
         # Of a machine with two axes, the other one is stopped as well.
         stopped = list(problems)
-        self.send(StopTaken(drives=stopped, problems=problems_of))
+        taken = StopTaken(
+            drives=stopped,
+            problems={drive: words_of(why) for drive, why in failed.items()},
+            problem_messages={drive: message_of(why) for drive, why in failed.items()},
+        )
+        self.send(taken)
         for drive, why in failed.items():
             failure = DriveError("api-live.stop-not-reach", drive=drive, text=why)
             self.send(Refused(request="stop", problem=problem_of(failure)))
@@ -263,7 +268,7 @@ class Connection:
         if request.take:
             self._bench.leases.take(request.drive, self.id, self.identity.person)
             return
-        self.jogs.release(request.drive, "control was given back")
+        self.jogs.release(request.drive, text("jog.end-control-given-back"))
         self._bench.leases.give(request.drive, self.id)
 
     def _watch(self, drives: set[str]) -> None:

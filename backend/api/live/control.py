@@ -52,7 +52,7 @@ class PeopleControl:
                 self._log(drive, "asks", line, identity)
             case LeaseAnswer(give=True):
                 if leases.asked(drive) is not None:
-                    page.release(drive, "control was handed over")
+                    page.release(drive, text("jog.end-control-handed-over"))
                     leases.give(drive, page.id)
                     line = text("journal.gives-control", person=identity.person)
                     self._log(drive, "gives", line, identity)
@@ -65,7 +65,7 @@ class PeopleControl:
                 if to is None:
                     raise NotAllowed("api-live.person-not-more", drive=drive)
                 require_control(self._people, to.identity, drive)
-                page.release(drive, "control was handed over")
+                page.release(drive, text("jog.end-control-handed-over"))
                 leases.hand(drive, page.id, to.id, to.identity.person, request.time_s)
                 line = text(
                     "journal.hands-control", person=identity.person, other=to.identity.person
@@ -81,10 +81,10 @@ class PeopleControl:
         if Right.ADMINISTER not in identity.rights and not from_guest:
             raise Forbidden("api-live.administrator-takes-control-somebody", drive=drive)
         if held_by is not None and held_by.id != page.id:
-            held_by.release(drive, "control was taken")
+            why = text("work.control-taken", person=identity.person)
+            held_by.release(drive, why)
             if self._bench.jobs.moving(drive) is not None:
                 # Who watched this motion does not control it any more.
-                why = text("work.control-taken", person=identity.person)
                 await self._bench.motion.stop([drive], why)
         self._bench.leases.override(drive, page.id, identity.person)
         line = text("journal.overrides-control", person=identity.person)

@@ -7,16 +7,17 @@ from collections.abc import Callable
 from pydantic import BaseModel
 
 from backend.api.drive.convert_motion import jog_settings, unit_of
-from backend.api.errors import problem_of
+from backend.api.errors import message_or_none, problem_of, words_of
 from backend.api.live.messages import JogEnded, JogGap, JogRenew, JogStart
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.jog.cyclic import jog_cyclic
 from backend.tools.jog.hold import Hold
 from backend.tools.jog.run import jog
-from backend.work.jobs import JobResult, Progress
+from backend.work.jobs import Job, JobResult, Progress
 from drivers.errors import DriveError
-from drivers.texts.message import text
+from drivers.texts.answers import message_in
+from drivers.texts.message import Text, text
 
 
 class Jogs:
@@ -37,7 +38,7 @@ class Jogs:
                 pressed=sign.pressed,
             )
 
-    def release(self, drive: str | None, reason: str, press: int = 0) -> None:
+    def release(self, drive: str | None, reason: Text, press: int = 0) -> None:
         """End the jog of one axis, or all; of one press, or whatever is held."""
         for each, hold in self._holds.items():
             if drive in (None, each):
@@ -77,13 +78,26 @@ class Jogs:
                 del self._holds[request.drive]
             if not held_before:
                 bench.leases.give(request.drive, self._connection)
-            result = job.result or {}
-            reason = str(result.get("reason", job.state))
-            problem = problem_of(job.error) if job.error else None
-            self._send(JogEnded(drive=request.drive, reason=reason, problem=problem))
+            self._send(_end_of(request.drive, job))
 
         if job.task is not None:
             job.task.add_done_callback(ended)
+
+
+def _end_of(drive: str, job: Job) -> JogEnded:
+    """Why a jog ended: its button, what cancelled it, or the problem of one that failed."""
+    reason = (
+        job.cancel_cause if job.state == "cancelled" else message_in(job.result or {}, "reason")
+    )
+    remedy = None if reason is None else reason.remedy()
+    return JogEnded(
+        drive=drive,
+        reason=words_of(reason),
+        reason_message=message_or_none(reason),
+        remedy=words_of(remedy),
+        remedy_message=message_or_none(remedy),
+        problem=problem_of(job.error) if job.error else None,
+    )
 
 
 async def _jog_work(

@@ -64,18 +64,20 @@ class LiveHub:
 
     def _ended(self, session: str) -> None:
         """A session is over: its pages hold nothing any more, and hear nothing."""
+        why = text("motion.session-is-over")
         for connection in self._each():
             if connection.identity.session == session:
-                connection.release(None, "the session is over")
+                connection.release(None, why)
         self._sockets.end(session)
-        self.bench.authority.end_of(session, text("motion.session-is-over"))
+        self.bench.authority.end_of(session, why)
 
     def _lowered(self, session: str) -> None:
         """An account may move nothing any more: what it still moves is stopped."""
+        why = text("motion.account-has-another-role")
         for connection in self._each():
             if connection.identity.session == session:
-                connection.release(None, "the account has another role now")
-        self.bench.authority.end_of(session, text("motion.account-has-another-role"))
+                connection.release(None, why)
+        self.bench.authority.end_of(session, why)
 
     def _each(self) -> list[Connection]:
         return list(self.connections.values())

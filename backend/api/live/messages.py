@@ -26,6 +26,8 @@ from backend.api.drive.models_parameters import ParameterValue
 from backend.api.live.people_messages import PeopleRequest
 from backend.api.models import JobInfo, LogEntry, Message, Positive, Problem
 from backend.api.station.models import DriveSummary
+from backend.tools.jog.release import ReleaseOfPage
+from backend.tools.wire_message import MessageInfo
 
 # --- page to server -----------------------------------------------------------------
 
@@ -96,7 +98,7 @@ class JogStop(Message):
     type: Literal["jog_stop"] = "jog_stop"
     drive: str
     press: int = Field(default=0, ge=0, description="of which press; 0: of any")
-    reason: str = Field(default="", max_length=200)
+    reason: ReleaseOfPage = "released"
 
 
 class StopAll(Message):
@@ -200,11 +202,21 @@ class JobChanged(Message):
 
 
 class JogEnded(Message):
-    """The jog of this connection ended, and why."""
+    """The jog of this connection ended: why, or with which problem; the words are for whoever
+    jogs."""
 
     type: Literal["jog_ended"] = "jog_ended"
     drive: str
-    reason: str
+    reason: str = Field(description="empty where the problem states it")
+    reason_message: MessageInfo | None = Field(
+        default=None, description="of reason, as code and facts"
+    )
+    remedy: str = Field(
+        default="", description="what to do about the reason; empty where nothing is known"
+    )
+    remedy_message: MessageInfo | None = Field(
+        default=None, description="of remedy, as code and facts"
+    )
     problem: Problem | None = None
 
 
@@ -262,6 +274,9 @@ class StopTaken(Message):
     type: Literal["stop_taken"] = "stop_taken"
     drives: list[str]
     problems: dict[str, str] = Field(description="drives that did not take it yet, and why")
+    problem_messages: dict[str, MessageInfo] = Field(
+        default_factory=dict, description="of problems, as code and facts, by the same drives"
+    )
 
 
 class StopReached(Message):

@@ -9,6 +9,7 @@ from pydantic import BaseModel
 
 from backend.api.live.shared import Shared
 from backend.people.identity import Identity
+from drivers.texts.message import Text
 
 
 class Page(Protocol):
@@ -27,5 +28,5 @@ class Page(Protocol):
     def later(self, kind: str, which: str, message: Shared) -> None:
         """Send the newest state of something."""
 
-    def release(self, drive: str | None, reason: str) -> None:
+    def release(self, drive: str | None, reason: Text) -> None:
         """End jogs of this page: of one axis, or all."""

@@ -36,6 +36,7 @@ from backend.people.identity import Identity
 from backend.people.station import People
 from backend.people.throttle import Bucket
 from backend.station.bench import Bench
+from backend.tools.jog.release import END_OF_ENABLING, end_of_enabling
 from drivers.texts.message import prose, text
 
 #: Lines of a page's chat at once, and a second: nobody talks the log full.
@@ -75,15 +76,15 @@ class PeopleLive:
             then.callback(self._motions.let_go, page, text("api-live.is-gone"))
             then.callback(self._motions.end, page, text("api-live.is-gone"), text("work.page-gone"))
             self._talk.pop(page.id, None)
-            self._support.release_all(page.id, "the connection on site closed")
+            self._support.release_all(page.id, END_OF_ENABLING["connection-lost"])
 
     def _fell_silent(self, page: Page) -> None:
         """A page says nothing any more, though its line may look open for some seconds yet."""
         self._motions.let_go(page, text("api-live.fell-silent"))
-        if self._bench.leases.held_by(page.id):
-            page.release(None, "the page fell silent")
-            self._bench.leases.lose(page.id)
         why = text("work.page-not-reachable", silent_s=SILENT_END_S)
+        if self._bench.leases.held_by(page.id):
+            page.release(None, why)
+            self._bench.leases.lose(page.id)
         self._motions.end(page, text("api-live.fell-silent"), why)
 
     # --- requests ---------------------------------------------------------------------
@@ -102,7 +103,7 @@ class PeopleLive:
             case EnableRenew():
                 self._support.renew(request.invitation, page.id)
             case EnableRelease():
-                why = request.reason or "the enabling button was let go"
+                why = end_of_enabling(request.reason)
                 self._support.release(request.invitation, page.id, why)
             case Chat():
                 self._say(page, identity, request.text)

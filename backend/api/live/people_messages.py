@@ -9,6 +9,8 @@ from pydantic import Field
 
 from backend.api.models import Message
 from backend.people.rights import Right, Role
+from backend.tools.jog.release import ReleaseOfPage
+from backend.tools.wire_message import MessageInfo
 
 Name = Annotated[str, Field(max_length=100)]
 #: A place on a page, 0 at the left and top, 1 at the right and bottom of its content.
@@ -111,7 +113,7 @@ class EnableRelease(Message):
 
     type: Literal["enable_release"] = "enable_release"
     invitation: Name
-    reason: str = Field(default="", max_length=200)
+    reason: ReleaseOfPage = "released"
 
 
 PeopleRequest = (
@@ -162,7 +164,10 @@ class InvitationView(Message):
     created: datetime
     expires: datetime
     state: Literal["open", "joined", "ended"]
-    why_ended: str
+    why_ended: str = Field(description="empty while it has not ended")
+    why_ended_message: MessageInfo | None = Field(
+        default=None, description="of why_ended, as code and facts"
+    )
     grant: GrantView | None
     enabled: bool
     code: str | None

@@ -12,7 +12,7 @@ from backend.people.support import Invitation
 from backend.station.bench import Bench
 from backend.work.jobs import Job
 from drivers.cia402 import State
-from drivers.texts.message import Text, as_text, text
+from drivers.texts.message import Text, text
 
 
 class PeopleMotions:
@@ -65,7 +65,7 @@ class PeopleMotions:
         finally:
             self._ending.discard(job.id)
 
-    def _disabled(self, invitation: Invitation, why: str) -> None:
+    def _disabled(self, invitation: Invitation, why: Text) -> None:
         """A guest may not move anything from now on: what moves stops."""
         session = invitation.session
         self._record.note(
@@ -73,7 +73,7 @@ class PeopleMotions:
             "motion ended",
             text("journal.guest-may-not-move", guest=invitation.guest, why=why),
             target=invitation.guest,
-            outcome=as_text(why),
+            outcome=why,
         )
         guests = [p for p in self._pages.values() if session and p.identity.session == session]
         for page in guests:
@@ -89,7 +89,7 @@ class PeopleMotions:
             drives |= {d for d in self._bench.leases.held_by(page.id) if self._is_enabled(d)}
             if self._support.running(invitation) is None:
                 self._bench.leases.drop(page.id)
-        self._stop(drives, invitation.guest, as_text(why))
+        self._stop(drives, invitation.guest, why)
 
     def _job(self, job: Job) -> None:
         """A guest's motion that began just as the button was let go."""

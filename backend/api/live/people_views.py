@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import UTC, datetime
 
+from backend.api.errors import message_or_none, words_of
 from backend.api.live.page import Page
 from backend.api.live.people_messages import (
     ChatLine,
@@ -74,7 +75,8 @@ class PeopleViews:
             created=_moment(each.created),
             expires=_moment(moment_of(each.expires)),
             state=each.state,
-            why_ended=each.why_ended,
+            why_ended=words_of(each.why_ended),
+            why_ended_message=message_or_none(each.why_ended),
             grant=None
             if grant is None
             else GrantView(

@@ -94,7 +94,7 @@ async def log_out(people: ThePeople, record: TheRecord, me: Me) -> Response:
         line = text("journal.logged-out", person=me.person)
         record.note("login", "logged out", line, person=me.person)
     elif me.is_guest and (found := people.support.of_session(me.session)) is not None:
-        people.support.revoke(found.id, "the guest left")
+        people.support.revoke(found.id, text("people.end-guest-left"))
         line = text("journal.guest-left", person=me.person)
         record.note("invitation", "left", line, person=me.person)
     response = Response(status_code=204)

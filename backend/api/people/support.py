@@ -128,7 +128,7 @@ async def revoke_invitation(
     people: ThePeople, live: TheLive, record: TheRecord, me: Me, invitation_id: str
 ) -> InvitationView:
     """End an invitation; its guest is out at once and what they move stops."""
-    ended = people.support.revoke(invitation_id, f"ended by {me.person}")
+    ended = people.support.revoke(invitation_id, text("people.end-by-person", person=me.person))
     record.note(
         "invitation",
         "ended",
@@ -176,7 +176,9 @@ async def withdraw_grant(
     people: ThePeople, live: TheLive, record: TheRecord, me: Me, invitation_id: str
 ) -> InvitationView:
     """Withdraw a grant at once; what the guest moves stops."""
-    ended = people.support.withdraw(invitation_id, f"the grant was withdrawn by {me.person}")
+    ended = people.support.withdraw(
+        invitation_id, text("people.end-grant-withdrawn", person=me.person)
+    )
     record.note(
         "invitation",
         "grant withdrawn",

@@ -16,7 +16,16 @@ from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from backend.api.admission.requests import Admission
-from backend.api.errors import NotFound, WrongMethod, answer, answer_error, problem_of
+from backend.api.errors import (
+    TITLES,
+    NotFound,
+    WrongMethod,
+    answer,
+    answer_error,
+    message_or_none,
+    problem_of,
+    words_of,
+)
 from backend.api.models import Problem
 from backend.api.security.body import BodyRefused, MeasuredBody, framing
 from backend.api.security.origin import Addresses, header
@@ -40,14 +49,10 @@ CSRF_HEADER = "x-servodeck-csrf"
 CONNECTION_HEADER = "x-servodeck-connection"
 _SAFE = ("GET", "HEAD", "OPTIONS")
 _REFUSED = {
-    400: ("Bad request", "it is not said where it ends, or in two ways", "send its length, once"),
-    408: ("Too slow", "it came too slowly", "send it faster"),
-    413: ("Too large", "it is too large", "send less"),
-    422: (
-        "Not acceptable",
-        "it has half of a surrogate pair (\\ud800 to \\udfff), which is no character",
-        "send whole characters",
-    ),
+    400: text("api-security.body-no-length"),
+    408: text("api-security.body-too-slow"),
+    413: text("api-security.body-too-large"),
+    422: text("api-security.body-half-character"),
 }
 
 HEADERS = {
@@ -362,11 +367,14 @@ def _address(scope: Scope) -> str:
 
 
 def _refusal(status: int) -> Problem:
-    title, why, remedy = _REFUSED[status]
+    why = _REFUSED[status]
+    remedy = why.remedy()
     return Problem(
         type="urn:servodeck:body",
-        title=title,
+        title=TITLES["body"],
         status=status,
-        detail=f"the body of the request is refused: {why}",
-        remedy=remedy,
+        detail=words_of(why),
+        remedy=words_of(remedy) or None,
+        code=why.code,
+        advice=message_or_none(remedy),
     )

@@ -15,7 +15,8 @@ from backend.parameters.lists import export_list, import_list
 from backend.parameters.set_file import MAX_BYTES, BadSet
 from backend.work.apart import read_apart
 from drivers.errors import NotAllowed
-from drivers.texts.message import language, reason_of, text
+from drivers.texts.message import language, text
+from drivers.texts.profile_errors import profile_error_text
 from profiles import load_profile
 from profiles.loader import ProfileError
 from profiles.schema import Profile
@@ -27,7 +28,7 @@ def _family(name: str) -> Profile:
     try:
         return load_profile(name)
     except ProfileError as error:
-        raise NotFound(reason_of(error), value=name) from error
+        raise NotFound(profile_error_text(error), value=name) from error
 
 
 _MEDIA = {"csv": "text/csv; charset=utf-8", "dcf": "application/octet-stream"}

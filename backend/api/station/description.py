@@ -31,7 +31,8 @@ from drivers.errors import NotAllowed
 from drivers.link import Found
 from drivers.texts import limits
 from drivers.texts.imports import failure_text, message_of_import, summary_text
-from drivers.texts.message import Text, reason_of, text
+from drivers.texts.message import Text, text
+from drivers.texts.profile_errors import profile_error_text
 from profiles import drive_names, load_profile
 from profiles.importer import ImportFailed, export_eds, export_esi
 from profiles.importer.esi import MAX_BYTES
@@ -213,7 +214,9 @@ def _known(name: str) -> Profile:
     try:
         return load_profile(name)
     except ProfileError as error:
-        raise NotFound(reason_of(error), value=name, remedy="api-station.see-profiles") from error
+        raise NotFound(
+            profile_error_text(error), value=name, remedy="api-station.see-profiles"
+        ) from error
 
 
 @router.get("/profiles/{profile}/texts")
@@ -227,7 +230,7 @@ async def profile_texts(
         overlay = load_overlay(profile, language)
     except ProfileError as error:
         raise NotFound(
-            reason_of(error), value=profile, remedy="api-station.see-profiles"
+            profile_error_text(error), value=profile, remedy="api-station.see-profiles"
         ) from error
     return ProfileTexts(profile=profile, language=language, texts=translations(known, overlay))
 

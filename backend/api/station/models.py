@@ -241,3 +241,6 @@ class ProfileInfo(Message):
     parameters: int
     own: bool = Field(default=False, description="in the user's folder, imported or written there")
     problem: str = Field(default="", description="why this own profile cannot be used")
+    problem_message: MessageInfo | None = Field(
+        default=None, description="of problem, as code and facts"
+    )

@@ -12,7 +12,7 @@ from backend.api import convert
 from backend.api.context import Connection, Controlled, Me, TheBench, TheDrive, ThePeople
 from backend.api.drive.convert_stop import stop_result
 from backend.api.drive.models_axis import StopRequest, StopResult
-from backend.api.errors import NotFound
+from backend.api.errors import NotFound, message_of, words_of
 from backend.api.models import JobInfo, LogEntry
 from backend.api.security.gate import require_right
 from backend.api.station.interfaces import list_interfaces
@@ -37,7 +37,8 @@ from backend.station.second_port import require_same_drive
 from backend.work.jobs import Job, JobResult, Progress
 from drivers.errors import NotAllowed
 from drivers.link import Found
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
+from drivers.texts.profile_errors import profile_error_text
 from profiles import load_all
 from profiles.loader import broken_profiles, is_own
 
@@ -74,9 +75,10 @@ async def profiles() -> list[ProfileInfo]:
             links=[],
             parameters=0,
             own=True,
-            problem=why,
+            problem=words_of(why),
+            problem_message=message_of(why),
         )
-        for name, why in broken_profiles().items()
+        for name, why in _broken().items()
     ] + [
         ProfileInfo(
             profile=p.drive,
@@ -89,6 +91,10 @@ async def profiles() -> list[ProfileInfo]:
         )
         for p in load_all().values()
     ]
+
+
+def _broken() -> dict[str, Text]:
+    return {name: profile_error_text(error) for name, error in broken_profiles().items()}
 
 
 @router.get("/buses")

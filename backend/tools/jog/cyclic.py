@@ -25,7 +25,7 @@ from backend.drive.ports import address_of
 from backend.scales.units import AxisUnits
 from backend.scales.words import halt_remedy, halt_words
 from backend.tools.jog.hold import Hold
-from backend.tools.jog.run import JogSettings, require_scale
+from backend.tools.jog.run import JogSettings, end_of, require_scale
 from backend.tools.thresholds import jog_cyclic as threshold
 from backend.work.jobs import JobResult, Progress
 from drivers import link as bus
@@ -33,7 +33,7 @@ from drivers.cia402 import Mode
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange, motion_halted
 from drivers.motion.setpoint_plan import Phase
 from drivers.texts import limits
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 
 Signal = npt.NDArray[np.float64]
 
@@ -207,7 +207,7 @@ async def jog_cyclic(
         limits = await _limits(axis, envelope, start)
         # Enabling takes longer than a button may be held: released meanwhile, nothing moves.
         if reason := await _alive(axis, session, hold):
-            return {"reason": reason, "moved_rev": 0.0}
+            return end_of(reason, 0.0)
         progress(0.0, text("jog.moving"))
         begin = start
         while True:
@@ -228,7 +228,7 @@ async def jog_cyclic(
         if not await axis.standstill(2.0):
             raise LinkTimeout("jog.still-moves-after-jog", drive=drive.name)
         moved = units.position(await axis.position_raw() - start)
-    return {"reason": reason, "moved_rev": moved}
+    return end_of(reason, moved)
 
 
 def _run_up_from(
@@ -253,7 +253,7 @@ def run_up(travel: float, speed: float, slope: float, cycle_s: float) -> Signal:
     return np.asarray(np.where(t < ramp, rising, np.where(t < ramp + cruise, level, falling)))
 
 
-async def _while_held(axis: Axis, session: CyclicSession, hold: Hold) -> str:
+async def _while_held(axis: Axis, session: CyclicSession, hold: Hold) -> Text | None:
     """Renew until the hold ends, with the reason, or a gap begins, with none."""
     station = session.station(axis.drive)
     while not (reason := hold.ended()) and not hold.braking():
@@ -263,7 +263,7 @@ async def _while_held(axis: Axis, session: CyclicSession, hold: Hold) -> str:
     return reason
 
 
-async def _alive(axis: Axis, session: CyclicSession, hold: Hold) -> str:
+async def _alive(axis: Axis, session: CyclicSession, hold: Hold) -> Text | None:
     """Wait for the end of a gap and for an axis that stands; the reason if the hold ends."""
     station = session.station(axis.drive)
     while not (reason := hold.ended()) and (hold.braking() or _brakes(session, station)):

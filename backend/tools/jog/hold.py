@@ -12,12 +12,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from backend.tools.jog.release import END_OF_JOG
 from backend.tools.thresholds import jog_hold as threshold
+from drivers.texts.message import Text, text
 
 GAP_S = threshold.GAP_S
 RESUME_S = threshold.RESUME_S
 CONFIRM_S = threshold.CONFIRM_S
-_EXPIRED = f"no sign of life from the page for {1e3 * RESUME_S:.0f} ms"
+_RELEASED = END_OF_JOG["released"]
+_EXPIRED = text("jog.end-no-sign-of-life", silent_ms=1e3 * RESUME_S)
 
 
 class Hold:
@@ -35,7 +38,8 @@ class Hold:
         paused: Callable[[bool, float], None] = lambda _braked, _s: None,
     ) -> None:
         self.number = number
-        self.released = ""
+        #: Why it is released; None while the button is held or may still be held.
+        self.released: Text | None = None
         self._clock = clock
         self._paused = paused
         #: When the page was alive last, by this computer's clock.
@@ -65,7 +69,7 @@ class Hold:
         if number and number != self.number:
             return
         if not pressed:
-            self.release("released")
+            self.release(_RELEASED)
             return
         if sign is not None:
             if sign <= self._last_number:
@@ -79,7 +83,7 @@ class Hold:
             self._way = way if self._way is None else min(self._way, way)
             late = way - self._way
         alive = now - late - max(silent_s, 0.0)
-        if self.released or alive <= self._alive:
+        if self.released is not None or alive <= self._alive:
             return
         if now - alive > GAP_S:
             # It proves that the page lived some time ago, and no more.
@@ -91,7 +95,7 @@ class Hold:
             self._back = now
         self._alive = alive
 
-    def release(self, reason: str, number: int = 0) -> None:
+    def release(self, reason: Text, number: int = 0) -> None:
         """The button was let go, or what amounts to it; nothing revives this hold.
 
         One of an earlier press (``number``) that comes late is no matter of this one.
@@ -99,8 +103,8 @@ class Hold:
         if not number or not self.number or number >= self.number:
             self.released = self.released or reason
 
-    def ended(self) -> str:
-        """Why to stop, or empty while the button is held or may still be held."""
+    def ended(self) -> Text | None:
+        """Why to stop, or None while the button is held or may still be held."""
         self._look(self._clock())
         return self.released
 
@@ -108,8 +112,8 @@ class Hold:
         """Whether the axis has to brake and to wait, as a gap is open. Ends a gap that is over."""
         now = self._clock()
         self._look(now)
-        if self.released or self._gap_began is None:
-            return not self.released and self._gap_began is not None
+        if self.released is not None or self._gap_began is None:
+            return False
         alive = now - self._alive <= GAP_S
         if self._back is not None and alive and self._alive - self._back >= CONFIRM_S:
             began, self._gap_began, self._back = self._gap_began, None, None
@@ -119,7 +123,7 @@ class Hold:
 
     def _look(self, now: float) -> None:
         """Open a gap where a sign is missing; end the hold where a gap is too long."""
-        if self.released:
+        if self.released is not None:
             return
         silent = now - self._alive
         if self._gap_began is None:

@@ -23,7 +23,8 @@ from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from drivers.texts import limits
-from drivers.texts.message import joined, prose, text
+from drivers.texts.answers import sentence
+from drivers.texts.message import Text, joined, prose, text
 
 PERIOD_S = threshold.PERIOD_S
 TRAVEL_MARGIN_REV = threshold.TRAVEL_MARGIN_REV
@@ -70,7 +71,7 @@ async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress)
         for key, raw in ramps.items():
             await drive.write(key, raw)
         if reason := hold.ended():
-            return {"reason": reason, "moved_rev": 0.0}
+            return end_of(reason, 0.0)
         async with axis.enabled(Mode.PP, envelope):
             start = await axis.position_raw()
             # Enabling takes longer than the renewal time-out; the page has renewed meanwhile.
@@ -79,7 +80,12 @@ async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress)
             stop_time = 1.0 + 2.0 * settings.speed_rpm / settings.acceleration_rpm_s
             await axis.halt_and_wait(stop_time)
             moved = units.position(await axis.position_raw() - start)
-    return {"reason": reason, "moved_rev": moved}
+    return end_of(reason, moved)
+
+
+def end_of(reason: Text, moved_rev: float) -> JobResult:
+    """The result of a jog: why it ended, as a message with its words, and how far it went."""
+    return {**sentence("reason", reason), "moved_rev": moved_rev}
 
 
 def require_scale(axis: Axis, units: AxisUnits, settings: JogSettings) -> None:
@@ -100,7 +106,7 @@ def require_scale(axis: Axis, units: AxisUnits, settings: JogSettings) -> None:
         )
 
 
-async def _follow(axis: Axis, settings: JogSettings, hold: Hold, start: int) -> str:
+async def _follow(axis: Axis, settings: JogSettings, hold: Hold, start: int) -> Text:
     drive, units = axis.drive, await axis.units()
     target_key = drive.require("position_target")
     lead = units.position_raw(settings.lead_rev)

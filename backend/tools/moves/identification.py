@@ -12,8 +12,30 @@ from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, Rejected
-from drivers.texts.message import joined, prose, text
-from profiles.functions import DriveIdentification
+from drivers.texts.message import Text, joined, text
+from profiles.functions import DriveIdentification, IdentificationState
+
+_STATES: dict[IdentificationState, Text] = {
+    "idle": text("moves.identification-idle"),
+    "preparation": text("moves.identification-preparation"),
+    "resistance": text("moves.identification-resistance"),
+    "ready_for_inductance": text("moves.identification-ready-for-inductance"),
+    "inductance_d": text("moves.identification-inductance-d"),
+    "inductance_q": text("moves.identification-inductance-q"),
+    "sensor_bias": text("moves.identification-sensor-bias"),
+    "torque_constant": text("moves.identification-torque-constant"),
+    "torque_constant_limited": text("moves.identification-torque-constant-limited"),
+    "inertia": text("moves.identification-inertia"),
+    "inertia_again": text("moves.identification-inertia-again"),
+    "inertia_limited": text("moves.identification-inertia-limited"),
+    "complete": text("moves.identification-complete"),
+    "homing": text("moves.identification-homing"),
+    "acceleration_design": text("moves.identification-acceleration-design"),
+    "error_handling": text("moves.identification-error-handling"),
+    "error": text("moves.identification-error"),
+    "waiting": text("moves.identification-waiting"),
+    "jog_homing": text("moves.identification-jog-homing"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +60,12 @@ def require_identification(axis: Axis) -> DriveIdentification:
             profile_title=axis.drive.profile.title,
         )
     return spec
+
+
+def state_of(spec: DriveIdentification, status: int) -> Text:
+    """What a value of the status object means; the value itself where the profile does not say."""
+    state = spec.states.get(status)
+    return text("moves.identification-status", value=status) if state is None else _STATES[state]
 
 
 async def identify(axis: Axis, settings: IdentifySettings, progress: Progress) -> JobResult:
@@ -74,7 +102,6 @@ async def _until_done(
     axis: Axis, spec: DriveIdentification, settings: IdentifySettings, progress: Progress
 ) -> None:
     drive, units = axis.drive, await axis.units()
-    names = drive.parameter(spec.status_key).enum
     began = time.monotonic()
     start = await axis.position_raw()
     busy = False
@@ -85,7 +112,7 @@ async def _until_done(
             causes = joined(await axis.blocked_by() or [text("axis.cause-left-enabled")])
             raise NotAllowed("moves.broke-off-identification", drive=drive.name, causes=causes)
         status = await drive.raw(spec.status_key)
-        name = names.get(status, str(status))
+        state = state_of(spec, status)
         busy = busy or (status not in spec.done and status not in spec.failed and status != 0)
         if busy and status in spec.done:
             return
@@ -102,7 +129,7 @@ async def _until_done(
                 "moves.not-begin-identification-state",
                 drive=drive.name,
                 parameter=spec.status_key,
-                name=name,
+                name=state,
             )
         travelled = abs(units.position(await axis.position_raw() - start))
         if travelled > limit.travel_rev:
@@ -116,5 +143,5 @@ async def _until_done(
             raise LinkTimeout(
                 "moves.identification-took-longer", drive=drive.name, time_s=limit.time_s
             )
-        progress(min(0.95, elapsed / limit.time_s), prose(name))
+        progress(min(0.95, elapsed / limit.time_s), state)
         await asyncio.sleep(threshold.POLL_S)

@@ -32,7 +32,7 @@ class Pages:
     def __init__(self, name: str, heard: float) -> None:
         self.id, self.heard, self.identity = name, heard, LOCAL
 
-    def release(self, drive: str | None, reason: str) -> None:
+    def release(self, drive: str | None, reason: Text) -> None:
         """It holds no jog."""
 
     def later(self, kind: str, key: str, news: object) -> None:

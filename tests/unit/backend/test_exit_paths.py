@@ -28,6 +28,7 @@ from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.station.measuring import Exchange, exchange_for
 from backend.tools.jog.cyclic import jog_cyclic
+from backend.tools.jog.release import END_OF_JOG
 from backend.tools.jog.run import Hold, JogSettings
 from backend.tools.moves.end_search import limited
 from backend.work.jobs import Progress
@@ -214,7 +215,7 @@ async def test_a_motion_whose_loop_does_not_take_its_halt_owes_a_stop(
     loop, hold = Loop(x), Hold()
     loop.broken = True
     servo.enable()
-    hold.release("released")
+    hold.release(END_OF_JOG["released"])
     with pytest.raises(LinkTimeout):
         await jog_cyclic(x.axis, loop, JOG, hold, Progress(lambda: None))  # type: ignore[arg-type]
     assert stop_pending(x)
@@ -409,13 +410,13 @@ class Page:
     def __init__(self, name: str, ago_s: float) -> None:
         self.id, self.identity, self.page = name, LOCAL, ""
         self.heard = time.monotonic() - ago_s
-        self.released: list[str] = []
+        self.released: list[Text] = []
 
     def send(self, _message: object) -> None: ...
 
     def later(self, *_what: object) -> None: ...
 
-    def release(self, _drive: str | None, reason: str) -> None:
+    def release(self, _drive: str | None, reason: Text) -> None:
         self.released.append(reason)
 
 

@@ -16,6 +16,8 @@ from backend.functions.forcing import ForcingSessions
 from backend.people.lease import Leases
 from backend.work.jobs import JobRunner
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, OutOfRange, Rejected
+from drivers.texts.answers import sentence
+from drivers.texts.message import text
 from profiles.functions import Forcing, Functions, Probe, TerminalBits, TerminalFacts, TouchProbe
 from profiles.schema import IoFunction, IoTerminal, Parameter, Profile, Quirk
 from tests.support.memory_link import MemoryLink
@@ -161,7 +163,7 @@ async def test_everything_is_put_back_at_the_end(
     assert outputs(io_link) == (0x1, 0)
     assert sessions.get("x", "outputs") is None
     assert session.job is not None
-    assert session.job.result == {"reason": "ended"}
+    assert session.job.result == sentence("reason", text("functions.end-by-page"))
 
 
 @pytest.mark.parametrize(
@@ -205,7 +207,7 @@ async def test_a_silent_page_ends_it(
     await session.set({"DO1": True})
     monkeypatch.setattr(forcing, "SILENT_S", 0.0)
     await ended(lambda: sessions.get("x", "outputs") is None)
-    assert session.reason == "the page fell silent"
+    assert session.reason == text("work.page-not-reachable", silent_s=0.0)
     assert outputs(io_link) == (0x1, 0)
 
 
@@ -214,7 +216,7 @@ async def test_stop_ends_it(axis: Axis, io_link: MemoryLink, sessions: ForcingSe
     await session.set({"DO1": True})
     axis.stopped = True
     await ended(lambda: sessions.get("x", "outputs") is None)
-    assert session.reason == "STOP was pressed"
+    assert session.reason == text("motion.stop-was-pressed")
     assert outputs(io_link) == (0x1, 0)
 
 
@@ -225,7 +227,7 @@ async def test_control_that_passes_to_another_ends_it(axis: Axis, io_link: Memor
     await session.set({"DO1": True})
     leases.take("x", "other", "Kim")
     await ended(lambda: sessions.get("x", "outputs") is None)
-    assert session.reason == "Kim took control"
+    assert session.reason == text("work.control-taken", person="Kim")
     assert outputs(io_link) == (0x1, 0)
 
 

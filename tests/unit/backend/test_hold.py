@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import pytest
 
 from backend.tools.jog.hold import CONFIRM_S, GAP_S, RESUME_S, Hold
+from backend.tools.jog.release import END_OF_JOG
+from drivers.texts.message import text
 
 #: A page sends a sign every 40 ms; a motion looks at its hold as often.
 PERIOD_S = 0.04
@@ -75,7 +77,7 @@ class Held:
             while coming and coming[0].arrives_s <= now_s:
                 self.sign(coming.pop(0))
             if now_s >= release_at_s:
-                self.hold.release("released", 1)
+                self.hold.release(END_OF_JOG["released"], 1)
                 release_at_s = 1e9
             self.look()
             self.clock.s += 0.001
@@ -97,7 +99,7 @@ def test_a_steady_hold_moves_until_it_is_released() -> None:
     held = Held()
     held.play(steady(0.0, 3.0), 2.5, release_at_s=2.0)
     assert held.states() == ["moves", "ended"]
-    assert held.hold.ended() == "released"
+    assert held.hold.ended() == END_OF_JOG["released"]
     assert held.first("ended") == pytest.approx(2.0, abs=0.002)
 
 
@@ -117,7 +119,7 @@ def test_beyond_500_ms_a_new_press_is_needed(back_s: float) -> None:
     held = Held()
     held.play(steady(0.0, 1.0) + steady(back_s, 4.0, first=100), 3.5)
     assert held.states() == ["moves", "brakes", "ended"]
-    assert "500 ms" in held.hold.ended()
+    assert held.hold.ended() == text("jog.end-no-sign-of-life", silent_ms=500.0)
     assert held.first("ended") == pytest.approx(0.96 + RESUME_S, abs=0.003)
 
 
@@ -134,7 +136,7 @@ def test_a_release_in_a_gap_never_resumes(released_s: float) -> None:
     held = Held()
     held.play(steady(0.0, 1.0) + steady(1.40, 4.0, first=100), 3.5, release_at_s=released_s)
     assert "moves" not in [state for at, state in held.reported if at > 1.2]
-    assert held.hold.ended() == "released"
+    assert held.hold.ended() == END_OF_JOG["released"]
 
 
 def test_a_burst_that_waited_in_the_network_is_as_old_as_it_was_sent() -> None:
@@ -146,7 +148,7 @@ def test_a_burst_that_waited_in_the_network_is_as_old_as_it_was_sent() -> None:
     let_go = Sign(200, 1.43, late_s=0.01, pressed=False)
     held.play([*steady(0.0, 1.0), *waiting, let_go], 3.0)
     assert "moves" not in [state for at, state in held.reported if at > 1.2]
-    assert held.hold.ended() == "released"
+    assert held.hold.ended() == END_OF_JOG["released"]
 
 
 def test_a_burst_without_a_release_goes_on_only_with_what_comes_after_it() -> None:
@@ -215,12 +217,12 @@ def test_signs_of_an_earlier_press_are_no_matter_of_this_one() -> None:
     clock.s += 0.19
     hold.renew(1, 50)
     hold.renew(1, 51, pressed=False)
-    hold.release("released", 1)
-    assert not hold.ended()
+    hold.release(END_OF_JOG["released"], 1)
+    assert hold.ended() is None
     clock.s += 0.02
     assert hold.braking(), "the first sign of life was another press's"
-    hold.release("released", 2)
-    assert hold.ended() == "released"
+    hold.release(END_OF_JOG["released"], 2)
+    assert hold.ended() == END_OF_JOG["released"]
 
 
 def test_signs_without_numbers_as_commands_give_them() -> None:
@@ -229,8 +231,8 @@ def test_signs_without_numbers_as_commands_give_them() -> None:
     for _ in range(20):
         clock.s += 0.05
         hold.renew()
-        assert not hold.ended()
+        assert hold.ended() is None
         assert not hold.braking()
-    hold.release("released")
+    hold.release(END_OF_JOG["released"])
     hold.renew()
-    assert hold.ended() == "released"
+    assert hold.ended() == END_OF_JOG["released"]

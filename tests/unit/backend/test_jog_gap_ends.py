@@ -19,6 +19,7 @@ from backend.api.live.jog import Jogs
 from backend.api.live.messages import JogRenew, JogStart
 from backend.people.identity import LOCAL, Actor, acting
 from backend.station.bench import Bench
+from backend.tools.jog.release import END_OF_JOG
 from backend.tools.jog.run import Hold, JogSettings, jog
 from backend.work.jobs import Job, JobResult, Progress
 from benchmarks.stopping.clock import run_simulated
@@ -66,7 +67,7 @@ class Jogged:
 
     async def release(self) -> None:
         """The button was let go."""
-        self.hold.release("released", 1)
+        self.hold.release(END_OF_JOG["released"], 1)
 
     async def set_the_clock(self) -> None:
         """The computer's clock was set forward by an hour."""
@@ -107,7 +108,7 @@ def after_gap(happens: Callable[[Jogged], Awaitable[None]]) -> tuple[list[int], 
                     if not SILENT_S < number * SIGN_S < BACK_S:
                         hold.renew(1)
                     await asyncio.sleep(SIGN_S)
-                hold.release("released", 1)
+                hold.release(END_OF_JOG["released"], 1)
 
             job = bench.jobs.start("jog", "Jog", work, drive="x", motion=True)
             signs = asyncio.create_task(page())
@@ -181,11 +182,11 @@ async def test_the_signs_of_one_page_keep_no_jog_of_another_alive(tmp_path: Path
         alive = hold._alive
         second.renew(JogRenew(drive="x", press=1, sign=1))
         assert hold._alive == alive, "a sign of the other page"
-        second.release("x", "released", 1)
-        assert not hold.released
-        first.release("x", "released", 1)
-        assert hold.released == "released"
+        second.release("x", END_OF_JOG["released"], 1)
+        assert hold.released is None
+        first.release("x", END_OF_JOG["released"], 1)
+        assert hold.released == END_OF_JOG["released"]
         first.renew(JogRenew(drive="x", press=1, sign=2))
-        assert hold.ended() == "released"
+        assert hold.ended() == END_OF_JOG["released"]
     finally:
         await bench.close()

@@ -17,6 +17,7 @@ from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.jog import run as jogging
 from backend.tools.jog.cyclic import GeneratorSettings, generate, jog_cyclic
+from backend.tools.jog.release import END_OF_JOG
 from backend.tools.jog.run import Hold, JogSettings, jog
 from backend.tools.moves import move as moving
 from backend.work.jobs import Progress
@@ -437,8 +438,10 @@ async def test_jog_released_before_it_is_enabled_enables_nothing(
     x: ConnectedDrive, servo: Servo
 ) -> None:
     hold = Hold()
-    hold.release("released")
-    assert (await jog(x.axis, JOG, hold, quiet()))["reason"] == "released"
+    hold.release(END_OF_JOG["released"])
+    assert (await jog(x.axis, JOG, hold, quiet()))["reason_message"] == END_OF_JOG[
+        "released"
+    ].to_wire()
     assert enabling(servo) == 0
 
 
@@ -448,12 +451,14 @@ async def test_jog_released_while_enabling_aims_nowhere(x: ConnectedDrive, servo
 
     def note(place: tuple[int, int], value: int) -> None:
         if place == CONTROL and value & ENABLES == ENABLES:
-            hold.release("released")
+            hold.release(END_OF_JOG["released"])
         if place == TARGET:
             targets.append(value)
 
     servo.on_write = note
-    assert (await jog(x.axis, JOG, hold, quiet()))["reason"] == "released"
+    assert (await jog(x.axis, JOG, hold, quiet()))["reason_message"] == END_OF_JOG[
+        "released"
+    ].to_wire()
     assert set(targets) == {servo.number(POSITION)}
 
 
@@ -466,13 +471,13 @@ async def test_jog_ends_at_the_end_of_the_number_range(x: ConnectedDrive, servo:
         if place == TARGET:
             targets.append(value)
             if len(targets) > 3:
-                hold.release("enough")
+                hold.release(END_OF_JOG["released"])
 
     servo.on_write = note
     task = asyncio.create_task(jog(x.axis, JOG, hold, quiet()))
     await eventually(lambda: 2**31 - 1 in targets or task.done())
-    hold.release("enough")
-    assert (await task)["reason"] == "enough"
+    hold.release(END_OF_JOG["released"])
+    assert (await task)["reason_message"] == END_OF_JOG["released"].to_wire()
 
 
 async def test_jog_needs_a_known_resolution(x: ConnectedDrive, servo: Servo) -> None:
@@ -568,12 +573,12 @@ async def test_cyclic_jog_released_while_enabling_plays_nothing(
     def note(place: tuple[int, int], value: int) -> None:
         if place == CONTROL and value & ENABLES == ENABLES:
             enables["seen"] = True
-            hold.release("released")
+            hold.release(END_OF_JOG["released"])
 
     servo.on_write = note
     result = await jog_cyclic(x.axis, exchange, JOG, hold, quiet())  # type: ignore[arg-type]
     assert enables["seen"]
-    assert result["reason"] == "released"
+    assert result["reason_message"] == END_OF_JOG["released"].to_wire()
     assert exchange.played == []
     assert servo.number(STATUS) == 0x250
 
@@ -614,5 +619,5 @@ async def test_a_gap_halts_the_polled_jog_and_a_new_target_ends_the_halt(
     hold.renew(1)
     await eventually(lambda: ("control", 0x3F) in words)
     assert words[0][0] == "target"
-    hold.release("released", 1)
-    assert (await task)["reason"] == "released"
+    hold.release(END_OF_JOG["released"], 1)
+    assert (await task)["reason_message"] == END_OF_JOG["released"].to_wire()

@@ -12,6 +12,7 @@ from backend.axis.axis import Envelope
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.autotune.axis_facts import read_facts
+from backend.tools.jog.release import END_OF_JOG
 from backend.tools.jog.run import Hold, JogSettings, jog
 from backend.tools.moves.move import MoveSettings, move
 from backend.tools.sweep.plan import drive_limit_percent
@@ -112,11 +113,11 @@ async def test_a_drive_without_a_deceleration_is_jogged_by_its_acceleration(
     """CiA 402-2 object 6084h: without it the drive brakes by 6083h."""
     plain.without(DECELERATION, QUICK_STOP)
     hold = Hold()
-    asyncio.get_running_loop().call_later(0.1, hold.release, "let go")
+    asyncio.get_running_loop().call_later(0.1, hold.release, END_OF_JOG["released"])
     reported = await jog(
         connected.axis, JogSettings(1, 60.0, 600.0, 1.0, 50.0), hold, Progress(lambda: None)
     )
-    assert reported["reason"] == "let go"
+    assert reported["reason_message"] == END_OF_JOG["released"].to_wire()
     # 600 rpm/s are 10 rev/s², 100000 inc/s².
     assert (ACCELERATION, (100000).to_bytes(4, "little")) in plain.written
     assert plain.number(ACCELERATION) == 50000, "put back"

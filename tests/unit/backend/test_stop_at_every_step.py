@@ -17,6 +17,7 @@ import pytest
 from backend.axis.axis import Envelope
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
+from backend.tools.jog.release import END_OF_JOG
 from backend.tools.jog.run import Hold, JogSettings, jog
 from backend.tools.moves.move import MoveSettings, move
 from backend.work.jobs import JobResult, Progress
@@ -166,7 +167,7 @@ async def jog_and_release(steps: Steps) -> None:
             await asyncio.sleep(0.04)
             if not 2 <= number < 8:
                 hold.renew()
-        hold.release("released")
+        hold.release(END_OF_JOG["released"])
 
     async def work(progress: Progress) -> JobResult:
         holding = asyncio.create_task(page())

@@ -8,9 +8,11 @@ import pytest
 
 from backend.tools.jog.cyclic import jog_cyclic
 from backend.tools.jog.hold import GAP_S, RESUME_S, Hold
+from backend.tools.jog.release import END_OF_JOG
 from backend.tools.jog.run import JogSettings
 from backend.work.jobs import JobResult
 from drivers.cia402 import State
+from drivers.texts.message import text
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import mechanics, silent
 
@@ -48,7 +50,7 @@ class Watched:
         self._before = now_s, place
         since = 0.0 if self._moves_since is None else now_s - self._moves_since
         if since >= self.release_s:
-            self.hold.release("released", 1)
+            self.hold.release(END_OF_JOG["released"], 1)
         elif self.held(since):
             self.hold.renew(1)
 
@@ -68,7 +70,7 @@ async def test_a_gap_brakes_the_axis_which_speeds_up_again() -> None:
         start = await b.axis.position_raw()
         x = Watched(b, lambda at: at < 1.0 or at > 1.4, release_s=3.0)
         result = await x.jog()
-        assert result["reason"] == "released"
+        assert result["reason_message"] == END_OF_JOG["released"].to_wire()
         assert x.gaps == [True, False]
         assert x.fastest(0.6, 1.0) == pytest.approx(120.0, rel=0.1)
         # The last sign at 1.0 s, 200 ms, a look of the job and the loop's ramp of 100 ms.
@@ -84,7 +86,7 @@ async def test_a_release_in_a_gap_never_moves_it_again(release_s: float) -> None
     async with direct(ONE, drive="mms7") as b:
         x = Watched(b, lambda at: at < 1.0 or at > 1.4, release_s=release_s)
         result = await x.jog()
-        assert result["reason"] == "released"
+        assert result["reason_message"] == END_OF_JOG["released"].to_wire()
         assert all(rpm < STANDS_RPM for at, rpm in x.track if at > 1.0 + GAP_S + 0.2)
         assert await b.axis.state() is not State.OPERATION_ENABLED
 
@@ -93,7 +95,9 @@ async def test_beyond_500_ms_a_new_press_is_needed() -> None:
     async with direct(ONE, drive="mms7") as b:
         x = Watched(b, lambda at: at < 1.0 or at > 1.0 + RESUME_S + 0.1, release_s=4.0)
         result = await x.jog()
-        assert "500 ms" in str(result["reason"])
+        assert (
+            result["reason_message"] == text("jog.end-no-sign-of-life", silent_ms=500.0).to_wire()
+        )
         assert all(rpm < STANDS_RPM for at, rpm in x.track if at > 1.0 + GAP_S + 0.2)
         assert await b.axis.state() is not State.OPERATION_ENABLED
 
@@ -108,7 +112,7 @@ async def test_stop_in_a_gap_is_final() -> None:
             look(block)
             if x.gaps and x.track[-1][0] > 1.3:
                 b.axis.stopped = True
-                x.hold.release("STOP")
+                x.hold.release(text("motion.stop-was-pressed"))
 
         x.look = looked  # type: ignore[method-assign]
         await x.jog()

@@ -15,6 +15,7 @@ from backend.axis.cyclic import CyclicSession
 from backend.drive.drive import Drive
 from backend.drive.ports import Port
 from backend.tools.jog.cyclic import jog_cyclic
+from backend.tools.jog.release import END_OF_JOG
 from backend.tools.jog.run import Hold, JogSettings, jog
 from drivers.canopen.link import CanopenLink
 from drivers.cia402 import State
@@ -52,7 +53,7 @@ async def _hold_for(hold: Hold, seconds: float) -> None:
     while time.monotonic() < until:
         hold.renew()
         await asyncio.sleep(0.02)
-    hold.release("let go")
+    hold.release(END_OF_JOG["released"])
 
 
 @pytest.mark.parametrize("axis", sorted({"generic402", "ds_c"} & set(drive_names())), indirect=True)
@@ -62,7 +63,7 @@ async def test_jog_by_short_moves(axis: Axis) -> None:
     holding = asyncio.create_task(_hold_for(hold, 0.6))
     result = await jog(axis, SETTINGS, hold, lambda *_: None)
     await holding
-    assert result["reason"] == "let go"
+    assert result["reason_message"] == END_OF_JOG["released"].to_wire()
     assert await axis.position_raw() > start
     assert await axis.state() is not State.OPERATION_ENABLED
 
@@ -76,7 +77,7 @@ async def test_jog_with_process_data(axis: Axis) -> None:
     holding = asyncio.create_task(_hold_for(hold, 0.6))
     result = await jog_cyclic(axis, session, SETTINGS, hold, lambda *_: None)
     await holding
-    assert result["reason"] == "let go"
+    assert result["reason_message"] == END_OF_JOG["released"].to_wire()
     assert await axis.position_raw() > start
     assert await axis.state() is not State.OPERATION_ENABLED
     await session.stop()

@@ -20,6 +20,7 @@ from backend.drive.drive import Drive
 from backend.drive.ports import Port
 from backend.tools.jog.cyclic import jog_cyclic
 from backend.tools.jog.hold import Hold
+from backend.tools.jog.release import END_OF_JOG
 from backend.tools.jog.run import JogSettings
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.run import sweep
@@ -86,7 +87,7 @@ async def jogged(way: Way) -> None:
             page_s[0] += 0.05
             hold.renew()
             await asyncio.sleep(0.05)
-        hold.release("released")
+        hold.release(END_OF_JOG["released"])
 
     holding = asyncio.create_task(held())
     try:
@@ -94,7 +95,7 @@ async def jogged(way: Way) -> None:
     finally:
         holding.cancel()
     moved = way.position() - before
-    assert result["reason"] == "released", result
+    assert result["reason_message"] == END_OF_JOG["released"].to_wire(), result
     assert result["moved_rev"] == pytest.approx(moved / INCREMENTS_PER_REV, abs=1e-3)
     assert moved > 1000
 

@@ -5390,6 +5390,13 @@ export interface components {
             notes: string;
             /** Source */
             source: string;
+            /**
+             * States
+             * @description what each value of the status means
+             */
+            states?: {
+                [key: string]: "idle" | "preparation" | "resistance" | "ready_for_inductance" | "inductance_d" | "inductance_q" | "sensor_bias" | "torque_constant" | "torque_constant_limited" | "inertia" | "inertia_again" | "inertia_limited" | "complete" | "homing" | "acceleration_design" | "error_handling" | "error" | "waiting" | "jog_homing";
+            };
             /** Status Key */
             status_key: string;
             /** Warning */
@@ -5763,9 +5770,10 @@ export interface components {
             invitation: string;
             /**
              * Reason
-             * @default
+             * @default released
+             * @enum {string}
              */
-            reason: string;
+            reason: "released" | "pointer-cancelled" | "focus-lost" | "page-hidden" | "page-left" | "page-silent" | "escape" | "another-key" | "another-jog" | "another-guest" | "axis-changed" | "connection-lost" | "stop";
             /**
              * Type
              * @default enable_release
@@ -8291,8 +8299,13 @@ export interface components {
              * @enum {string}
              */
             state: "open" | "joined" | "ended";
-            /** Why Ended */
+            /**
+             * Why Ended
+             * @description empty while it has not ended
+             */
             why_ended: string;
+            /** @description of why_ended, as code and facts */
+            why_ended_message?: components["schemas"]["MessageInfo"] | null;
         };
         /**
          * IoInfo
@@ -8376,15 +8389,35 @@ export interface components {
         };
         /**
          * JogEnded
-         * @description The jog of this connection ended, and why.
+         * @description The jog of this connection ended: why, or with which problem; the words are for whoever
+         *     jogs.
          */
         JogEnded: {
             /** Drive */
             drive: string;
             /** @default null */
             problem: components["schemas"]["Problem"] | null;
-            /** Reason */
+            /**
+             * Reason
+             * @description empty where the problem states it
+             */
             reason: string;
+            /**
+             * @description of reason, as code and facts
+             * @default null
+             */
+            reason_message: components["schemas"]["MessageInfo"] | null;
+            /**
+             * Remedy
+             * @description what to do about the reason; empty where nothing is known
+             * @default
+             */
+            remedy: string;
+            /**
+             * @description of remedy, as code and facts
+             * @default null
+             */
+            remedy_message: components["schemas"]["MessageInfo"] | null;
             /**
              * Type
              * @default jog_ended
@@ -8532,9 +8565,10 @@ export interface components {
             press: number;
             /**
              * Reason
-             * @default
+             * @default released
+             * @enum {string}
              */
-            reason: string;
+            reason: "released" | "pointer-cancelled" | "focus-lost" | "page-hidden" | "page-left" | "page-silent" | "escape" | "another-key" | "another-jog" | "another-guest" | "axis-changed" | "connection-lost" | "stop";
             /**
              * Type
              * @default jog_stop
@@ -10241,7 +10275,10 @@ export interface components {
             remedy?: string | null;
             /** Status */
             status: number;
-            /** Title */
+            /**
+             * Title
+             * @description of the type, in English, the same for every occurrence
+             */
             title: string;
             /**
              * Type
@@ -10319,6 +10356,8 @@ export interface components {
              * @default
              */
             problem: string;
+            /** @description of problem, as code and facts */
+            problem_message?: components["schemas"]["MessageInfo"] | null;
             /** Profile */
             profile: string;
             /** Title */
@@ -12718,6 +12757,13 @@ export interface components {
         StopTaken: {
             /** Drives */
             drives: string[];
+            /**
+             * Problem Messages
+             * @description of problems, as code and facts, by the same drives
+             */
+            problem_messages?: {
+                [key: string]: components["schemas"]["MessageInfo"];
+            };
             /**
              * Problems
              * @description drives that did not take it yet, and why

@@ -1,6 +1,6 @@
 import { ActionIcon, Drawer, NativeSelect } from '@mantine/core'
 import { type ReactNode, useEffect, useRef, useState } from 'react'
-import { known, useSay, useT } from '../i18n'
+import { known, problemTitle, useSay, useT } from '../i18n'
 import * as live from '../live/live'
 import { contents, useAxisState, useDrive, useDrives, useLink, useStore } from '../live/store'
 import { clock } from '../widgets/format'
@@ -346,8 +346,7 @@ function Refused() {
   return (
     <div className="note fault" role="alert">
       <p>
-        <strong>{known(t, 'problemTitle', refused.problem.title)}</strong>{' '}
-        {say.detail(refused.problem)}
+        <strong>{problemTitle(t, refused.problem)}</strong> {say.detail(refused.problem)}
       </p>
       {refused.problem.remedy && (
         <p>

@@ -4,6 +4,7 @@ import type { InvitationView } from '../api/schema'
 import { useT } from '../i18n'
 import * as live from '../live/live'
 import { usePeople } from '../live/people'
+import type { Release } from '../live/protocol'
 import { contents, subscribe, useDrives } from '../live/store'
 import { clock } from '../widgets/format'
 import { Icon } from '../widgets/Icon'
@@ -105,13 +106,13 @@ const BEAT_MS = 30
 function EnablingButton({ invitation }: { invitation: InvitationView }) {
   const t = useT()
   const [held, setHeld] = useState(false)
-  const stop = useRef<((why: string) => void) | null>(null)
+  const stop = useRef<((why: Release) => void) | null>(null)
   const press = () => {
     if (stop.current || document.visibilityState !== 'visible') return
     live.enablePress(invitation.id)
     setHeld(true)
     const beat = setInterval(() => live.enableBeat(), BEAT_MS)
-    const release = (why: string) => {
+    const release = (why: Release) => {
       if (stop.current !== release) return
       stop.current = null
       clearInterval(beat)
@@ -122,18 +123,18 @@ function EnablingButton({ invitation }: { invitation: InvitationView }) {
       live.enableRelease(why)
       setHeld(false)
     }
-    const blur = () => release('window lost the focus')
-    const hidden = () => release('page hidden')
+    const blur = () => release('focus-lost')
+    const hidden = () => release('page-hidden')
     window.addEventListener('blur', blur)
     window.addEventListener('pagehide', hidden)
     document.addEventListener('visibilitychange', hidden)
     const off = subscribe('link', () => {
-      if (!contents.link.open) release('connection lost')
+      if (!contents.link.open) release('connection-lost')
     })
     stop.current = release
   }
-  const release = () => stop.current?.('the enabling button was let go')
-  useEffect(() => () => stop.current?.('page left'), [])
+  const release = () => stop.current?.('released')
+  useEffect(() => () => stop.current?.('page-left'), [])
   const down = (event: PointerEvent<HTMLButtonElement>) => {
     if (event.button !== 0) return
     event.currentTarget.setPointerCapture(event.pointerId)

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest'
-import type { Quality } from '../api/schema'
-import { listsFaults, linkLook } from './states'
+import type { AxisState, Quality } from '../api/schema'
+import { listsFaults, linkLook, stateSign } from './states'
 
 const quality = (part: Partial<Quality>): Quality => ({
   connected: true,
@@ -32,6 +32,24 @@ describe('link quality in a word', () => {
       details: { cyclic_cycles: 100_000 },
     })
     expect(linkLook(cyclic).word).toBe('good')
+  })
+})
+
+describe('the sign of a state in the 3D scene', () => {
+  // As `look_of` of the server: torque, none, a fault, not known.
+  it.each([
+    ['Not ready to switch on', 'O'],
+    ['Switch on disabled', 'O'],
+    ['Ready to switch on', 'O'],
+    ['Switched on', 'O'],
+    ['Operation enabled', 'I'],
+    ['Quick stop active', 'I'],
+    ['Fault reaction active', '!'],
+    ['Fault', '!'],
+    ['Unknown', '?'],
+  ])('of %s is %s', (state, sign) => {
+    expect(stateSign({ state, fresh: true } as AxisState)).toBe(sign)
+    expect(stateSign({ state, fresh: false } as AxisState)).toBe('?')
   })
 })
 

@@ -21,6 +21,24 @@ export function stateLook(state: AxisState | null): { tone: string; icon: IconNa
   }
 }
 
+/**
+ * The sign of a state in the 3D scene, as `look_of` in backend/scene/feed.py gives it: I where the
+ * motor has torque, O where it has none, ! with a fault, ? where the state is not known.
+ */
+export function stateSign(state: AxisState | null): 'I' | 'O' | '!' | '?' {
+  if (!state?.fresh || state.state === 'Unknown') return '?'
+  switch (state.state) {
+    case 'Operation enabled':
+    case 'Quick stop active':
+      return 'I'
+    case 'Fault':
+    case 'Fault reaction active':
+      return '!'
+    default:
+      return 'O'
+  }
+}
+
 /** Counters that mean trouble on a link. */
 function troubles(quality: Quality): number {
   return (

@@ -44,7 +44,7 @@ export async function stopEverything(): Promise<void> {
   pressed = mine.at
   try {
     live.send({ type: 'stop', drive: null })
-    live.jogStop('STOP')
+    live.jogStop('stop')
   } catch (error) {
     console.error('STOP could not be sent over the websocket', error)
   }

@@ -90,6 +90,15 @@ export function known(t: T, prefix: string, text: string): string {
   return key in catalogue ? t(key as Key) : text
 }
 
+const PROBLEM = 'urn:servodeck:'
+
+/** What kind of problem it is, by its type; the server's own title is English for everybody. */
+export function problemTitle(t: T, problem: Problem): string {
+  const kind = problem.type.startsWith(PROBLEM) ? problem.type.slice(PROBLEM.length) : ''
+  const title = known(t, 'problemTitle', kind)
+  return title === kind ? t('problem.title') : title
+}
+
 function useTexts(): Language {
   useSyncExternalStore(
     (listener) => {

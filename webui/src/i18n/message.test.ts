@@ -1,5 +1,5 @@
 import { beforeAll, describe, expect, it } from 'vitest'
-import { sayIn } from './index'
+import { problemTitle, sayIn, type T, translate } from './index'
 import { formatted, load, words } from './message'
 
 beforeAll(async () => {
@@ -73,6 +73,18 @@ describe('a message of the server', () => {
     expect(sayIn('zh').detail(problem)).toBe('canopen://x 未打开')
     expect(sayIn('zh').remedy(problem)).toBe('请先打开总线')
     expect(sayIn('en').detail({ ...problem, code: null, params: { words: 'x' } })).toBe('as said')
+  })
+})
+
+describe('the title of a problem', () => {
+  const zh: T = (key, variables) => translate('zh', key, variables)
+  const problem = (type: string) => ({ type, title: 'In use', status: 409, detail: '' })
+  it('is that of its type, and never the English one of the server', () => {
+    expect(problemTitle(zh, problem('urn:servodeck:busy'))).toBe('正在使用')
+    expect(problemTitle(zh, problem('urn:servodeck:not-granted'))).toBe('需要运动许可')
+    for (const type of ['urn:servodeck:of-another-version', 'about:blank', '']) {
+      expect(problemTitle(zh, problem(type))).toBe('操作未成功。')
+    }
   })
 })
 

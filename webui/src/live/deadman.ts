@@ -1,4 +1,5 @@
 import type { JogRenew, JogStart } from '../api/schema'
+import type { Release } from './protocol'
 
 /** Time between signs of life sent. */
 export const RENEW_MS = 40
@@ -14,7 +15,7 @@ type Send = (
   message:
     | JogStart
     | (Omit<JogRenew, 'sent_ms' | 'sign'> & { sent_ms: number; sign: number })
-    | { type: 'jog_stop'; drive: string; press: number; reason: string },
+    | { type: 'jog_stop'; drive: string; press: number; reason: Release },
 ) => boolean
 
 /**
@@ -44,7 +45,7 @@ export class DeadMan {
 
   /** False when the message could not be sent; nothing is held then. */
   start(message: JogStart): boolean {
-    if (this.drive !== null) this.stop('another jog began')
+    if (this.drive !== null) this.stop('another-jog')
     this.press += 1
     this.sign = 0
     this.released = null
@@ -65,11 +66,11 @@ export class DeadMan {
   tick(): void {
     if (this.drive === null) return this.repeatRelease()
     const silent = this.now() - this.heard
-    if (silent > SILENCE_MS) this.stop('the page fell silent')
+    if (silent > SILENCE_MS) this.stop('page-silent')
     else if (!this.give(this.drive, this.press, true, silent)) this.drive = null
   }
 
-  stop(reason: string): void {
+  stop(reason: Release): void {
     if (this.drive === null) return
     const drive = this.drive
     this.drive = null

@@ -44,8 +44,8 @@ describe('the enabling button', () => {
   it('is let go once, and not at all without a connection', () => {
     const { hold, sent, close } = rig()
     hold.press('i')
-    hold.release('up')
-    hold.release('up')
+    hold.release('released')
+    hold.release('released')
     close()
     hold.press('i')
     hold.tick()

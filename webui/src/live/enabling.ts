@@ -1,10 +1,12 @@
+import type { Release } from './protocol'
+
 /** With the 40 ms between looks the motion ends within 200 ms of the page's last sign of life. */
 export const SILENCE_MS = 140
 
 type Send = (
   message:
     | { type: 'enable_press' | 'enable_renew'; invitation: string }
-    | { type: 'enable_release'; invitation: string; reason: string },
+    | { type: 'enable_release'; invitation: string; reason: Release },
 ) => boolean
 
 /**
@@ -21,7 +23,7 @@ export class EnablingHold {
   ) {}
 
   press(invitation: string): void {
-    if (this.invitation !== null) this.release('another guest')
+    if (this.invitation !== null) this.release('another-guest')
     if (!this.send({ type: 'enable_press', invitation })) return
     this.invitation = invitation
     this.heard = this.now()
@@ -36,13 +38,13 @@ export class EnablingHold {
 
   tick(): void {
     if (this.invitation === null) return
-    if (this.now() - this.heard > SILENCE_MS) this.release('the page fell silent')
+    if (this.now() - this.heard > SILENCE_MS) this.release('page-silent')
     else if (!this.send({ type: 'enable_renew', invitation: this.invitation })) {
       this.invitation = null
     }
   }
 
-  release(reason: string): void {
+  release(reason: Release): void {
     if (this.invitation === null) return
     const invitation = this.invitation
     this.invitation = null

@@ -50,7 +50,7 @@ describe('dead man', () => {
     deadMan.start(start)
     clock.now = SILENCE_MS + 1
     deadMan.tick()
-    expect(sent.at(-1)).toMatchObject({ type: 'jog_stop', reason: 'the page fell silent' })
+    expect(sent.at(-1)).toMatchObject({ type: 'jog_stop', reason: 'page-silent' })
     deadMan.beat('x')
     deadMan.tick()
     expect(sent.filter((message) => message.pressed)).toHaveLength(0)

@@ -41,6 +41,9 @@ import type {
   WatchValues,
 } from '../api/schema'
 
+/** Why a held button was released; the words are made where they are shown. */
+export type Release = NonNullable<JogStop['reason']>
+
 export type FromPage =
   | WatchState
   | WatchValues

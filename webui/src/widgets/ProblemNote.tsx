@@ -1,6 +1,6 @@
 import { UNREACHABLE } from '../api/client'
 import type { Problem } from '../api/schema'
-import { known, useSay, useT } from '../i18n'
+import { problemTitle, useSay, useT } from '../i18n'
 import { FORGOTTEN } from '../live/store'
 
 /** What happened, to which drive and parameter, the limit, and what to try. */
@@ -23,11 +23,7 @@ export function ProblemNote({
     <div className="note fault" role="alert">
       {about && <p className="dim">{about}</p>}
       <p>
-        <strong>
-          {unreachable
-            ? t('problem.unreachable')
-            : known(t, 'problemTitle', problem.title) || t('problem.title')}
-        </strong>{' '}
+        <strong>{unreachable ? t('problem.unreachable') : problemTitle(t, problem)}</strong>{' '}
         {forgotten ? t('problem.forgotten') : say.detail(problem)}
       </p>
       {problem.limit && (

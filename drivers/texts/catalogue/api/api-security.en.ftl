@@ -1,5 +1,13 @@
 api-security_address-server-not-answers = the server does not accept this address
     .remedy = open the address that the terminal shows
+api-security_body-half-character = the body of the request is refused: it has half of a surrogate pair (\ud800 to \udfff), which is no character
+    .remedy = send whole characters
+api-security_body-no-length = the body of the request is refused: it is not stated where it ends, or in two ways
+    .remedy = send its length, once
+api-security_body-too-large = the body of the request is refused: it is too large
+    .remedy = send less
+api-security_body-too-slow = the body of the request is refused: it came too slowly
+    .remedy = send it faster
 api-security_connection-page-asked-ended = the connection of the page that sent this request has ended: nothing was done
     .remedy = wait until the page is connected again, check the axis, then repeat the request
 api-security_connections-log-open = this session already has { $most_per_session } open connections, the permitted maximum

@@ -1,5 +1,13 @@
 api-security_address-server-not-answers = 服务器不响应此地址
     .remedy = 请打开终端显示的地址
+api-security_body-half-character = 请求内容被拒绝：其中含有半个代理对（\ud800 至 \udfff），不是字符
+    .remedy = 请发送完整的字符
+api-security_body-no-length = 请求内容被拒绝：未说明其结束位置，或说明了两次
+    .remedy = 请只发送一次其长度
+api-security_body-too-large = 请求内容被拒绝：内容过大
+    .remedy = 请减少发送的内容
+api-security_body-too-slow = 请求内容被拒绝：发送过慢
+    .remedy = 请加快发送
 api-security_connection-page-asked-ended = 发出请求的页面连接已结束：未执行任何操作
     .remedy = 请等待页面重新连接，查看轴后再次请求
 api-security_connections-log-open = 此会话已打开 { $most_per_session } 个连接，达到上限

@@ -122,7 +122,6 @@ printed_samples = { $file }: { $samples } samples, { $lost } lost on the way
 printed_saved-in-drive = { $drive }: saved in the drive's memory
 printed_scale-not-certain = NOT CERTAIN: { $why }
 printed_scan-code = {"  "}or scan this with a phone in the same network: { $url }
-printed_see-profile-check = see `servodeck profile check`
 printed_serial = serial { $serial }
 printed_server-cut-off = note: { $drive }: a server was cut off on { $since } and left temporary values, which are not the drive's own: { $values }
           restore them: servodeck params restore { $url } --station { $station }

@@ -119,7 +119,6 @@ printed_samples = { $file }：{ $samples } 个采样，途中丢失 { $lost } �
 printed_saved-in-drive = { $drive }：已保存到驱动器存储器
 printed_scale-not-certain = 不确定：{ $why }
 printed_scan-code = {"  "}或用同一网络中的手机扫描：{ $url }
-printed_see-profile-check = 参见 `servodeck profile check`
 printed_serial = 序列号 { $serial }
 printed_server-cut-off = 注意：{ $drive }：服务器于 { $since } 中断，留下了临时更改的值，这些不是驱动器自己的值：{ $values }
           恢复命令：servodeck params restore { $url } --station { $station }

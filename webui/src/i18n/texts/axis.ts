@@ -134,24 +134,7 @@ export const axis = {
     '本页面的响应中断，因此轴已制动。',
   ],
   'jog.ended': ['Ended: {reason}', '已结束：{reason}'],
-  'reason.released': ['released', '已松开'],
-  'reason.page hidden': ['page hidden', '页面被隐藏'],
-  'reason.window lost the focus': ['window lost the focus', '窗口失去焦点'],
-  'reason.pointer cancelled': ['pointer cancelled', '触控被取消'],
-  'reason.another key': ['another key or button', '按下了其他按键'],
-  'reason.the page fell silent': [
-    'this device was too busy to keep the signal alive. Close other programs and tabs, then hold again',
-    '本设备过于繁忙，无法维持按住。请关闭其他程序和标签页后再按住',
-  ],
-  'reason.no sign of life from the page for 500 ms': [
-    'no signal from the page for 500 ms: the network is slow, or this device is busy. Hold again',
-    '页面 500 毫秒无响应。网络慢或设备繁忙？请重新按住',
-  ],
-  'reason.no sign of life from the page for 200 ms': [
-    'no signal from the page for 200 ms: the network is slow, or this device is busy. Hold again',
-    '页面 200 毫秒无响应。网络慢或设备繁忙？请重新按住',
-  ],
-  'reason.cancelled': ['stopped', '已停止'],
+  'jog.endedRemedy': ['Ended: {reason}. Try: {remedy}', '已结束：{reason}。请尝试：{remedy}'],
   'start.not': ['Not begun.', '未开始。'],
   'start.noConnection': [
     'There is no connection to the server. It is restored automatically; then press again.',

@@ -2,7 +2,7 @@ import { Button, Modal, NativeSelect } from '@mantine/core'
 import { useCallback, useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { FoundDrive, ImportedDescription, ProfileInfo } from '../../api/schema'
-import { useT } from '../../i18n'
+import { useSay, useT } from '../../i18n'
 import { useLink } from '../../live/store'
 import { Icon } from '../../widgets/Icon'
 import { Panel } from '../../widgets/Panel'
@@ -36,6 +36,7 @@ export function NotListedButton({
 /** Import without a drive at hand, and export of what there is. */
 export function NotListedPanel() {
   const t = useT()
+  const say = useSay()
   const { open } = useLink()
   const [profiles, setProfiles] = useState<ProfileInfo[]>([])
   const [chosen, setChosen] = useState('')
@@ -46,7 +47,7 @@ export function NotListedPanel() {
     if (open) refresh()
   }, [open, refresh])
   const profile = profiles.find((each) => each.profile === chosen) ?? profiles[0]
-  const broken = profile?.problem ?? ''
+  const broken = say.message(profile?.problem_message, profile?.problem)
   return (
     <Panel title={t('notListed.title')}>
       <details>

@@ -1,9 +1,9 @@
 import { Button, Checkbox, SegmentedControl } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask, problemOf } from '../../api/client'
-import type { ForcingInfo } from '../../api/schema'
+import type { ForcingInfo, MessageInfo } from '../../api/schema'
 import { plainResult } from '../../api/results'
-import { useT } from '../../i18n'
+import { useSay as useMessages, useT } from '../../i18n'
 import { useJob } from '../../live/store'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
@@ -29,12 +29,13 @@ export function ForcingPanel({
 }) {
   const t = useT()
   const say = useSay(drive)
+  const speak = useMessages()
   const [agreed, setAgreed] = useState(false)
   const [mine, setMine] = useState<ForcingInfo | null>(null)
   const act = useAction()
   const job = useJob(mine?.job ?? forcing.job ?? null)
   const path = { drive_id: drive, name: forcing.name }
-  const plain = plainResult(job?.result)
+  const plain = plainResult(job?.result) as { reason?: string; reason_message?: MessageInfo | null }
   const over = mine !== null && job !== null && job.state !== 'running'
   useEffect(() => {
     if (!mine || over) return
@@ -98,7 +99,7 @@ export function ForcingPanel({
       {over && job?.problem && <ProblemNote problem={job.problem} onClose={() => setMine(null)} />}
       {over && !job?.problem && (
         <p className="note info" role="status">
-          {typeof plain.reason === 'string' ? plain.reason : ''}
+          {speak.message(plain.reason_message, plain.reason)}
         </p>
       )}
       {!holding && forcing.running && !mine ? (

@@ -1,6 +1,6 @@
 import { type KeyboardEvent, type PointerEvent, useEffect, useRef, useState } from 'react'
-import type { AxisState } from '../../api/schema'
-import { known, useSay, useT } from '../../i18n'
+import type { AxisState, JogEnded } from '../../api/schema'
+import { type Say, type T, useSay, useT } from '../../i18n'
 import { useJob } from '../../live/store'
 import { quantity } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
@@ -66,7 +66,7 @@ export function JogPanel({
   const keyDown = (event: KeyboardEvent) => {
     const towards = keys[event.key]
     if (towards === undefined || event.target !== pad.current) {
-      if (hold.held !== null && !event.repeat) hold.release('another key')
+      if (hold.held !== null && !event.repeat) hold.release('another-key')
       return
     }
     event.preventDefault()
@@ -93,7 +93,7 @@ export function JogPanel({
         aria-label={t('jog.pad')}
         onKeyDown={keyDown}
         onKeyUp={keyUp}
-        onBlur={() => hold.release('window lost the focus')}
+        onBlur={() => hold.release('focus-lost')}
       >
         <JogButton
           towards={-1}
@@ -149,12 +149,19 @@ export function JogPanel({
       )}
       {ended && !ended.problem && (
         <p className="note" role="status">
-          {t('jog.ended', { reason: known(t, 'reason', ended.reason) })}
+          {endOf(ended, t, say)}
         </p>
       )}
       <ProblemNote problem={ended?.problem ?? null} />
     </Panel>
   )
+}
+
+/** Why a jog ended, and what to do about it. */
+function endOf(ended: JogEnded, t: T, say: Say): string {
+  const reason = say.message(ended.reason_message, ended.reason)
+  const remedy = say.message(ended.remedy_message, ended.remedy)
+  return t(remedy ? 'jog.endedRemedy' : 'jog.ended', { reason, remedy })
 }
 
 const shown = (value: number | null | undefined, convert: (value: number) => number) =>
@@ -172,7 +179,7 @@ function JogButton({
   held: -1 | 1 | null
   disabled: boolean
   press: (towards: -1 | 1) => boolean
-  hold: { held: -1 | 1 | null; release(reason: 'released' | 'pointer cancelled'): void }
+  hold: { held: -1 | 1 | null; release(reason: 'released' | 'pointer-cancelled'): void }
   pad: React.RefObject<HTMLDivElement | null>
 }) {
   const t = useT()
@@ -181,7 +188,7 @@ function JogButton({
     if (event.button !== 0) return
     event.preventDefault()
     if (hold.held !== null) {
-      hold.release('pointer cancelled')
+      hold.release('pointer-cancelled')
       return
     }
     if (disabled) {
@@ -193,7 +200,7 @@ function JogButton({
     pad.current?.focus({ preventScroll: true })
     if (press(towards)) pointer.current = event.pointerId
   }
-  const up = (reason: 'released' | 'pointer cancelled') => (event: PointerEvent) => {
+  const up = (reason: 'released' | 'pointer-cancelled') => (event: PointerEvent) => {
     if (pointer.current !== event.pointerId) return
     pointer.current = null
     hold.release(reason)
@@ -208,8 +215,8 @@ function JogButton({
       aria-disabled={disabled}
       onPointerDown={down}
       onPointerUp={up('released')}
-      onPointerCancel={up('pointer cancelled')}
-      onLostPointerCapture={up('pointer cancelled')}
+      onPointerCancel={up('pointer-cancelled')}
+      onLostPointerCapture={up('pointer-cancelled')}
       onContextMenu={(event) => event.preventDefault()}
     >
       <Icon name={towards > 0 ? 'right' : 'left'} size={40} />

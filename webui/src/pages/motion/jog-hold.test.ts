@@ -50,9 +50,9 @@ describe('jog hold', () => {
     expect(log.filter((line) => line === 'beat')).toHaveLength(10)
     page.visible = false
     hold.asked()
-    expect(log.at(-1)).toBe('stop page hidden')
+    expect(log.at(-1)).toBe('stop page-hidden')
     hold.asked()
-    expect(log.at(-1)).toBe('stop page hidden')
+    expect(log.at(-1)).toBe('stop page-hidden')
   })
   it('counts only a drawn frame after it was busy, as a release may be waiting', () => {
     const { log, page, hold, draw } = make()
@@ -96,7 +96,7 @@ describe('jog hold', () => {
     const { log, hold } = make()
     hold.press(1)
     expect(hold.press(-1)).toBe(false)
-    expect(log).toEqual(['start 1', 'stop another key'])
+    expect(log).toEqual(['start 1', 'stop another-key'])
     expect(hold.held).toBeNull()
   })
 })

@@ -1,14 +1,4 @@
-/** What ends a hold, as text that go to the server's log. */
-export type ReleaseReason =
-  | 'released'
-  | 'pointer cancelled'
-  | 'window lost the focus'
-  | 'page hidden'
-  | 'page left'
-  | 'Esc'
-  | 'another key'
-  | 'connection lost'
-  | 'axis changed'
+import type { Release } from '../../live/protocol'
 
 /**
  * After so long without a beat the page was too busy to see a release. Only a drawn frame counts
@@ -19,7 +9,7 @@ export const BUSY_MS = 120
 interface Port {
   start(direction: -1 | 1): void
   beat(): void
-  stop(reason: ReleaseReason): void
+  stop(reason: Release): void
   /** Called with the direction, or null, whenever it changes. */
   changed(direction: -1 | 1 | null): void
 }
@@ -56,7 +46,7 @@ export class JogHold {
   press(direction: -1 | 1): boolean {
     if (this.direction !== null) {
       // Two buttons at once is no clear wish: stop.
-      this.release('another key')
+      this.release('another-key')
       return false
     }
     if (!this.around.isVisible() || !this.around.hasFocus()) return false
@@ -68,7 +58,7 @@ export class JogHold {
     return true
   }
 
-  release(reason: ReleaseReason): void {
+  release(reason: Release): void {
     if (this.direction === null) return
     this.around.cancelFrame(this.frame)
     this.direction = null
@@ -83,8 +73,8 @@ export class JogHold {
   }
 
   private beat(): void {
-    if (!this.around.isVisible()) return this.release('page hidden')
-    if (!this.around.hasFocus()) return this.release('window lost the focus')
+    if (!this.around.isVisible()) return this.release('page-hidden')
+    if (!this.around.hasFocus()) return this.release('focus-lost')
     this.beaten = this.around.now()
     this.port.beat()
   }

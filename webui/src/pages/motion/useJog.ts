@@ -51,13 +51,13 @@ export function useJog(drive: string, settings: JogSettings | null) {
     [drive],
   )
   useEffect(() => {
-    const hidden = () => document.visibilityState !== 'visible' && hold.release('page hidden')
-    const frozen = () => hold.release('page hidden')
-    const blur = () => hold.release('window lost the focus')
-    const leave = () => hold.release('page left')
-    const key = (event: KeyboardEvent) => event.key === 'Escape' && hold.release('Esc')
-    const lost = subscribe('link', () => !contents.link.open && hold.release('connection lost'))
-    const refused = subscribe('jogRefused', () => hold.release('connection lost'))
+    const hidden = () => document.visibilityState !== 'visible' && hold.release('page-hidden')
+    const frozen = () => hold.release('page-hidden')
+    const blur = () => hold.release('focus-lost')
+    const leave = () => hold.release('page-left')
+    const key = (event: KeyboardEvent) => event.key === 'Escape' && hold.release('escape')
+    const lost = subscribe('link', () => !contents.link.open && hold.release('connection-lost'))
+    const refused = subscribe('jogRefused', () => hold.release('connection-lost'))
     const asked = subscribe('jogAsked', () => hold.asked())
     const paused = subscribe('jogGap', () => {
       if (contents.jogGap?.drive === drive) setGap(contents.jogGap)
@@ -79,7 +79,7 @@ export function useJog(drive: string, settings: JogSettings | null) {
     document.addEventListener('freeze', frozen)
     window.addEventListener('keydown', key, { capture: true })
     return () => {
-      hold.release('axis changed')
+      hold.release('axis-changed')
       setBegun(false)
       for (const end of [lost, refused, asked, paused, over, turnedDown]) end()
       document.removeEventListener('visibilitychange', hidden)

@@ -4,6 +4,7 @@ import { useT } from '../../i18n'
 import { useDrives } from '../../live/store'
 import { stopByEscapeIn } from '../../widgets/frame-stop'
 import { cameraFor, written } from './camera'
+import { SceneStates } from './SceneStates'
 
 /**
  * viser's page in a frame of our origin, in the page's own light. With `axis` the camera begins
@@ -24,12 +25,15 @@ export function SceneFrame({ axis, className = '' }: { axis?: string; className?
   })
   if (dark) query.set('darkMode', '')
   return (
-    <iframe
-      ref={frame}
-      className={`viewer ${className}`}
-      title={t('scene.frame')}
-      src={`/viser/?${query}`}
-      onLoad={() => stopByEscapeIn(frame.current)}
-    />
+    <div className="scene">
+      <iframe
+        ref={frame}
+        className={`viewer ${className}`}
+        title={t('scene.frame')}
+        src={`/viser/?${query}`}
+        onLoad={() => stopByEscapeIn(frame.current)}
+      />
+      <SceneStates {...(axis === undefined ? {} : { axis })} />
+    </div>
   )
 }
