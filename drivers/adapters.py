@@ -7,7 +7,7 @@ the libraries beneath understand far more than an adapter's name: pyserial opens
 serial port can have effects by itself (a watchdog begins to count). So only these pass:
 
 - a serial port: an absolute path that leads to a serial device, or ``COM1`` … ``COM999``;
-- a network interface by its name;
+- a network interface by its name, or a network adapter of Windows by its ``NPF_{…}``;
 - a channel of one of python-can's interfaces, in the form that this interface has.
 
 `require_serial_form` looks at the text alone, so that an address can be judged on any computer;
@@ -25,6 +25,7 @@ from pathlib import Path
 
 from serial.tools import list_ports
 
+from drivers.computer.packet_capture import NPF_NAME
 from drivers.computer.terminals import has_descriptor, own_terminals
 from drivers.errors import LinkLost, OutOfRange
 from drivers.texts.message import text
@@ -109,6 +110,18 @@ def require_interface(name: str) -> None:
             value=name,
             limit=text("limit.interface-name"),
         )
+
+
+def require_ethercat_adapter(name: str) -> None:
+    """The text is the name of a network interface, or ``NPF_{GUID}`` as Windows' adapters have it.
+
+    What is opened is taken from the system's own list; the form alone opens nothing.
+
+    Raises:
+        OutOfRange: it is neither.
+    """
+    if not NPF_NAME.fullmatch(name):
+        require_interface(name)
 
 
 def _require_multicast(channel: str) -> None:

@@ -9,13 +9,12 @@ step from sample to sample is at most 2·sin(π/10) = 0.62 of its amplitude, the
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 from backend.preflight.findings import Code, Effect, Finding
-from drivers.computer.lateness import Measured
+from drivers.computer.lateness import Measured, missed_bound
 
 
 class Purpose(StrEnum):
@@ -62,22 +61,6 @@ _SHARES = {
     Purpose.RESPONSE_1_KHZ: (0.001, 0.01),
     Purpose.RESPONSE_4_KHZ: (0.001, 0.01),
 }
-
-
-def missed_bound(missed: int, cycles: int) -> float:
-    """One-sided 95 % bound of the share (Wilson's score with continuity, conservative at 0).
-
-    With none missed it is the rule of three, 3 / cycles (Hanley and Lippman-Hand 1983).
-    """
-    if cycles <= 0:
-        return 1.0
-    if missed == 0:
-        return min(1.0, 3.0 / cycles)
-    z = 1.645
-    share = min(1.0, (missed + 0.5) / cycles)
-    centre = share + z * z / (2 * cycles)
-    half = z * math.sqrt(share * (1 - share) / cycles + z * z / (4 * cycles * cycles))
-    return min(1.0, (centre + half) / (1 + z * z / cycles))
 
 
 def verdicts(found: Sequence[Finding], measured: Mapping[int, Measured]) -> list[Verdict]:

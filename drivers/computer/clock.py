@@ -6,6 +6,11 @@ import sys
 import time
 
 
+def resolution_s() -> float:
+    """The steps of `time.monotonic`: 15.6 ms on Windows before CPython 3.13, else below 1 µs."""
+    return time.get_clock_info("monotonic").resolution
+
+
 def elapsed_s() -> float:
     """Seconds since some time before the start of this process; never set, never back.
 

@@ -7,26 +7,35 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from drivers.computer.packet_capture import adapters
+
 _NET = Path("/sys/class/net")
 _ARPHRD_ETHER, _ARPHRD_CAN = 1, 280
 
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """One interface; ``up`` is whether it can carry frames now (not reported as down)."""
+    """One interface; ``up`` is whether it can carry frames now (not reported as down).
+
+    ``title`` is what a person knows it by, where that is not its name.
+    """
 
     name: str
     up: bool
     is_wired: bool
     is_can: bool
+    title: str = ""
 
 
 def network_interfaces(net: Path = _NET) -> list[Interface]:
-    """What the system lists. Only Linux says of what kind each is; elsewhere none is listed,
-    as EtherCAT and SocketCAN are not available there.
+    """What the system lists. Only Linux says of what kind each is; elsewhere those are listed that
+    the packet capture library can open, wireless ones among them.
     """
     if sys.platform != "linux":
-        return []
+        return [
+            Interface(one.name, up=True, is_wired=True, is_can=False, title=one.title)
+            for one in adapters()
+        ]
     return [_interface(net / name, name) for _, name in socket.if_nameindex()]
 
 

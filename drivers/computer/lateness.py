@@ -72,6 +72,22 @@ class Measured:
     unanswered: int = 0
 
 
+def missed_bound(missed: int, cycles: int) -> float:
+    """One-sided 95 % bound of the share (Wilson's score with continuity, conservative at 0).
+
+    With none missed it is the rule of three, 3 / cycles (Hanley and Lippman-Hand 1983).
+    """
+    if cycles <= 0:
+        return 1.0
+    if missed == 0:
+        return min(1.0, 3.0 / cycles)
+    z = 1.645
+    share = min(1.0, (missed + 0.5) / cycles)
+    centre = share + z * z / (2 * cycles)
+    half = z * math.sqrt(share * (1 - share) / cycles + z * z / (4 * cycles * cycles))
+    return min(1.0, (centre + half) / (1 + z * z / cycles))
+
+
 def from_json(text: str) -> Measured:
     """What the process has printed."""
     found = json.loads(text)

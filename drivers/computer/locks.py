@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import sys
+import tempfile
 from pathlib import Path
+from typing import BinaryIO
 
 if sys.platform == "win32":
     import msvcrt
@@ -44,3 +47,20 @@ def try_lock(descriptor: int) -> bool:
         except BlockingIOError:
             return False
         return True
+
+
+def hold_file(name: str) -> BinaryIO:
+    """Hold a name for this process alone by a locked file in the folder for temporary files, until
+    the file is closed.
+
+    Names of adapters have characters that no file may have, so the file has their digest.
+
+    Raises:
+        OSError: another process holds it, or the file cannot be made.
+    """
+    digest = hashlib.sha256(name.encode()).hexdigest()[:32]
+    descriptor = open_lock_file(Path(tempfile.gettempdir()) / f"servodeck-{digest}.lock")
+    if not try_lock(descriptor):
+        os.close(descriptor)
+        raise BlockingIOError(f"{name} is held by another process")
+    return os.fdopen(descriptor, "rb")

@@ -1,7 +1,8 @@
-"""What is missing on a real interface, and the exact commands that grant it.
+"""What is missing on a real interface, and the exact commands that grant it on Linux.
 
 SOEM opens a raw packet socket (CAP_NET_RAW) and switches the interface to promiscuous mode
 (CAP_NET_ADMIN): both are needed. CAP_SYS_NICE and CAP_IPC_LOCK only make cycles more punctual.
+Windows and macOS need a packet capture library instead: see `drivers.computer.packet_capture`.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.computer.sockets import interface_flags, require_ethercat
+from drivers.computer.packet_capture import adapters, capture_state
+from drivers.computer.sockets import interface_flags
 from drivers.texts.message import Text, joined, text
 
 NEEDED = {"CAP_NET_RAW": 13, "CAP_NET_ADMIN": 12}
@@ -21,7 +23,10 @@ _IFF_UP = 1
 
 @dataclass(frozen=True, slots=True)
 class Permissions:
-    """``missing`` prevents EtherCAT, ``advised`` makes it more punctual; both capability names."""
+    """``missing`` prevents EtherCAT, ``advised`` makes it more punctual; both capability names.
+
+    ``capture`` is why the packet capture library cannot be used, ``capture_remedy`` what helps.
+    """
 
     interface: str
     exists: bool
@@ -29,15 +34,19 @@ class Permissions:
     missing: tuple[str, ...]
     advised: tuple[str, ...]
     commands: tuple[str, ...]
+    capture: Text | None = None
+    capture_remedy: Text | None = None
 
     @property
     def ready(self) -> bool:
         """Whether EtherCAT can be opened on this interface."""
-        return self.exists and self.up and not self.missing
+        return self.exists and self.up and not self.missing and self.capture is None
 
     @property
     def text(self) -> Text:
         """What is missing, as one message for the user."""
+        if self.capture is not None:
+            return self.capture
         if not self.exists:
             return text("computer.no-interface", interface=self.interface)
         parts = []
@@ -54,14 +63,13 @@ class Permissions:
 def check(interface: str, *, status: str | None = None, python: str | None = None) -> Permissions:
     """Look at the capabilities of this process and at the interface.
 
+    Elsewhere than on Linux at the packet capture library and its list of adapters.
+
     ``status`` is the text of /proc/self/status and ``python`` the interpreter's path, given only
     by tests.
-
-    Raises:
-        NotAllowed: this system has no EtherCAT (Windows, macOS).
     """
     if status is None and sys.platform != "linux":
-        require_ethercat(interface)
+        return captured(interface)
     read = Path("/proc/self/status").read_text("ascii") if status is None else status
     held = _effective(read)
     missing = tuple(name for name, bit in NEEDED.items() if not held >> bit & 1)
@@ -81,6 +89,16 @@ def check(interface: str, *, status: str | None = None, python: str | None = Non
     if exists and not up:
         commands.append(f"sudo ip link set {interface} up")
     return Permissions(interface, exists, up, missing, advised, tuple(commands))
+
+
+def captured(interface: str) -> Permissions:
+    """Look at the packet capture library, and for the adapter in its list."""
+    state = capture_state()
+    if not state.ready:
+        exists = True  # not known yet
+        return Permissions(interface, exists, exists, (), (), (), state.text, state.remedy)
+    exists = any(one.name == interface for one in adapters())
+    return Permissions(interface, exists, exists, (), (), ())
 
 
 def _effective(status: str) -> int:

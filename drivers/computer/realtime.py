@@ -9,6 +9,7 @@ import sys
 from dataclasses import dataclass
 
 from drivers.computer import scheduling
+from drivers.computer.processes import prefer_process
 from drivers.texts.message import Text, text
 
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
@@ -34,15 +35,19 @@ def claim(*, wanted: bool = True) -> RealTime:
     if not wanted:
         return RealTime(0, notes=(text("computer.real-time-not-asked"),))
     notes: list[Text] = []
-    libc = ctypes.CDLL(None, use_errno=True)
     scheduling.fine_timers()
     priority = _PRIORITY if scheduling.real_time(_PRIORITY) else 0
-    if not priority:
-        scheduling.short_slice()
-        notes.append(text("computer.no-real-time"))
-    locked = libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) == 0
-    if not locked:
-        notes.append(text("computer.memory-not-locked"))
+    locked = False
+    if sys.platform == "linux":
+        if not priority:
+            scheduling.short_slice()
+            notes.append(text("computer.no-real-time"))
+        locked = ctypes.CDLL(None, use_errno=True).mlockall(_MCL_CURRENT | _MCL_FUTURE) == 0
+        if not locked:
+            notes.append(text("computer.memory-not-locked"))
+    else:
+        prefer_process()
+        notes.append(text("computer.no-real-time-here"))
     # A pause of the garbage collector is a late cycle; the loop creates no reference cycles.
     scheduling.spare_collector()
     gc.disable()
@@ -51,5 +56,9 @@ def claim(*, wanted: bool = True) -> RealTime:
 
 
 def die_with_parent() -> None:
-    """Have SIGTERM sent to this process when its parent dies; the pipe's end shows as well."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
+    """Have SIGTERM sent to this process when its parent dies; the pipe's end shows as well.
+
+    Linux alone has that; elsewhere the pipe's end is what shows it.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)

@@ -7,35 +7,29 @@ import socket
 import struct
 import sys
 from pathlib import Path
+from typing import BinaryIO
 
+from drivers.computer.locks import hold_file
 from drivers.errors import NotAllowed
+
+#: Whether a process can send and receive Ethernet frames of its own by a socket (packet(7)).
+#: Elsewhere EtherCAT goes through SOEM alone, over a packet capture library.
+RAW_FRAMES = sys.platform == "linux"
 
 if sys.platform == "linux":
     from socket import AF_NETLINK, AF_PACKET, AF_UNIX, MSG_DONTWAIT, NETLINK_ROUTE
 else:
-    # By Linux' numbers (bits/socket.h). Nothing opens them elsewhere: see `require_ethercat`.
+    # By Linux' numbers (bits/socket.h). Nothing opens them elsewhere: see `RAW_FRAMES`.
     AF_UNIX, AF_NETLINK, AF_PACKET, MSG_DONTWAIT, NETLINK_ROUTE = 1, 16, 17, 0x40, 0
 
 _SIOCGIFFLAGS, _SIOCSIFFLAGS = 0x8913, 0x8914
 
 __all__ = [
-    "AF_NETLINK", "AF_PACKET", "AF_UNIX", "MSG_DONTWAIT", "NETLINK_ROUTE",
-    "blocks", "hold_name", "interface_flags", "open_sockets", "receive_with_notes",
-    "require_ethercat", "require_linux", "set_blocking", "set_interface_flags",
+    "AF_NETLINK", "AF_PACKET", "AF_UNIX", "MSG_DONTWAIT", "NETLINK_ROUTE", "RAW_FRAMES",
+    "hold_name", "interface_flags", "open_sockets", "receive_with_notes",
+    "require_linux", "set_blocking", "set_interface_flags",
     "shared_memory_file",
 ]  # fmt: skip
-
-
-def require_ethercat(interface: str) -> None:
-    """EtherCAT needs raw sockets and shared memory as Linux has them.
-
-    Raises:
-        NotAllowed: another system; with what helps.
-    """
-    if sys.platform != "linux":
-        raise NotAllowed(
-            "computer.ethercat-not-available-servodeck", value=interface, limit="Linux"
-        )
 
 
 def require_linux(what: str) -> None:
@@ -48,14 +42,6 @@ def require_linux(what: str) -> None:
         raise NotAllowed(
             "computer.not-available-looks-linux", value=sys.platform, limit="Linux", what=what
         )
-
-
-def blocks(descriptor: int) -> bool:
-    """Whether reading this descriptor waits; True on Windows, where it always does."""
-    if sys.platform == "win32":
-        return True
-    else:  # noqa: RET505 - type checkers follow the branches of a system
-        return os.get_blocking(descriptor)
 
 
 def set_blocking(descriptor: int, wanted: bool) -> None:
@@ -118,13 +104,18 @@ def _flags_by(request: int, interface: str, flags: int) -> int:
     return int(struct.unpack("16sH14x", answer)[1])
 
 
-def hold_name(name: str) -> socket.socket:
-    """A socket that holds this name for this process alone: abstract (unix(7)), so that it belongs
-    to the network namespace as its interfaces do, and goes with the process.
+def hold_name(name: str) -> socket.socket | BinaryIO:
+    """What holds this name for this process alone, and goes with the process.
+
+    On Linux an abstract socket (unix(7)), which belongs to the network namespace as its interfaces
+    do. Elsewhere a locked file in the user's folder for temporary files: another user's process
+    is not seen there.
 
     Raises:
-        OSError: another process holds it, or the system has no such names.
+        OSError: another process holds it.
     """
+    if sys.platform != "linux":
+        return hold_file(name)
     holder = socket.socket(AF_UNIX, socket.SOCK_DGRAM)
     try:
         holder.bind(f"\0{name}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drivers.adapters import require_interface
+from drivers.adapters import require_ethercat_adapter
 from drivers.bus import BusKind, BusUrl
 from drivers.link import Link, LinkTraits
 from drivers.texts.message import text
@@ -25,6 +25,6 @@ BUS = BusKind(
         description="dictionary",
         silent=text("ethercat.check-when-silent"),
     ),
-    require_place=require_interface,
+    require_place=require_ethercat_adapter,
     link=_link,
 )

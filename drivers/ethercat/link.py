@@ -12,12 +12,12 @@ from typing import Any
 
 from drivers import cia402
 from drivers.computer import permissions
-from drivers.computer.sockets import require_ethercat
+from drivers.computer.sockets import RAW_FRAMES
 from drivers.dictionary import Described, EntryDescription, ObjectInfo
 from drivers.doctor.diagnosis import Cause, diagnose
 from drivers.doctor.evidence import Evidence
 from drivers.doctor.examined import Examination
-from drivers.errors import DriveError, NotAllowed
+from drivers.errors import DriveError, LinkLost, NotAllowed
 from drivers.ethercat.bus import BUS
 from drivers.ethercat.doctor import evidence_of
 from drivers.ethercat.eeprom.access import EepromAccess
@@ -25,6 +25,7 @@ from drivers.ethercat.exchange.segmentcyclic import EthercatCyclic
 from drivers.ethercat.process import firmware
 from drivers.ethercat.process.hostprocess import HostProcess
 from drivers.ethercat.process.protocol import Message
+from drivers.ethercat.process.punctuality import Kept
 from drivers.ethercat.process.requested import AlRequests
 from drivers.ethercat.process.survey import ExchangeFigures, Survey, exchange_from, survey_from
 from drivers.ethercat.wire.al_status import AlState
@@ -60,9 +61,12 @@ class EthercatLink:
         url: str | None = None,
         launcher: Sequence[str] = (),
         lockstep: float = 0.0,
+        raw_frames: bool = RAW_FRAMES,
     ) -> None:
         """``lockstep`` only for virtual segments whose time follows the frames: no cycle is
-        skipped then, and time runs at most this many times as fast as real time.
+        skipped then, and time runs at most this many times as fast as real time. Without
+        ``raw_frames`` nothing is used that Linux alone has: frames go through SOEM's own calls,
+        and none are recorded.
         """
         interface = interface.removeprefix(_SCHEME)
         self.interface = interface
@@ -73,11 +77,21 @@ class EthercatLink:
         self._counts = {"transactions": 0, "timeouts": 0}
         self._launched = bool(launcher)
         self._host = HostProcess(
-            interface, launcher, self._received, self._restarted, _options(lockstep)
+            interface,
+            launcher,
+            self._received,
+            self._restarted,
+            _options(lockstep),
+            raw_frames=raw_frames,
         )
+        self._raw_frames = raw_frames
         self.recorder = SegmentRecorder(interface, launcher)
         self.process_data = EthercatCyclic(
-            self._host, self._profiles, self._exchange_changed, self.recorder.note
+            self._host,
+            self._profiles,
+            self._exchange_changed,
+            self.recorder.note,
+            None if raw_frames else Kept(interface),
         )
         self.cyclic: Cyclic | None = self.process_data
         self.eeprom = EepromAccess(self._call, self.read)
@@ -91,11 +105,12 @@ class EthercatLink:
         Raises:
             LinkLost: no such interface, switched off, or a permission is missing; with commands.
             Busy: another servodeck has it.
-            NotAllowed: this system has no EtherCAT (Windows, macOS).
         """
-        require_ethercat(self.interface)
+        if not RAW_FRAMES:
+            _require_capture(self.interface)
         await self._host.start()
-        await self.recorder.start()
+        if self._raw_frames:
+            await self.recorder.start()
 
     async def close(self) -> None:
         """Brake, leave OP, end the host. Calling again does nothing."""
@@ -331,9 +346,9 @@ class EthercatLink:
         return Examination(station, reached, () if reached else causes)
 
     @property
-    def frames(self) -> EthercatLink:
-        """It keeps the last minute of its frames."""
-        return self
+    def frames(self) -> EthercatLink | None:
+        """It keeps the last minute of its frames, where a process gets copies of them (Linux)."""
+        return self if self._raw_frames else None
 
     async def flight(self, station: int | None = None) -> bytes:
         """See `drivers.link.RecordsFrames`."""
@@ -412,6 +427,17 @@ def _found(item: Message) -> Found:
 
 def _options(lockstep: float) -> tuple[str, ...]:
     return ("--lockstep", f"{lockstep:g}") if lockstep else ()
+
+
+def _require_capture(interface: str) -> None:
+    """Without its packet capture library the host process could not even start.
+
+    Raises:
+        LinkLost: the library is missing, too old or not permitted, or has no such adapter.
+    """
+    report = permissions.check(interface)
+    if report.capture is not None:
+        raise LinkLost(report.capture, remedy=report.capture_remedy)
 
 
 def segment_of(link: Link | None) -> EthercatLink | None:

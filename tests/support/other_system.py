@@ -12,6 +12,7 @@ from __future__ import annotations
 import asyncio
 import builtins
 import contextlib
+import ctypes
 import fcntl
 import importlib
 import os
@@ -39,7 +40,15 @@ LACKING = {
     "socket": {"AF_NETLINK", "AF_PACKET", "AF_UNIX", "MSG_DONTWAIT"},
     "time": {"CLOCK_BOOTTIME", "clock_gettime"},
 }  # fmt: skip
-DIFFERENT = {"sys": {"platform": "win32"}}
+#: What Windows alone has, as far as servodeck calls it when it imports and starts.
+WINDLL = types.SimpleNamespace(
+    shell32=types.SimpleNamespace(IsUserAnAdmin=lambda: 0),
+    winmm=types.SimpleNamespace(timeBeginPeriod=lambda _ms: 0),
+)
+DIFFERENT: dict[str, dict[str, object]] = {
+    "sys": {"platform": "win32"},
+    "ctypes": {"windll": WINDLL},
+}
 
 
 class Other(types.ModuleType):
@@ -74,11 +83,23 @@ def _msvcrt() -> types.ModuleType:
     return module
 
 
+def _winreg() -> types.ModuleType:
+    """A registry without any key: nothing is installed."""
+    module = types.ModuleType("winreg")
+    module.HKEY_LOCAL_MACHINE = 0x80000002  # type: ignore[attr-defined]
+
+    def open_key(_root: int, key: str) -> object:
+        raise FileNotFoundError(key)
+
+    module.OpenKey = open_key  # type: ignore[attr-defined]
+    return module
+
+
 def become_other() -> None:
     """From now on servodeck's modules are imported as on the other system."""
     real_import = builtins.__import__
-    others = {one.__name__: Other(one) for one in (os, select, signal, socket, sys, time)}
-    made = {**others, "msvcrt": _msvcrt()}
+    others = {one.__name__: Other(one) for one in (ctypes, os, select, signal, socket, sys, time)}
+    made = {**others, "msvcrt": _msvcrt(), "winreg": _winreg()}
 
     def importing(
         name: str, where: Any = None, local: Any = None, names: Any = (), level: int = 0
@@ -144,13 +165,13 @@ async def serve_once() -> None:
 
 
 async def ethercat() -> None:
-    """What an EtherCAT bus answers on a system that has none."""
-    from drivers.errors import NotAllowed
+    """What an EtherCAT bus answers on a computer with Windows that has no Npcap."""
+    from drivers.errors import LinkLost
     from drivers.urls import link_for
 
     try:
-        await link_for("ethercat://eth0").open()
-    except NotAllowed as error:
+        await link_for("ethercat://NPF_{4D36E972-E325-11CE-BFC1-08002BE10318}").open()
+    except LinkLost as error:
         print("refused:", error.message, "|", error.remedy)
 
 

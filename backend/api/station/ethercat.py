@@ -26,7 +26,7 @@ from backend.drive.identity import confirm_identity
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.work.jobs import JobResult, Progress
-from drivers.adapters import require_interface
+from drivers.adapters import require_ethercat_adapter
 from drivers.cia402 import State
 from drivers.computer import permissions
 from drivers.errors import DriveError, NotAllowed, OutOfRange
@@ -94,7 +94,7 @@ async def ethercat_permissions(url: Annotated[str, Query()]) -> EthercatPermissi
         raise OutOfRange("api-station.no-ethercat-bus", value=url, limit=f"{_SCHEME}INTERFACE")
     interface = url.removeprefix(_SCHEME)
     # It becomes part of commands that somebody copies into a terminal.
-    require_interface(interface)
+    require_ethercat_adapter(interface)
     return _permissions(permissions.check(interface))
 
 

@@ -45,7 +45,7 @@ def _serial(path: str, description: str) -> SerialPort:
 def _network(one: Interface) -> NetworkInterface:
     problem = None if one.up else text("api-station.interface-down")
     return NetworkInterface(
-        name=one.name,
+        name=one.title or one.name,
         up=one.up,
         url=f"ethercat://{one.name}",
         usable=one.up,

@@ -13,7 +13,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from drivers.computer.sockets import set_blocking
 from drivers.ethercat.exchange.gridphase import GridPhase
 from drivers.ethercat.exchange.mapping import Entry
 from drivers.ethercat.exchange.ring import RESYNCED, VALID, Ring, lost_flag
@@ -120,8 +119,7 @@ class CyclicLoop:
 
     def start(self) -> None:
         """Begin the grid now; frames no longer block."""
-        if self._fd is not None:
-            set_blocking(self._fd, False)
+        self._segment.wait_for_frames(False)
         for image in self.images:
             image.outputs = image.pack(*image.axis.outputs)
             self._segment.set_output(image.station, image.outputs)
@@ -129,8 +127,7 @@ class CyclicLoop:
 
     def stop(self) -> None:
         """Frames block again, for everything that is not cyclic."""
-        if self._fd is not None:
-            set_blocking(self._fd, True)
+        self._segment.wait_for_frames(True)
 
     def cycle(self) -> None:
         """Wait for the grid, exchange process data, let every axis decide, keep the sample."""
@@ -235,18 +232,25 @@ class CyclicLoop:
         return self.cycle_ns if 2 * late > self.cycle_ns else 0
 
     def _exchange(self) -> int:
-        self._segment.discard_late_frames()
+        if not self._segment.in_step():
+            return -1
         self._master.send_processdata()
-        if self._fd is not None:
-            left_s = (self.next_ns + self.cycle_ns - time.monotonic_ns()) * 0.95e-9
-            if self._lockstep:
-                # A late reply is awaited; one that is missing must not hold up the others.
-                left_s = self.cycle_ns * 1e-9 if self._invalid_run else _LOCKSTEP_WAIT_S
-            ready, _, _ = select.select((self._fd,), (), (), max(left_s, _LEAST_WAIT_S))
-            if not ready:
-                # Shows SOEM to give the frame up; it returns at once.
-                self._master.receive_processdata(0)
-                return -1
+        left_s = (self.next_ns + self.cycle_ns - time.monotonic_ns()) * 0.95e-9
+        if self._lockstep:
+            # A late reply is awaited; one that is missing must not hold up the others.
+            left_s = self.cycle_ns * 1e-9 if self._invalid_run else _LOCKSTEP_WAIT_S
+        if self._fd is None:
+            # Without a socket to wait for, SOEM asks the capture library again and again.
+            # Commands, a STOP among them, are received by another thread meanwhile.
+            wait_us = round(max(left_s, _LEAST_WAIT_S) * 1e6)
+            came = int(self._master.receive_processdata(wait_us, release_gil=True))
+            self._segment.note_process_data(came_back=came >= 0)
+            return came
+        ready, _, _ = select.select((self._fd,), (), (), max(left_s, _LEAST_WAIT_S))
+        if not ready:
+            # Shows SOEM to give the frame up; it returns at once.
+            self._master.receive_processdata(0)
+            return -1
         wkc: int = self._master.receive_processdata(_RECEIVE_US)
         return wkc
 

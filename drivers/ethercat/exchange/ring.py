@@ -11,7 +11,9 @@ import contextlib
 import mmap
 import os
 import struct
+import tempfile
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -73,6 +75,25 @@ class Ring:
             os.close(descriptor)
             raise
         return descriptor
+
+    @staticmethod
+    def create_file() -> Path:
+        """A new file in the folder for temporary files, where a child inherits no descriptor.
+
+        Whoever creates it removes it.
+        """
+        descriptor, name = tempfile.mkstemp(prefix="servodeck-ethercat-")
+        try:
+            os.ftruncate(descriptor, RING_BYTES)
+        finally:
+            os.close(descriptor)
+        return Path(name)
+
+    @classmethod
+    def of_file(cls, path: Path) -> Ring:
+        """One end of the ring in a file of `create_file`."""
+        with path.open("r+b") as file:
+            return cls(file.fileno())
 
     def close(self) -> None:
         """Give the memory back."""

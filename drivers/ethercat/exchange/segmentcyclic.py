@@ -21,6 +21,13 @@ from drivers.ethercat.exchange.samples import contiguous, fields_of
 from drivers.ethercat.exchange.trajectory import message_of
 from drivers.ethercat.process.hostprocess import HostProcess
 from drivers.ethercat.process.protocol import Message
+from drivers.ethercat.process.punctuality import (
+    CHECK_S,
+    Kept,
+    Punctuality,
+    require_fine_clock,
+    require_punctual,
+)
 from drivers.halt import Halted, LoopState
 from drivers.link import Coupled, CyclicSignal, ScopeBlock, Trajectory, Unsubscribe
 from drivers.motion.setpoint_plan import Phase
@@ -53,12 +60,16 @@ class EthercatCyclic:
         profiles: Mapping[int, Profile],
         notify: Callable[[Text, bool], None],
         note: Callable[[str, int | None], None] = lambda _text, _station: None,
+        unproven: Kept | None = None,
     ) -> None:
         """``notify`` gets a message when the exchange breaks off (False) or runs again (True).
 
         ``note`` gets what is commanded, with its station, for the record of the bus.
+        ``unproven``: this system gives no guarantee, so that process data need a check that has
+        shown how punctual computer and adapter are; where the last one is kept.
         """
         self._note = note
+        self._unproven = unproven
         self._host = host
         self._notify = notify
         self._setup: Message = {}
@@ -104,7 +115,8 @@ class EthercatCyclic:
         Every drive is reset to PREOP for it, so the exchange must not run.
 
         Raises:
-            NotAllowed: cycle time, an output that does not fit, or a drive that refuses.
+            NotAllowed: cycle time, an output that does not fit, a drive that refuses, or a
+                computer that does not keep the cycle.
         """
         await self._forget()
         self._check_names([*inputs, *outputs])
@@ -120,6 +132,8 @@ class EthercatCyclic:
         )
         for plan in plans:
             self._check_cycle(plan.station, cycle_s)
+        if self._unproven is not None:
+            await self._require_punctual(self._unproven, stations[0], cycle_s)
         message: Message = {
             "op": "configure",
             "cycle_ns": round(cycle_s * 1e9),
@@ -133,6 +147,17 @@ class EthercatCyclic:
         self._fields = fields_of(plans)
         self.left_over = tuple(item for plan in plans for item in plan.left_over)
         return tuple(signal for plan in plans for signal in plan.mapped)
+
+    async def _require_punctual(self, kept: Kept, station: int, cycle_s: float) -> None:
+        """The last check allows this cycle, or one that is made now, which takes 10 s."""
+        require_fine_clock()
+        found = kept.read()
+        if found is None or not found.allows(cycle_s * 1e6):
+            message = {"op": "punctuality", "station": station, "seconds": CHECK_S}
+            answer: Message = await self._host.call(message, 3 * CHECK_S + _ANSWER_S)
+            found = Punctuality(tuple(answer["counts"]))
+            kept.write(found)
+        require_punctual(kept.interface, found, cycle_s)
 
     def _station_wire(self, plan: StationPlan, cycle_ns: int) -> Message:
         rules = station_bring_up(self._profiles.get(plan.station), cycle_ns)

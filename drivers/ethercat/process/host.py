@@ -13,18 +13,19 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import select
 import socket
 import struct
 import sys
 import time
 from collections import deque
+from pathlib import Path
 
 from drivers.computer import realtime, signals
 from drivers.computer.processes import end_within
 from drivers.errors import DriveError, LinkLost, ProtocolError
 from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.process import protocol
+from drivers.ethercat.process.channel import HostEnd, PipeHostEnd, SocketHostEnd
 from drivers.ethercat.process.operations import Operations
 from drivers.ethercat.process.protocol import Message
 from drivers.halt import HaltCause, Halted
@@ -43,16 +44,18 @@ _SILENT = Halted(
 class Host:
     """Commands in, replies and events out, and the loop that never waits for either."""
 
-    def __init__(self, interface: str, control: socket.socket, ring: Ring) -> None:
+    def __init__(
+        self, interface: str, control: HostEnd, ring: Ring, *, raw_frames: bool = True
+    ) -> None:
+        """``raw_frames``: registers by frames of our own, else by SOEM's calls."""
         self._control = control
-        control.setblocking(False)
         self._unpacker = protocol.Unpacker()
         self._outgoing = bytearray()
         self._incoming: deque[Message] = deque()
         self._ring = ring
         self._orphaned = False
         self._next_status = 0.0
-        self.operations = Operations(interface, ring, self.send)
+        self.operations = Operations(interface, ring, self.send, raw_frames=raw_frames)
         self.operations.roster.exchange.end_set_up_when(self._stop_waits)
 
     def run(self, granted: realtime.RealTime) -> None:
@@ -87,6 +90,9 @@ class Host:
             if self._server_is_silent():
                 loop.stop_axes(_SILENT)
             operations.use_spare_time()
+        elif operations.checking:
+            operations.check_cycle()
+            self._commands(0.0)
         else:
             worked = any(operations.lanes.step() for _ in range(8))
             self._flush()
@@ -106,8 +112,8 @@ class Host:
         return bool(seen) and time.monotonic_ns() - seen > _SERVER_SILENT_S * 1e9
 
     def _commands(self, timeout_s: float) -> None:
-        if timeout_s > 0 and not select.select((self._control,), (), (), timeout_s)[0]:
-            return
+        if timeout_s > 0:
+            self._control.wait(timeout_s)
         self._receive()
         while self._incoming:
             self._handle(self._incoming.popleft())
@@ -117,12 +123,9 @@ class Host:
         return any(self.operations.stops(message) for message in self._incoming)
 
     def _receive(self) -> None:
-        try:
-            data = self._control.recv(1 << 16)
-        except BlockingIOError:
+        data = self._control.receive()
+        if data is None:
             return
-        except ConnectionError:
-            data = b""
         if not data:
             self._orphaned = True
             return
@@ -152,11 +155,8 @@ class Host:
     def _flush(self) -> None:
         if not self._outgoing:
             return
-        try:
-            sent = self._control.send(self._outgoing)
-        except BlockingIOError:
-            return
-        except ConnectionError:
+        sent = self._control.send(self._outgoing)
+        if sent is None:
             self._orphaned = True
             return
         del self._outgoing[:sent]
@@ -171,15 +171,23 @@ def main(argv: list[str] | None = None) -> int:
     """Entry point of the process."""
     parser = argparse.ArgumentParser(description="EtherCAT host process of servodeck")
     parser.add_argument("interface")
-    parser.add_argument("--control", type=int, required=True, help="descriptor of the socket")
-    parser.add_argument("--ring", type=int, required=True, help="descriptor of the ring")
+    parser.add_argument("--control", type=int, help="descriptor of the socket, else by pipes")
+    ring = parser.add_mutually_exclusive_group(required=True)
+    ring.add_argument("--ring", type=int, help="descriptor of the ring")
+    ring.add_argument("--ring-file", type=Path, help="file of the ring")
+    parser.add_argument("--library-frames", action="store_true", help="registers by SOEM's calls")
     parser.add_argument("--no-realtime", action="store_true")
     parser.add_argument("--lockstep", type=float, default=0.0, help="for virtual segments")
     options = parser.parse_args(argv)
     realtime.die_with_parent()
     signals.ignore_interrupt()
-    control = socket.socket(fileno=options.control)
-    host = Host(options.interface, control, Ring(options.ring))
+    control: HostEnd = (
+        PipeHostEnd.of_this_process()
+        if options.control is None
+        else SocketHostEnd(socket.socket(fileno=options.control))
+    )
+    memory = Ring(options.ring) if options.ring_file is None else Ring.of_file(options.ring_file)
+    host = Host(options.interface, control, memory, raw_frames=not options.library_frames)
     if options.lockstep:
         host.operations.roster.exchange.lockstep = options.lockstep
         # A virtual segment on a busy computer answers when it gets its turn.
@@ -189,6 +197,7 @@ def main(argv: list[str] | None = None) -> int:
     with contextlib.suppress(LinkLost):
         host.run(granted)
     end_within(_LAST_WORDS_S)
+    control.close()
     return 0
 
 

@@ -16,6 +16,7 @@ from typing import Any
 from drivers.errors import DriveError, LinkLost, LinkTimeout, why_of
 from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.process import protocol
+from drivers.ethercat.process.channel import PipeServerEnd, ServerEnd, SocketServerEnd
 from drivers.ethercat.process.protocol import Message
 from drivers.link import Progress
 from drivers.texts.message import Text, text
@@ -23,6 +24,8 @@ from drivers.texts.message import Text, text
 _WATCH_S = 0.1
 _RESTART_PAUSE_S = (0.2, 1.0, 3.0, 10.0)
 _FAREWELL_S = 3.0
+_PIPE_LIMIT = 1 << 20
+"""Bytes of a child's messages that are held for the server before the child has to wait."""
 START_S = 30.0
 """A child that hangs as it starts; one that dies is noticed at once. Loading alone takes a busy
 computer ten seconds, and a shorter time would have it begin again for ever."""
@@ -38,8 +41,13 @@ class HostProcess:
         received: Callable[[Message], None],
         restarted: Callable[[Text], None],
         options: Sequence[str] = (),
+        *,
+        raw_frames: bool = True,
     ) -> None:
+        """Without ``raw_frames`` the child inherits no descriptors, as on other systems."""
         self._options = tuple(options)
+        self._raw_frames = raw_frames
+        self._ring_file: Path | None = None
         self.restarts = 0
         self.why, self._opened = text("ethercat.process-not-opened"), False
         self.granted: tuple[Text, ...] = ()
@@ -49,7 +57,7 @@ class HostProcess:
         self._received = received
         self._restarted = restarted
         self._process: asyncio.subprocess.Process | None = None
-        self._socket: socket.socket | None = None
+        self._channel: ServerEnd | None = None
         self._numbers = itertools.count(1)
         self._waiting: dict[int, tuple[asyncio.Future[Any], Progress | None]] = {}
         self._ready: asyncio.Future[None] | None = None
@@ -111,7 +119,7 @@ class HostProcess:
             LinkTimeout: no reply in time.
             DriveError: what the child says.
         """
-        if not self.running or self._socket is None:
+        if not self.running or self._channel is None:
             raise LinkLost(
                 "ethercat.ethercat-process-not-running", interface=self._interface, words=self.why
             )
@@ -147,8 +155,7 @@ class HostProcess:
                 interface=self._interface,
                 strerror=str(error.strerror or error),
             ) from error
-        ours.setblocking(False)
-        self._socket = ours
+        self._channel = ours
         self._ready = loop.create_future()
         self._reader = loop.create_task(self._read(ours))
         self.why = text("ethercat.process-starting")
@@ -163,8 +170,26 @@ class HostProcess:
             ) from None
         self.why, self._opened = text("ethercat.process-open"), True
 
-    async def _launch(self) -> socket.socket:
+    async def _launch(self) -> ServerEnd:
         """Start the child; our end of its control channel. Raises OSError, with nothing left."""
+        return await (self._launch_inheriting() if self._raw_frames else self._launch_portably())
+
+    async def _launch_portably(self) -> ServerEnd:
+        """Messages by the child's standard input and output, samples through a file."""
+        self._ring_file = path = Ring.create_file()
+        self.ring = Ring.of_file(path)
+        self._process = process = await asyncio.create_subprocess_exec(
+            *self._launcher, sys.executable, "-m", "drivers.ethercat.process.host",
+            self._interface, "--ring-file", str(path), "--library-frames", *self._options,
+            env=_environment(), stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
+            limit=_PIPE_LIMIT,
+        )  # fmt: skip
+        assert process.stdin is not None
+        assert process.stdout is not None
+        return PipeServerEnd(process.stdout, process.stdin)
+
+    async def _launch_inheriting(self) -> ServerEnd:
+        """A pair of sockets and a file in memory, both inherited."""
         ours, theirs = socket.socketpair()
         try:
             with theirs:
@@ -183,16 +208,12 @@ class HostProcess:
         except BaseException:
             ours.close()
             raise
-        return ours
+        return SocketServerEnd(ours)
 
-    async def _read(self, ours: socket.socket) -> None:
-        loop = asyncio.get_running_loop()
+    async def _read(self, ours: ServerEnd) -> None:
         unpacker = protocol.Unpacker()
         while True:
-            try:
-                data = await loop.sock_recv(ours, 1 << 18)
-            except OSError:
-                data = b""
+            data = await ours.receive()
             if not data:
                 self._gone(text("ethercat.ethercat-process-ended"))
                 return
@@ -246,12 +267,12 @@ class HostProcess:
                 future.set_exception(LinkLost(why, remedy="ethercat.started-again-by-itself"))
 
     async def _write(self, data: bytes) -> None:
-        ours = self._socket
+        ours = self._channel
         if ours is None:
             raise LinkLost(self.why)
         async with self._outgoing:
             try:
-                await asyncio.get_running_loop().sock_sendall(ours, data)
+                await ours.send(data)
             except OSError as error:
                 raise LinkLost("ethercat.ethercat-process-ended") from error
 
@@ -295,9 +316,9 @@ class HostProcess:
 
     async def _end(self, *, kill: bool) -> None:
         process, self._process = self._process, None
-        if self._socket is not None:
+        if self._channel is not None:
             # The end of the pipe is what makes the child brake its axes and leave.
-            self._socket.close() if process is None else self._hang_up()
+            self._hang_up()
         if process is not None and process.returncode is None:
             if kill:
                 process.kill()
@@ -314,17 +335,20 @@ class HostProcess:
         self._close_ring()
 
     def _hang_up(self) -> None:
-        assert self._socket is not None
-        with contextlib.suppress(OSError):
-            self._socket.shutdown(socket.SHUT_RDWR)
+        assert self._channel is not None
         self._reader.cancel()
-        self._socket.close()
-        self._socket = None
+        self._channel.close()
+        self._channel = None
 
     def _close_ring(self) -> None:
         ring, self.ring = self.ring, None
         if ring is not None:
             ring.close()
+        path, self._ring_file = self._ring_file, None
+        if path is not None:
+            # Windows removes no file that a reader still looks at; it is a temporary one.
+            with contextlib.suppress(OSError):
+                path.unlink()
 
 
 def _noticed(sending: asyncio.Task[None]) -> None:
@@ -336,4 +360,4 @@ def _noticed(sending: asyncio.Task[None]) -> None:
 def _environment() -> dict[str, str]:
     root = str(Path(__file__).resolve().parents[3])
     path = os.environ.get("PYTHONPATH")
-    return {**os.environ, "PYTHONPATH": f"{root}:{path}" if path else root}
+    return {**os.environ, "PYTHONPATH": f"{root}{os.pathsep}{path}" if path else root}

@@ -20,6 +20,7 @@ from drivers.ethercat.process import station as transactions
 from drivers.ethercat.process.eeprom import EepromOperations
 from drivers.ethercat.process.examination import examine
 from drivers.ethercat.process.protocol import Message, error_to_wire
+from drivers.ethercat.process.punctuality import Check
 from drivers.ethercat.process.requested import refuse_op, request
 from drivers.ethercat.process.roster import Roster, Send
 from drivers.ethercat.process.segment import InvalidMap, Segment
@@ -44,8 +45,8 @@ _ENDED = Halted(HaltCause.COMMANDED, note=text("ethercat.motion-ended"))
 class Operations:
     """One segment with its stations, and what can be asked of it."""
 
-    def __init__(self, interface: str, ring: Ring, send: Send) -> None:
-        self.segment = Segment(interface)
+    def __init__(self, interface: str, ring: Ring, send: Send, *, raw_frames: bool = True) -> None:
+        self.segment = Segment(interface, raw_frames=raw_frames)
         self.lanes = Lanes(self.segment, time.monotonic)
         self.roster = Roster(self.segment, self.lanes, ring, send)
         self.granted: RealTime | None = None
@@ -53,6 +54,7 @@ class Operations:
         self._send = send
         self._starved = 0
         self._loading: set[int] = set()
+        self._check: tuple[Check, Done] | None = None
         self._eeprom = EepromOperations(self.roster, self.lanes, self._progress_of)
         self._handlers: dict[str, Callable[[Message, Done], None]] = {
             "scan": self._scan, "read": self._read, "read_many": self._read_many,
@@ -63,6 +65,7 @@ class Operations:
             "configure": self._configure, "start": self._start, "stop": self._stop,
             "play": self._play, "renew": self._renew, "halt": self._halt, "pause": self._pause,
             "drive_to": self._drive_to,
+            "punctuality": self._punctuality,
             "eeprom_read": self._eeprom.read, "eeprom_write": self._eeprom.write,
         }  # fmt: skip
 
@@ -97,6 +100,26 @@ class Operations:
         """Whether it writes a control word that takes the power or the speed of an axis."""
         place = message["op"], message.get("index"), message.get("subindex")
         return place == ("write", *_CONTROL_WORD) and cia402.stops(_word(message["data"]))
+
+    @property
+    def checking(self) -> bool:
+        """Whether it is being measured how punctual this computer is."""
+        return self._check is not None
+
+    def check_cycle(self) -> None:
+        """One cycle of that, and one frame of whatever else is due."""
+        if self._check is None:
+            return
+        check, done = self._check
+        if self.loop is not None or not self.roster.is_open or self.roster.powered:
+            self._check = None
+            done(None, Busy("ethercat.segment-busy"))
+            return
+        result = check.cycle()
+        if result is not None:
+            self._check = None
+            done(result, None)
+        self.lanes.step()
 
     def use_spare_time(self) -> None:
         """Mailbox frames between two cycles; now and then one although there is no time."""
@@ -368,6 +391,15 @@ class Operations:
         if station.number in self._loading:
             raise Busy("ethercat.station-being-loaded-firmware", station=station.number)
         return station
+
+    def _punctuality(self, message: Message, done: Done) -> None:
+        """Measure for ``seconds``, see `drivers.ethercat.process.punctuality`; nothing moves."""
+        station = self._calm_station(message)
+        if self.loop is not None or self.checking:
+            raise Busy("ethercat.segment-busy")
+        if self.roster.powered:
+            raise Busy("ethercat.axis-enabled-by-mailbox")
+        self._check = Check(self.segment, station.number, message["seconds"]), done
 
     # Cyclic --------------------------------------------------------------------------------
 

@@ -64,6 +64,11 @@ class Roster:
         self.segment.open()
         self.is_open = True
 
+    @property
+    def powered(self) -> bool:
+        """Whether a control word by mailbox has enabled a station."""
+        return bool(self._powered)
+
     # Watching ------------------------------------------------------------------------------
 
     def housekeeping(self, now: float) -> None:
@@ -110,7 +115,8 @@ class Roster:
             self.new_aliases.clear()
 
     def _interface_gone(self) -> None:
-        why = text("event.interface-gone", interface=self.segment.interface)
+        code = "event.answers-too-late" if self.segment.mixed_up else "event.interface-gone"
+        why = text(code, interface=self.segment.interface)
         self.exchange.abandon()
         self.lanes.drop(why)
         self.segment.close()

@@ -21,14 +21,22 @@ import select
 import socket
 import time
 from collections.abc import Sequence
+from typing import BinaryIO
 
 import pysoem
 
-from drivers.adapters import require_interface
-from drivers.computer import permissions
-from drivers.computer.sockets import MSG_DONTWAIT, blocks, hold_name, open_sockets, set_blocking
+from drivers.adapters import require_ethercat_adapter
+from drivers.computer import packet_capture, permissions
+from drivers.computer.sockets import (
+    MSG_DONTWAIT,
+    RAW_FRAMES,
+    hold_name,
+    open_sockets,
+    set_blocking,
+)
 from drivers.errors import Busy, LinkLost, NotAllowed, ProtocolError
 from drivers.ethercat.process import promiscuous
+from drivers.ethercat.process.library_wire import LibraryWire
 from drivers.ethercat.wire import frames
 from drivers.ethercat.wire.steps import Read, Write
 from drivers.texts import limits
@@ -41,6 +49,8 @@ _EMERGENCY = "an emergency or another unexpected mail came in between"
 _FRAME_TIMEOUT_US, _IDLE_FRAME_TIMEOUT_US = 2000, 10_000
 """With and without process data. A mail is gone once it was read: a slave made of software, on a
 busy computer, may send the frame with it late."""
+_MARGIN_US = 1000
+_RECOVER_US = 2000
 _STALL_S = 0.1
 _MOST_STRAY = 64
 """Frames of something else that may come before the answer."""
@@ -63,16 +73,20 @@ class InvalidMap(ProtocolError):
 class Segment:
     """One interface with its slaves. Stations count from 1, in the order of the cable."""
 
-    def __init__(self, interface: str) -> None:
+    def __init__(self, interface: str, *, raw_frames: bool = True) -> None:
+        """Without ``raw_frames`` all goes through SOEM's own calls, as on Windows and macOS."""
         self.interface = interface
+        self._library = None if raw_frames else LibraryWire()
         self._master: pysoem.Master | None = None
-        self._lock: socket.socket | None = None
+        self._lock: socket.socket | BinaryIO | None = None
         self._index = 0
         self.socket_fd: int | None = None
         self.slaves: Sequence[pysoem.CdefSlave] = ()
         self.mapped = False
         self._fresh = False
         """Nothing was mapped since the search."""
+        self._waits = True
+        """Frames are waited for; not while process data are exchanged."""
         self.frame_timeout_us = _FRAME_TIMEOUT_US
         self.late_frames = 0
         """Frames that came back after they had been given up."""
@@ -93,6 +107,10 @@ class Segment:
             return
         self._check_interface()
         self._lock = _lock(self.interface)
+        self._waits = True
+        if self._library is not None:
+            self._open_by_library()
+            return
         master = pysoem.Master()
         was_promiscuous = promiscuous.is_set(self.interface)
         before = open_sockets()
@@ -118,6 +136,24 @@ class Segment:
             promiscuous.bind_to(self._ear, self.interface, self._index)
         self._master = master
 
+    def _open_by_library(self) -> None:
+        # A frame is sent again after this time, and ours are given up before: each is sent once.
+        pysoem.settings.timeouts.ret = self._patience_us() + _MARGIN_US
+        master = pysoem.Master()
+        try:
+            master.open(_device(self.interface))
+        except ConnectionError as error:
+            self._unlock()
+            report = permissions.check(self.interface)
+            raise LinkLost(
+                "ethercat.interface-not-opened",
+                remedy=report.capture_remedy or "ethercat.check-wired",
+                interface=self.interface,
+                check=report.text,
+            ) from error
+        self._library = LibraryWire()
+        self._master = master
+
     def close(self) -> None:
         """Close the interface once; calling again does nothing."""
         master, self._master = self._master, None
@@ -130,11 +166,20 @@ class Segment:
         self._unlock()
 
     def replaced(self) -> bool:
-        """Whether the interface vanished or came back as another since `open`."""
+        """Whether the interface has to be opened again: it vanished or came back as another, or
+        old answers match new requests.
+        """
+        if self._library is not None:
+            return self.mixed_up
         try:
             return socket.if_nametoindex(self.interface) != self._index
         except OSError:
             return True
+
+    @property
+    def mixed_up(self) -> bool:
+        """Old answers match new requests; see `drivers.ethercat.process.library_wire`."""
+        return self._library is not None and self._library.mixed_up
 
     @property
     def master(self) -> pysoem.Master:
@@ -160,7 +205,8 @@ class Segment:
         for attempt in range(_FIND_TRIES):
             if attempt:
                 time.sleep(_STALL_S)
-            self.discard_late_frames()
+            if not self.in_step() and self.mixed_up:
+                raise LinkLost("ethercat.answers-come-too-late", interface=self.interface)
             count = self.master.config_init(release_gil=True)
             self.forget_errors()
             if 0 < count <= MAX_STATIONS:
@@ -171,6 +217,8 @@ class Segment:
             raise LinkLost("ethercat.answers-come-too-late", interface=self.interface)
         self._fresh = True
         self.slaves = tuple(self.master.slaves) if count > 0 else ()
+        if self._library is not None:
+            self._library.found(self.slaves, self._patience_us())
         return len(self.slaves)
 
     def discard_late_frames(self) -> None:
@@ -186,11 +234,35 @@ class Segment:
             # The interface went down: whoever sends next is informed.
             return
 
+    def in_step(self) -> bool:
+        """Whether the next answer will be that of the next request; to be called with no frame
+        under way. Late frames are discarded, or probes sent where they cannot be seen.
+        """
+        if self._library is not None:
+            return self._library.in_step(self._patience_us())
+        self.discard_late_frames()
+        return True
+
+    def wait_for_frames(self, waits: bool) -> None:
+        """Whether sending and receiving may wait; not while process data are exchanged."""
+        self._waits = waits
+        if self.socket_fd is not None:
+            set_blocking(self.socket_fd, waits)
+
+    def note_process_data(self, *, came_back: bool) -> None:
+        """Whether a frame of process data came back."""
+        if self._library is not None:
+            self._library.count(came_back=came_back)
+
     def exchange(self, requests: Sequence[frames.Request]) -> list[bytes | None]:
         """Accesses to registers in one frame; see `frames.answers`, all None for a lost frame.
 
         They must fit one frame. A frame that came back late is nobody's answer any more.
         """
+        if self._library is not None:
+            replies = self._library.exchange(requests, self._patience_us())
+            self.silent = self._library.silent
+            return replies
         self.discard_late_frames()
         self._number = (self._number + 1) % frames.INDICES
         reported = self._transmit(
@@ -203,9 +275,9 @@ class Segment:
         self, requests: Sequence[frames.Request], sent: bytes
     ) -> list[bytes | None] | None:
         ear = self._ear
-        if ear is None or self.socket_fd is None:
+        if ear is None:
             return None
-        deadline = time.monotonic() + self._patience_us(self.socket_fd) * 1e-6
+        deadline = time.monotonic() + self._patience_us() * 1e-6
         scrap = memoryview(self._scrap)
         try:
             ear.send(sent, MSG_DONTWAIT)
@@ -225,8 +297,8 @@ class Segment:
             return None
         return None
 
-    def _patience_us(self, descriptor: int) -> int:
-        if blocks(descriptor):
+    def _patience_us(self) -> int:
+        if self._waits:
             return max(self.frame_timeout_us, _IDLE_FRAME_TIMEOUT_US)
         # Process data must not wait long for each of many frames that do not come back.
         return _FRAME_TIMEOUT_US if self.silent else self.frame_timeout_us
@@ -268,6 +340,8 @@ class Segment:
             self.master.config_map()
         except pysoem.ConfigMapError as error:
             self.forget_errors()
+            if self._library is not None:
+                self._library.doubt()
             reported = sorted({_mapping_error(item) for item in error.error_list})
             raise InvalidMap(
                 "ethercat.process-data-not-mapped", reported="; ".join(reported)
@@ -293,16 +367,19 @@ class Segment:
 
     def recover(self, station: int) -> bool:
         """Give a slave that was switched off its address back; False when it is another one."""
+        if not self.in_step() and self.mixed_up:
+            return False
         # SOEM sends some of these frames without waiting, and needs the socket to block then.
-        waits = self.socket_fd is None or blocks(self.socket_fd)
         if self.socket_fd is not None:
             set_blocking(self.socket_fd, True)
-        self.discard_late_frames()
+        began = time.perf_counter()
         try:
-            back = bool(self.slaves[station - 1].recover(2000) > 0)
+            back = bool(self.slaves[station - 1].recover(_RECOVER_US) > 0)
         finally:
             if self.socket_fd is not None:
-                set_blocking(self.socket_fd, waits)
+                set_blocking(self.socket_fd, self._waits)
+        if self._library is not None and (time.perf_counter() - began) * 1e6 >= _RECOVER_US:
+            self._library.doubt()
         self.forget_errors()
         return back
 
@@ -315,18 +392,30 @@ class Segment:
             raise NotAllowed("ethercat.no-process-data-before")
 
     def _check_interface(self) -> None:
+        if not RAW_FRAMES:
+            self._check_adapter()
+            return
         if not 0 < len(self.interface.encode()) <= _NAME_LIMIT:
             raise LinkLost(
                 "ethercat.cannot-interface-names-letters",
                 interface=self.interface,
                 name_limit=_NAME_LIMIT,
             )
-        require_interface(self.interface)
+        require_ethercat_adapter(self.interface)
         report = permissions.check(self.interface)
         if not report.exists or not report.up:
             names = ", ".join(name for _, name in socket.if_nameindex())
             others = text("ethercat.interfaces-there-are", names=names)
             raise LinkLost(report.text, remedy="; ".join(report.commands) or others)
+
+    def _check_adapter(self) -> None:
+        """Only what is in the list of the packet capture library is opened."""
+        require_ethercat_adapter(self.interface)
+        report = permissions.check(self.interface)
+        if not report.ready:
+            names = ", ".join(f"{one.name} ({one.title})" for one in packet_capture.adapters())
+            others = text("ethercat.interfaces-there-are", names=names)
+            raise LinkLost(report.text, remedy=report.capture_remedy or others)
 
     def _unlock(self) -> None:
         if self._lock is not None:
@@ -334,8 +423,16 @@ class Segment:
             self._lock = None
 
 
-def _lock(interface: str) -> socket.socket:
-    """An abstract socket: per network namespace like the interface, and gone with its holder."""
+def _device(interface: str) -> str:
+    """What SOEM opens: the device of the adapter in its own list, else the interface's name."""
+    if RAW_FRAMES:
+        return interface
+    listed = (one.device for one in packet_capture.adapters() if one.name == interface)
+    return next(listed, interface)
+
+
+def _lock(interface: str) -> socket.socket | BinaryIO:
+    """A name that one process alone holds; see `hold_name`."""
     try:
         return hold_name(f"servodeck-ethercat-{interface}")
     except OSError as error:

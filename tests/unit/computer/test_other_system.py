@@ -40,11 +40,10 @@ def test_the_server_starts_and_answers() -> None:
     assert other("serve").splitlines()[-1].startswith("drives 200")
 
 
-def test_ethercat_is_refused_in_words_with_what_helps() -> None:
+def test_ethercat_without_npcap_is_refused_with_the_way_to_it() -> None:
     said = other("ethercat")
-    assert "eth0" in said
-    assert "Linux only" in said
-    assert "Modbus, MLink and CANopen by slcan work" in said
+    assert "EtherCAT on Windows needs Npcap" in said
+    assert "install Npcap from npcap.com" in said
 
 
 def test_one_process_at_a_time_has_a_state_folder() -> None:

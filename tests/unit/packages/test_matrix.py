@@ -52,6 +52,18 @@ def test_windows_is_imported_only_where_that_ran_and_lacks_what_it_refuses(tmp_p
     assert matrix.cell(row("a", "Windows"), "Windows", ran) == ABSENT
 
 
+def test_what_stood_in_on_linux_is_no_test_of_the_system_itself(tmp_path: Path) -> None:
+    ran = reported(tmp_path, first=REPORT)
+    shown = Row("EtherCAT", "scan", path_shown_by=("tests/unit/test_a.py",))
+    failed = Row("EtherCAT", "scan", path_shown_by=("tests/unit/test_b.py",))
+    for system in ("Windows", "macOS"):
+        assert matrix.cell(shown, system, ran) == matrix.STOOD_IN
+        assert matrix.cell(failed, system, ran) != matrix.STOOD_IN
+    assert matrix.cell(shown, HERE, ran) == UNTESTED
+    said = {(failed, "Windows"): matrix.STOOD_IN}
+    assert matrix.overstated(said, ran) == ["EtherCAT, scan on Windows: tests/unit/test_b.py"]
+
+
 def test_a_table_that_says_more_than_ran_is_found(tmp_path: Path) -> None:
     ran = reported(tmp_path, first=REPORT)
     said = {
@@ -73,7 +85,7 @@ def test_the_documentation_has_this_table() -> None:
     assert matrix.table(cells) == matrix.written()
     for (each, system), said in cells.items():
         assert said == ABSENT if system in each.lacking else said in {
-            TESTED, IMPORTED, matrix.TYPED, UNTESTED,
+            TESTED, IMPORTED, matrix.STOOD_IN, matrix.TYPED, UNTESTED,
         }, (each, system)  # fmt: skip
         assert said != TESTED or each.shown_by, (each, system)
 

@@ -6,8 +6,8 @@ import pytest
 
 from backend.preflight.findings import Code, Effect, Finding
 from backend.preflight.texts import verdict_words
-from backend.preflight.verdicts import Grade, Purpose, missed_bound, verdicts
-from drivers.computer.lateness import EDGES_US, Histogram, Measured, broadcast_read
+from backend.preflight.verdicts import Grade, Purpose, verdicts
+from drivers.computer.lateness import EDGES_US, Histogram, Measured, broadcast_read, missed_bound
 
 
 def run(period_us: int, cycles: int, missed: int) -> dict[int, Measured]:

@@ -23,12 +23,21 @@ class Rig:
     """One private network with a segment of servo drives on ``ec0s``; the host takes ``ec0m``."""
 
     def __init__(
-        self, namespace: Namespace, drives: tuple[str, ...], *, lockstep: bool = False
+        self,
+        namespace: Namespace,
+        drives: tuple[str, ...],
+        *,
+        lockstep: bool = False,
+        raw_frames: bool = True,
     ) -> None:
-        """With ``lockstep`` time follows the frames, so that a busy machine is no trouble."""
+        """With ``lockstep`` time follows the frames, so that a busy machine is no trouble.
+
+        Without ``raw_frames`` the host is that of Windows and macOS.
+        """
         self.namespace = namespace
         self.drives = drives
         self.lockstep = lockstep
+        self.raw_frames = raw_frames
         self.segment = self.start()
 
     def start(self) -> VirtualSegment:
@@ -73,6 +82,7 @@ class Rig:
             url="ethercat://virtual0",
             launcher=self.namespace.command([]),
             lockstep=1.0 if self.lockstep else 0.0,
+            raw_frames=self.raw_frames,
         )
         bus = Bus(link)
         await link.open()
@@ -149,7 +159,12 @@ def namespace() -> Iterator[Namespace]:
 
 @pytest.fixture(scope="module")
 def shared_rig(namespace: Namespace, request: pytest.FixtureRequest) -> Iterator[Rig]:
-    rig = Rig(namespace, ("servo", "servo"), lockstep=getattr(request.module, "LOCKSTEP", False))
+    rig = Rig(
+        namespace,
+        ("servo", "servo"),
+        lockstep=getattr(request.module, "LOCKSTEP", False),
+        raw_frames=getattr(request.module, "RAW_FRAMES", True),
+    )
     yield rig
     rig.segment.close()
 

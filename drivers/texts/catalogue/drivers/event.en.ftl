@@ -1,4 +1,5 @@
 event_another-master = another master is talking to node { $node }: answers can be mixed up. Stop the other master before writing anything
+event_answers-too-late = answers on { $interface } came too late to be assigned to their requests: the adapter is opened again
 event_can-adapter-back = CAN adapter { $channel } is back
 event_exchange-broke-off = the cyclic exchange was interrupted: { $cause }. Every axis stops, and the exchange is set up again automatically
 event_exchange-ended-by-itself = the exchange ended without a request

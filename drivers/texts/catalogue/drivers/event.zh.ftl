@@ -1,4 +1,5 @@
 event_another-master = 另一个主站正在与节点 { $node } 通信：应答可能混淆。写入任何值之前，请先停止另一个主站
+event_answers-too-late = { $interface } 上的应答来得太晚，无法与请求对应：将重新打开该适配器
 event_can-adapter-back = CAN 适配器 { $channel } 已恢复
 event_exchange-broke-off = 周期通信中断：{ $cause }。所有轴停止，周期通信将自动重新建立
 event_exchange-ended-by-itself = 周期通信自行结束
