@@ -1,8 +1,8 @@
 """``servodeck demo --defect``: the command is started with defects, and the tools find them.
 
 The bench file is healthy. The defects here are those of a motor and its brake; a loose coupling and
-a worn belt are found in simulated time (`tests/virtual/tools`), a gantry out of square and a worn
-belt through the page (`tests/browser`), on benches that `DemoBench` makes as the command does.
+a worn belt are found in simulated time (`tests/virtual/tools`), a gantry out of square through the
+page (`tests/browser`), all on benches that `DemoBench` makes as the command does.
 """
 
 from __future__ import annotations
