@@ -39,6 +39,7 @@ REAL_TIME = [
     "tests/api/test_ethercat_segment.py",
     "tests/api/test_every_family.py",
     "tests/api/test_gantry.py",
+    "tests/api/test_demo_defects.py",
     "tests/wire/ethercat_host",
     "tests/api/test_scope_streams.py",
     "tests/api/test_scope_soak.py",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import importlib
 import socket
 import ssl
 import sys
@@ -28,6 +27,7 @@ from backend.station.box.kept import Box, names_of, read
 from backend.station.box.roles import addresses_of
 from backend.station.box.shown import phone_address, scan_code
 from backend.store.database import FILE
+from backend.work import libraries
 from backend.work.journal import Entry
 from drivers.computer import scheduling
 from drivers.computer.processes import raise_descriptors
@@ -49,14 +49,7 @@ DESCRIPTORS = 8192
 
 
 #: What the start leaves out, so that the page is there sooner, and loads behind it.
-LATE = (
-    "scipy.fft",
-    "scipy.ndimage",
-    "scipy.optimize",
-    "scipy.signal",
-    "scipy.special",
-    "backend.report.pdf",
-)
+LATE = (*libraries.COMPUTING, "backend.report.pdf")
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,18 +160,12 @@ _SWITCH_S = 0.0005
 
 async def settle() -> None:
     """What a first request would wait for otherwise, and every later one again and again."""
+    sys.setswitchinterval(_SWITCH_S)
     # One that cannot be read is reported where it is asked for, and keeps no server from its work.
     with contextlib.suppress(ProfileError, OSError, UnicodeDecodeError):
         await asyncio.to_thread(load_all)
-    await asyncio.to_thread(_load_late)
+    await asyncio.to_thread(libraries.load, LATE)
     scheduling.spare_collector()
-    sys.setswitchinterval(_SWITCH_S)
-
-
-def _load_late() -> None:
-    """Libraries that no page needs at first: a measurement must not wait for them in motion."""
-    for name in LATE:
-        importlib.import_module(name)
 
 
 async def accounts_needed(folder: Path, serving: Serving) -> bool:

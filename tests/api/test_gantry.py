@@ -68,22 +68,27 @@ PROFILE = load_profile("mms7")
 KEYS = [p.key for p in storable(PROFILE, motor_individual=True)] + ["6060:00"]
 
 
+def connected(station: Station) -> tuple[str, str]:
+    """Both axes with loops that a cycle of 1 ms shows whole, and the exchange."""
+    drives = station.add(1, URL, name="Left"), station.add(2, URL, name="Right")
+    for drive in drives:
+        # 80 Hz with the inertia of one motor.
+        path = f"/drives/{drive}/parameters/2005:03"
+        station.ok(station.http.put(path, json={"value": 80.0}))
+        for procedure in ("write_settings", "save"):
+            path = f"/drives/{drive}/procedures/{procedure}"
+            station.done(station.http.post(path, json={"confirmed": True}))
+    body = {"url": URL, "cycle_us": 1000}
+    assert station.ok(station.http.post("/buses/cyclic", json=body))["cyclic"]["running"]
+    return drives
+
+
 class Gantry:
     """A station with both axes of a gantry, and the truth of its virtual shafts."""
 
     def __init__(self, station: Station) -> None:
         self.station = station
-        self.left = station.add(1, URL, name="Left")
-        self.right = station.add(2, URL, name="Right")
-        for drive in (self.left, self.right):
-            # 80 Hz with the inertia of one motor: loops that a cycle of 1 ms shows whole.
-            path = f"/drives/{drive}/parameters/2005:03"
-            station.ok(station.http.put(path, json={"value": 80.0}))
-            for procedure in ("write_settings", "save"):
-                path = f"/drives/{drive}/procedures/{procedure}"
-                station.done(station.http.post(path, json={"confirmed": True}))
-        body = {"url": URL, "cycle_us": 1000}
-        assert station.ok(station.http.post("/buses/cyclic", json=body))["cyclic"]["running"]
+        self.left, self.right = connected(station)
         self._before = self.settings()
 
     def trouble(self, command: str, **arguments: object) -> Any:

@@ -39,6 +39,7 @@ from backend.tools.sweep import profile_speed
 from backend.tools.sweep.preview import preview
 from backend.tools.sweep.settings import SweepRequest
 from backend.tools.tool import AnyTool, Run, ToolResult, ToolSettings
+from backend.work import libraries
 from backend.work.jobs import JobResult, Progress
 from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import text
@@ -102,6 +103,8 @@ async def start_tool(
         exchange.taken = True
         limits, axis = request.envelope, connected.axis
         try:
+            # A server that has just started still loads them, and could not renew a motion.
+            await asyncio.to_thread(libraries.load)
             async with AsyncExitStack() as held:
                 for each in (axis,) if partner is None else (axis, partner.axis):
                     await held.enter_async_context(

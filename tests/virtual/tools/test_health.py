@@ -1,4 +1,4 @@
-"""A baseline, then a loose coupling and a worn belt: planted in the mechanics, found and named."""
+"""A baseline, then a loose coupling and a worn belt as the demo plants them: found and named."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from backend.health.compare import compare
 from backend.health.records import HealthRecords
 from backend.health.words import message_of
 from backend.store.database import Store
-from drivers.virtual.defects import LOOSE, WORN, planted
+from drivers.virtual.defects import LOOSE, WORN
+from tests.virtual.tools.set_ups.demo import with_defect
 from tests.virtual.tools.set_ups.health import (
     ASKED,
     AXIS,
@@ -31,7 +32,7 @@ async def test_a_loose_coupling_and_a_worn_belt_are_found(tmp_path: Path) -> Non
     runs = records.add(AXIS, ASKED, healthy.rounds, {"a.sdmeas": "0" * 64}, "Ann")
     records.sign(AXIS.key, runs, "Ann")
 
-    loose = await checked(planted(axis_of(), "coupling_loose"), 2)
+    loose = await checked(with_defect(axis_of(), "coupling_loose"), 2)
     records.add(AXIS, ASKED, loose.rounds, {"b.sdmeas": "1" * 64}, "Ben")
     found = changed(records.condition(AXIS).findings)
     records._store.close()
@@ -44,7 +45,7 @@ async def test_a_loose_coupling_and_a_worn_belt_are_found(tmp_path: Path) -> Non
     assert "check the coupling" in step.words("en")
     assert "联轴器" in step.words("zh")
 
-    worn = await checked(planted(axis_of(), "belt_worn"), 2, response=False)
+    worn = await checked(with_defect(axis_of(), "belt_worn"), 2, response=False)
     found = changed(compare(healthy.rounds, worn.rounds))
     assert set(found) == {"friction 1"}
     assert found["friction 1"].direction == "higher"

@@ -14,9 +14,10 @@ from backend.commands.tools import lines_of
 from backend.tools.load_side.result import LoadSideResult
 from backend.tools.load_side.run import TOOL
 from drivers.errors import NotAllowed
-from drivers.virtual.defects import WORN_BACKLASH_RAD, planted
+from drivers.virtual.defects import WORN_BACKLASH_RAD
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import settings_of
+from tests.virtual.tools.set_ups.demo import with_defect
 from tests.virtual.tools.set_ups.load_side import (
     ASKED,
     CYCLE_S,
@@ -74,9 +75,9 @@ async def test_backlash_stiffness_and_error_are_those_of_the_mechanics() -> None
 
 
 async def test_the_backlash_of_a_worn_belt_is_found_with_the_next_step() -> None:
-    """The defect as it is planted on an axis that has no backlash otherwise."""
+    """As the demo plants it, on an axis that has no backlash otherwise."""
     healthy = axis(gap=0.0)
-    async with direct(planted(healthy, "belt_worn"), CYCLE_S, drive=DRIVE) as bench:
+    async with direct(with_defect(healthy, "belt_worn"), CYCLE_S, drive=DRIVE) as bench:
         found = await measured(bench)
     assert codes(found)[0] == "measured"
     assert found.backlash_deg is not None
