@@ -31,6 +31,7 @@ from drivers.dialect import dialect_of
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError
 from drivers.link import OwnsPowerState
 from drivers.texts.message import Text, joined, text
+from drivers.texts.states import state_text
 from profiles.schema import Fault
 
 #: Longest time that one change of the power state may take (brake and bus included).
@@ -259,8 +260,8 @@ class PowerState:
                 if causes
                 else text("axis.try-see-alarms-page")
             ),
-            state=state.value,
-            goal=goal.value,
+            state=state_text(state),
+            goal=state_text(goal),
             why=why,
         )
         error.names_faults = state in (State.FAULT, State.FAULT_REACTION)

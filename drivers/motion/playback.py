@@ -38,6 +38,7 @@ from drivers.motion.setpoint_plan import (
     Phase,
 )
 from drivers.texts.message import Text, text
+from drivers.texts.states import state_text
 
 STOP_S = 0.1
 """From any speed to standstill; shorter than the 200 ms in which a lost setpoint must end."""
@@ -294,7 +295,7 @@ class AxisLoop:
             self._brakes_itself = self.state is State.QUICK_STOP_ACTIVE
             self._rested = self._stopping = 0
             self.halted = Halted(
-                HaltCause.LEFT_ENABLED, note=self.state.value, left_by=self._left_by(word)
+                HaltCause.LEFT_ENABLED, note=state_text(self.state), left_by=self._left_by(word)
             )
             self._report(self.station, self.halted.text)
         self.phase = Phase.IDLE
@@ -501,11 +502,11 @@ class AxisLoop:
                 raise NotAllowed(
                     "cyclic.motion-needs-enabled-again",
                     where=where,
-                    state=self.state.value,
+                    state=state_text(self.state),
                     cause=self.halted.text,
                 )
             raise NotAllowed(
-                "cyclic.motion-needs-operation-enabled", where=where, state=self.state.value
+                "cyclic.motion-needs-operation-enabled", where=where, state=state_text(self.state)
             )
         wanted = cia402.Mode(self._dialect.mode(MODE_OF[motion.target]))
         if self._mode is not None and self._mode != wanted:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
+import yaml
 
 from drivers.cia402 import State, allowed_goals, decode_state, next_control_word
+from drivers.texts.message import text
+from drivers.texts.states import state_text
 
 # CiA 402-2 table 31: xxxx xxxx x0xx 0000 and so on; x bits tried both ways.
 WORDS = [
@@ -81,3 +86,23 @@ def test_fault_reset_needs_an_edge() -> None:
 def test_nothing_can_be_asked_of_a_drive_in_fault_reaction() -> None:
     assert allowed_goals(State.FAULT_REACTION) == ()
     assert next_control_word(State.FAULT_REACTION, State.READY) is None
+
+
+def test_states_have_the_names_of_the_term_base() -> None:
+    terms = Path(__file__).resolve().parents[2] / "docs" / "glossary" / "terms.yaml"
+    fields = yaml.safe_load(terms.read_text("utf-8")).values()
+    chinese = {term["en"]: term["zh"] for field in fields for term in field}
+    for state in State:
+        name = state_text(state)
+        assert name.words("en") == state.value
+        if state is not State.UNKNOWN:
+            assert name.words("zh") == chinese[state.value]
+
+
+def test_a_refused_state_is_named_in_the_readers_language() -> None:
+    refused = text(
+        "axis.stays-not-go", drive="X", why=text("axis.cause-none"),
+        state=state_text(State.FAULT), goal=state_text(State.OPERATION_ENABLED),
+    )  # fmt: skip
+    assert "“Fault”" in refused.words("en")
+    assert "“故障（Fault）”" in refused.words("zh")

@@ -49,6 +49,7 @@ from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from drivers.texts.message import text
+from drivers.texts.states import state_text
 from profiles.schema import Parameter, Raw
 
 router = APIRouter(prefix="/drives/{drive_id}")
@@ -75,7 +76,7 @@ async def transition(
     mode = None if request.mode is None else _mode(connected, request.mode)
     await _alone(bench, connected, goal.value, lambda: connected.axis.transition(goal, mode))
     bench.journal.add(
-        text("journal.power-state", drive=connected.drive.name, state=goal.value),
+        text("journal.power-state", drive=connected.drive.name, state=state_text(goal)),
         drive=connected.drive.id,
     )
     return convert.axis_state(bench, connected, await connected.monitor.refresh())

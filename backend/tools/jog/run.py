@@ -24,7 +24,8 @@ from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from drivers.texts import limits
 from drivers.texts.answers import sentence
-from drivers.texts.message import Text, joined, prose, text
+from drivers.texts.message import Text, joined, text
+from drivers.texts.states import state_text
 
 PERIOD_S = threshold.PERIOD_S
 TRAVEL_MARGIN_REV = threshold.TRAVEL_MARGIN_REV
@@ -125,8 +126,8 @@ async def _follow(axis: Axis, settings: JogSettings, hold: Hold, start: int) -> 
             raise NotAllowed(
                 "jog.left-enabled",
                 drive=drive.name,
-                enabled=State.OPERATION_ENABLED.value,
-                why=joined(await axis.blocked_by() or [prose(state.value)]),
+                enabled=state_text(State.OPERATION_ENABLED),
+                why=joined(await axis.blocked_by() or [state_text(state)]),
             )
         _inside(axis, settings, units.position(position - start))
         ahead = start + settings.direction * travel

@@ -9,6 +9,7 @@ from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, NotAllowed, motion_halted
 from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted
 from drivers.texts.message import text
+from drivers.texts.states import state_text
 
 #: Ends that the loop makes by itself for what a tool has asked of the axis. A smaller motion or
 #: other gains may mend them; nothing mends any other end but a person.
@@ -65,7 +66,7 @@ async def require_enabled(axis: Axis) -> None:
     """
     state = await axis.state()
     if state is not State.OPERATION_ENABLED:
-        raise interrupted_by(axis, Halted(HaltCause.LEFT_ENABLED, note=state.value))
+        raise interrupted_by(axis, Halted(HaltCause.LEFT_ENABLED, note=state_text(state)))
 
 
 async def ends_all(axis: Axis, error: DriveError) -> bool:

@@ -1,0 +1,9 @@
+state_fault = Fault
+state_fault-reaction-active = Fault reaction active
+state_not-ready-to-switch-on = Not ready to switch on
+state_operation-enabled = Operation enabled
+state_quick-stop-active = Quick stop active
+state_ready-to-switch-on = Ready to switch on
+state_switch-on-disabled = Switch on disabled
+state_switched-on = Switched on
+state_unknown = Unknown

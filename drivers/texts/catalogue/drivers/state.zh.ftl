@@ -1,0 +1,9 @@
+state_fault = 故障（Fault）
+state_fault-reaction-active = 故障反应有效（Fault reaction active）
+state_not-ready-to-switch-on = 未就绪（Not ready to switch on）
+state_operation-enabled = 运行使能（Operation enabled）
+state_quick-stop-active = 快速停止有效（Quick stop active）
+state_ready-to-switch-on = 准备就绪（Ready to switch on）
+state_switch-on-disabled = 禁止接通（Switch on disabled）
+state_switched-on = 已接通（Switched on）
+state_unknown = 未知（Unknown）
