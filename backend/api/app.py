@@ -138,8 +138,8 @@ def make_app(
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         _build_routes(app)
-        # This thread sleeps between answers; when woken, it must run before a browser's longer
-        # slices.
+        # This thread sleeps between answers; when woken, it must run before a
+        # browser's longer slices.
         scheduling.short_slice()
         # Whatever fails during start or end, the bench is closed in order: axes lose their power.
         async with AsyncExitStack() as then:

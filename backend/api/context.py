@@ -18,9 +18,9 @@ from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from drivers.errors import NotAllowed
 
-#: Header that the page sends with every change: the id of its live connection, which may hold
-#: control. The gate removes an id that does not belong to the same session, so a route may trust
-#: it.
+#: Header that the page sends with every change: the id of its live connection, which
+#: may hold control. The gate removes an id that does not belong to the same session,
+#: so a route may trust it.
 CONNECTION_HEADER = "X-Servodeck-Connection"
 
 

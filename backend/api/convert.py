@@ -37,7 +37,7 @@ def moment(seconds: float) -> datetime:
 
 
 def quality(now: LinkQuality) -> models_bench.Quality:
-    """Counters of a link."""
+    """Connection state and counters of a link."""
     return models_bench.Quality(
         connected=now.connected,
         state=words_of(now.state),

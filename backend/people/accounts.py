@@ -1,8 +1,8 @@
 """Accounts, log-in sessions and tokens.
 
-Everything that a request needs is kept in memory (`Directory`), because STOP must not wait for a
-disk; changes go to the database first. `tend` reads what another process (the command line) has
-changed there.
+Everything that a request needs is kept in memory (`Directory`), because STOP must not wait
+for a disk; changes go to the database first. `tend` reads what another process (the command
+line) has changed there.
 """
 
 from __future__ import annotations
@@ -200,8 +200,8 @@ class Accounts:
             TooOften: too many tries.
         """
         account = self.directory.account(account_id)
-        # The caller has a session of the account, so these tries have a budget apart from
-        # strangers'.
+        # The caller has a session of the account, so these tries have a
+        # budget apart from strangers'.
         own = f"account {account_id}"
         self._budgets.require(account.name, address, own)
         self._budgets.tried(account.name, address, own)
@@ -231,8 +231,8 @@ class Accounts:
 
     async def _end(self, sessions: Iterable[str]) -> None:
         gone = list(sessions)
-        # Sessions end in memory first, so that they end even when the disk is full; the rows are
-        # then deleted later.
+        # Sessions end in memory first, so that they end even when the disk is full; the
+        # rows are then deleted later.
         for session in gone:
             self.directory.forget(session)
         if gone:
@@ -246,8 +246,8 @@ class Accounts:
         """Make a token for a script. Returns the secret, which is not stored, and the token.
 
         Raises:
-            NotAllowed: a scope that the owner does not have, no scope, or a lifetime that is too
-            long.
+            NotAllowed: a scope that the owner does not have, no scope, or a
+            lifetime that is too long.
         """
         account = self.directory.account(account_id)
         name = checked_person(name)

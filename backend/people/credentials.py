@@ -15,8 +15,8 @@ from drivers.texts.message import text
 _CLEAR = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"
 
 #: Invisible characters (Default_Ignorable_Code_Point, Unicode Standard 15.0
-#: DerivedCoreProperties.txt): they would allow many different spellings of a name that looks the
-#: same.
+#: DerivedCoreProperties.txt): they would allow many different spellings of a
+#: name that looks the same.
 _IGNORABLE = re.compile(
     "[\u00ad\u034f\u061c\u115f\u1160\u17b4\u17b5\u180b-\u180f\u200b-\u200f\u202a-\u202e"
     "\u2060-\u206f\u3164\ufe00-\ufe0f\ufeff\uffa0\ufff0-\ufff8"

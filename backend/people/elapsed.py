@@ -1,8 +1,8 @@
 """Monotonic time, for limits on a duration.
 
-The wall clock can be set: by a person, by a time server after the start, or after its battery
-failed. A grant must end after its minutes all the same. Time in which the computer was suspended
-counts, where the system reports it.
+The wall clock can be set: by a person, by a time server after the start, or by a power failure. A
+grant must end after its minutes all the same. Time in which the computer was suspended counts,
+where the system reports it.
 """
 
 from __future__ import annotations

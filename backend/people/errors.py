@@ -7,7 +7,7 @@ from drivers.texts.message import Param, Text, as_text, text
 
 
 class NotLoggedIn(NotAllowed):
-    """No valid session, token or cookie, or one that has ended (HTTP 401)."""
+    """No valid session or token, or a wrong password or code (HTTP 401)."""
 
     kind = "not-logged-in"
 

@@ -47,9 +47,9 @@ class Actor:
 acting: ContextVar[Actor | None] = ContextVar("acting", default=None)
 
 
-#: Arrival time of the request or message that is being carried out (`time.monotonic`); None where
-#: the program acts by itself. A STOP pressed after it takes precedence, however long the request
-#: waited.
+#: Arrival time of the request or message that is being carried out (`time.monotonic`);
+#: None where the program acts by itself. A STOP pressed after it takes precedence, however
+#: long the request waited.
 arrived_s: ContextVar[float | None] = ContextVar("arrived_s", default=None)
 
 

@@ -10,8 +10,8 @@ from typing import Literal
 from backend.people.elapsed import elapsed_s
 from drivers.errors import Busy, NotAllowed
 
-#: A request that the holder does not answer passes control on after this time [s], if nothing
-#: moves.
+#: A request that the holder does not answer passes control on after this
+#: time [s], if nothing moves.
 ANSWER_WITHIN_S = 30.0
 LONGEST_HAND_OVER_S = 8 * 3600.0
 
@@ -172,8 +172,8 @@ class Leases:
         if to == connection:
             return
         until = None if time_s is None else self._ticks() + time_s
-        # Control returns to the first giver: a chain of temporary hand-overs would have no known
-        # end.
+        # Control returns to the first giver: a chain of temporary hand-overs
+        # would have no known end.
         giver = None if time_s is None else holder.giver or holder
         self._set(drive, Holder(to, person, time.time(), until, giver))
         self._notify(to, drive, "given", holder.person)

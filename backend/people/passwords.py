@@ -21,8 +21,8 @@ class Passwords:
 
     def __init__(self, hasher: PasswordHasher = DEFAULT) -> None:
         self._hasher = hasher
-        #: Hash to verify against where the account does not exist, so that the answer takes as
-        #: long.
+        #: Hash to verify against where the account does not exist, so that
+        #: the answer takes as long.
         self.decoy = hasher.hash("no account has this password")
 
     def hash(self, password: str) -> str:

@@ -20,7 +20,7 @@ REMEMBERED = timedelta(hours=24)
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """Somebody who may log in."""
+    """An account; ``password`` is the argon2id hash."""
 
     id: int
     name: str
@@ -31,7 +31,7 @@ class Account:
 
 @dataclass(frozen=True, slots=True)
 class LoginSession:
-    """A log-in; ``id`` is the hash of the cookie."""
+    """A log-in session; ``id`` is the hash of the cookie."""
 
     id: str
     account: int

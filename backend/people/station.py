@@ -57,8 +57,8 @@ class People:
     async def open(self, *, recovering: bool = False) -> None:
         """Read the accounts, where the station uses them.
 
-        ``recovering`` skips the check that they still exist; only the machine's terminal may use
-        it.
+        ``recovering`` skips the check that they still exist; only the
+        machine's terminal may use it.
 
         Raises:
             AccountsMissing: the station has had accounts, and has no administrator now.

@@ -1,8 +1,8 @@
 """Remote support: invitations, guests, temporary grants, and the enabling button on site.
 
-Nothing here is stored: a restart of the server ends every invitation. A guest may look; more only
-during a grant of the person on site, and moving an axis only while that person holds the enabling
-button.
+Nothing here is stored: a restart of the server ends every invitation. A guest may look;
+more only during a grant of the person on site, and moving an axis only while that person
+holds the enabling button.
 """
 
 from __future__ import annotations
@@ -90,8 +90,8 @@ class Support:
         self._ticks = ticks
         self._invitations: dict[str, Invitation] = {}
         self._throttle = Throttle(10, ticks)
-        #: By invitation: the on-site connection that holds the button, and time of its last
-        #: message.
+        #: By invitation: the on-site connection that holds the button, and
+        #: time of its last message.
         self._holds: dict[str, tuple[str, float]] = {}
         self._chat: deque[Said] = deque(maxlen=CHAT_KEPT)
         self._said = 0
@@ -243,8 +243,8 @@ class Support:
     ) -> Invitation:
         """Give a guest more rights for a time [s]; replaces an earlier grant.
 
-        The guest's motion is stopped if the new grant lacks a right to move or the axis of the
-        earlier one.
+        The guest's motion is stopped if the new grant lacks a right to move or the
+        axis of the earlier one.
 
         Raises:
             NotAllowed: the guest has not joined, the invitation does not allow a right, no right is

@@ -38,7 +38,7 @@ class Throttle:
         )
 
     def failures(self, key: str) -> int:
-        """Wrong tries of a key since its last right one; 0 when the last was an hour ago."""
+        """Wrong tries of a key since its last right one; 0 if the last was over an hour ago."""
         record = self._known(key)
         return 0 if record is None else record.failures
 

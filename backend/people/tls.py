@@ -29,8 +29,8 @@ from drivers.errors import NotAllowed
 #: Longest lifetime that phones accept, also from an authority that their user has installed.
 LIFETIME = timedelta(days=820)
 AUTHORITY_LIFETIME = timedelta(days=10 * 365)
-#: A certificate with less lifetime left is renewed at a start; the authority outlives what it
-#: issues.
+#: A certificate with less lifetime left is renewed at a start; the authority
+#: outlives what it issues.
 RENEW = timedelta(days=180)
 AUTHORITY_FILE = "authority.pem"
 #: Private, link-local and loopback addresses (RFC 1918, 3927, 4193, 4291).
@@ -195,7 +195,7 @@ def _issue(
 def _builder(
     subject: x509.Name, issuer: x509.Name, secret: _Key, lifetime: timedelta
 ) -> x509.CertificateBuilder:
-    # The clock of a computer that was just switched on may be slow.
+    # The clock of a computer that was just switched on may be behind the real time.
     begin = datetime.now(UTC) - timedelta(days=1)
     return (
         x509.CertificateBuilder()

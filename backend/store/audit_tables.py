@@ -22,8 +22,8 @@ class AuditEntry(Base):
 
     number: Mapped[int] = mapped_column(_NUMBER, primary_key=True, autoincrement=False)
     time: Mapped[str] = mapped_column(String(32), index=True)
-    """ISO 8601 in UTC with microseconds; stored as text, so that it is identical to the hashed
-    text.
+    """ISO 8601 in UTC with microseconds; stored as text, so that it is
+    identical to the hashed text.
     """
     station: Mapped[str] = mapped_column(String(100))
     person: Mapped[str] = mapped_column(String(200), index=True)

@@ -59,8 +59,8 @@ class Blobs:
             if isinstance(self._fs, LocalFileSystem):
                 write_atomically(Path(path), data)
             else:
-                # An object store shows an object only when all of it has arrived, so no temporary
-                # name is needed.
+                # An object store shows an object only when all of it has arrived, so no
+                # temporary name is needed.
                 self._fs.pipe_file(path, data)
         except Exception as error:
             raise self._failed("stored", error) from error

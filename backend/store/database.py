@@ -34,8 +34,8 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 FILE = "servodeck.db"
-#: Key of the migration lock: any number that nothing else on the server uses; the same for all
-#: stations.
+#: Key of the migration lock: any number that nothing else on the server uses;
+#: the same for all stations.
 _MIGRATION_LOCK = 0x5E2D0DEC
 _PATIENCE_S = 5
 #: For the write lock of SQLite [s]. A process waits for a writer of another process by polling, and
@@ -65,8 +65,8 @@ class Store:
         self.url = _url(folder, database)
         self._engine: Engine | None = None
         self._identity: tuple[int, int] | None = None
-        #: Whether the folder has ever existed. A database elsewhere is usable before the folder is
-        #: made.
+        #: Whether the folder has ever existed. A database elsewhere is usable
+        #: before the folder is made.
         self._had_folder = False
         self._opening = threading.Lock()
         self._pool = ThreadPoolExecutor(max_workers=4, thread_name_prefix="store")

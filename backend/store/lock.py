@@ -10,9 +10,10 @@ from drivers.computer.locks import open_lock_file, try_lock
 
 
 class FolderLock:
-    """Lock that is released when its process ends, in whatever way. ``held``: it is ours.
+    """Lock on a state folder; the system releases it when its process ends, in whatever way.
 
-    A folder that does not exist, or cannot be written, is not locked and counts as held.
+    ``held`` is True while this process holds it. A folder that does not exist, or cannot be
+    written, is not locked and counts as held.
     """
 
     NAME = "servodeck.lock"

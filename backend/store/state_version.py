@@ -44,7 +44,7 @@ class StateVersion:
 
 
 def read(folder: Path) -> StateVersion | None:
-    """Read the version of a folder; None if the folder is empty. Changes nothing.
+    """Read the version of a folder; None if nothing is stored in it. Changes nothing.
 
     Raises:
         StateRefused: the file is damaged, or cannot be read.
@@ -100,8 +100,8 @@ def check(folder: Path) -> StateVersion | None:
 def bring_up_to_date(folder: Path) -> bool:
     """Migrate the folder and record its version; True if something was migrated. Blocks.
 
-    The caller holds the folder's lock. Each completed step is recorded, and repeated if the process
-    ended before that.
+    The caller holds the folder's lock. Each completed step is recorded, and repeated if the
+    process ended before that.
 
     Raises:
         StateRefused: as `check`; nothing was changed.

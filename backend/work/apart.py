@@ -2,7 +2,7 @@
 
 On a thread of the server such a reading shares the interpreter with the event loop: a regular
 expression or a JSON decoder over some megabytes blocks everything else until it ends, and a long
-Python loop competes with the event loop at each of its steps.
+Python loop takes the interpreter back after each step of the event loop.
 """
 
 from __future__ import annotations

@@ -171,8 +171,8 @@ class JobRunner:
         STOP, so it must leave the axis where it is.
 
         Raises:
-            Busy: a motion job already holds this axis, its bus is being changed, or too many jobs
-            run.
+            Busy: a motion job already holds this axis, its bus is being
+            changed, or too many jobs run.
         """
         moved = [each for each in (drive, partner) if motion and each is not None]
         for each in moved:

@@ -14,8 +14,8 @@ from collections import OrderedDict
 
 #: Connections without a completed handshake at a time. A handshake takes some milliseconds.
 MOST_SILENT = 128
-#: Connections accepted in one turn of the event loop, which carries out all that is ready before it
-#: polls again.
+#: Connections accepted in one turn of the event loop, which carries out all that is
+#: ready before it polls again.
 PER_TURN = 64
 
 
@@ -31,8 +31,8 @@ class AcceptingSocket(socket.socket):
         """Accept as usual; the connection counts as silent until `begun`.
 
         Raises:
-            BlockingIOError: no connection is waiting, or enough were accepted in this turn of the
-            loop.
+            BlockingIOError: no connection is waiting, or enough were accepted
+            in this turn of the loop.
         """
         if self._left <= 0:
             raise BlockingIOError
@@ -44,8 +44,8 @@ class AcceptingSocket(socket.socket):
         self._silent[line.fileno()] = line
         while len(self._silent) > MOST_SILENT:
             _, oldest = self._silent.popitem(last=False)
-            # Its transport sees the end and closes it; a socket that is closed already has no
-            # descriptor.
+            # Its transport sees the end and closes it; a socket that is closed
+            # already has no descriptor.
             if oldest.fileno() >= 0:
                 with contextlib.suppress(OSError):
                     oldest.shutdown(socket.SHUT_RDWR)

@@ -14,8 +14,8 @@ from backend.people.errors import TooOften
 from backend.people.login.budgets import address_group
 from backend.people.throttle import Bucket
 
-#: Requests in progress at once: all but STOP, those of unknown clients, and of these from one
-#: address.
+#: Requests in progress at once: all but STOP, those of unknown clients, and
+#: of these from one address.
 MOST_REQUESTS, MOST_OF_STRANGERS, MOST_OF_PLACE = 400, 200, 40
 #: Additional requests of unknown clients, only for addresses without a request in progress: a few
 #: addresses with long requests then do not shut out all others.
@@ -30,9 +30,9 @@ _KEEP = 4096
 class Beginnings:
     """Lets a limited number of requests begin per turn of the event loop; the others wait in order.
 
-    A turn carries out all that is ready. With hundreds of requests in one turn, STOP, which is read
-    in the next turn, would wait for all of them; so their work is spread over turns, and STOP
-    bypasses the queue.
+    A turn carries out all that is ready. With hundreds of requests in one turn, STOP, which is
+    read in the next turn, would wait for all of them; so their work is spread over turns, and
+    STOP bypasses the queue.
     """
 
     def __init__(self) -> None:

@@ -98,8 +98,8 @@ class AuditedAnswers:
             await self._app(scope, receive, send)
             return
         matched = next(iter(self._policy.needs(scope["method"], scope["path"])), None)
-        # Looked up now: the name is gone after the request if it removes the drive from the axis
-        # list.
+        # Looked up now: the name is gone after the request if it removes the
+        # drive from the axis list.
         axis = self._name_of(matched.drive) if matched and matched.drive else ""
         body = _Body(receive)
         query = dict(parse_qsl(scope["query_string"].decode("latin-1")))

@@ -114,7 +114,8 @@ def _past(past: PastFault) -> PastFaultInfo:
         causes=list(fault.causes) if fault else [],
         remedies=list(fault.remedies) if fault else [],
         reset=fault.reset if fault else "",
-        # No reading of its own: the selector may point to another record by now.
+        # Values frozen in the drive with this fault: a later read through the same selector
+        # would return another record.
         values=[_frozen(reading) for reading in past.values],
         error=words_of(past.problem),
         error_message=message_or_none(past.problem),

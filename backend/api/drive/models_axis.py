@@ -82,7 +82,7 @@ class TransitionRequest(Message):
 
 
 class ProcedureInfo(Message):
-    """A named sequence of the profile."""
+    """A procedure of the profile: a named sequence of steps."""
 
     name: str
     title: str

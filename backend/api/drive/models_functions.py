@@ -155,7 +155,7 @@ class GearPlanInfo(Message):
 
 
 class GearWritten(Message):
-    """The gear as written."""
+    """Result of writing the gear."""
 
     before: dict[str, int] = Field(description="raw values that undo it")
     waits: dict[str, str] = Field(description="key to what must happen before it acts")
@@ -204,7 +204,7 @@ class BrakingRequest(Message):
 
 
 class BrakingInfo(Message):
-    """Energies of one stop in J, powers in W, resistances in Ω."""
+    """Result of the braking calculation: energies of one stop [J], powers [W], resistances [Ω]."""
 
     kinetic_j: float
     returned_j: float

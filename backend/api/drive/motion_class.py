@@ -77,8 +77,8 @@ async def set_motion_class(
     A class other than ``energises`` also requires the right to move.
     """
     if request.motion != "energises":
-        # It makes the object writable in the parameter table, so it requires the right to move an
-        # axis.
+        # It makes the object writable in the parameter table, so it requires
+        # the right to move an axis.
         require_right(people, me, Right.MOTION, None)
     await asyncio.to_thread(_note, profile, key)
     try:

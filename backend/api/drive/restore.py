@@ -21,8 +21,8 @@ router = APIRouter(prefix="/drives/{drive_id}")
 async def put_back(bench: TheBench, people: ThePeople, me: Me, connected: Controlled) -> JobInfo:
     """Restore every pending value of the drive, while its axis is at standstill.
 
-    If one of them can energise the motor (a mode, the function of a terminal), the right to move is
-    also required.
+    If one of them can energise the motor (a mode, the function of a terminal), the right
+    to move is also required.
     """
     drive = connected.drive
     if not drive.pending_restores:

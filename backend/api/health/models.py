@@ -16,8 +16,8 @@ from backend.tools.wire_message import MessageInfo
 class HealthFinding(BaseModel):
     """Comparison of one quantity with the baseline; changes are fractions (0.1 is 10 % more).
 
-    ``low`` to ``high`` is the confidence interval of the true change, at 99 % for the whole
-    comparison.
+    ``low`` to ``high`` is the confidence interval of the true change, at 99 %
+    for the whole comparison.
     """
 
     quantity: Quantity
@@ -49,7 +49,7 @@ class HealthRunInfo(BaseModel):
 
 
 class HealthBaselineInfo(BaseModel):
-    """A signed baseline. ``intact``: its contents still have the checksum of the signing."""
+    """A signed baseline. ``intact``: its contents still match the checksum of the signature."""
 
     id: int
     signed: datetime

@@ -59,8 +59,8 @@ async def health_trend(
         since = since.replace(tzinfo=UTC)
 
     def made() -> bytes:
-        # On the store's thread up to the last byte, so that the event loop of the buses does not
-        # wait.
+        # On the store's thread up to the last byte, so that the event loop of
+        # the buses does not wait.
         found = [info_of(each) for each in records_of(bench).trend(since, axis)]
         return _TREND.dump_json(found)
 

@@ -91,8 +91,8 @@ class Unattended:
         """Store a permission that a person gives now.
 
         Raises:
-            NotAllowed: it is from a guest, for too long, for nothing, without a name or without a
-            baseline.
+            NotAllowed: it is from a guest, for too long, for nothing, without a
+            name or without a baseline.
         """
         if me.is_guest:
             raise NotAllowed("health.permission-guest", drive=connected.drive.name)

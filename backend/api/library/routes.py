@@ -193,7 +193,7 @@ async def change_library_entry(
         entry = _entry(bench, entry_id)
         tags = tuple(change.tags) if change.tags is not None else None
         if entry.kind == "recording" and entry.station == records.station:
-            # The remarks of a recording are stored next to its file, and are copied with it.
+            # The remarks of a recording are stored next to its file, and belong to it.
             recordings.library.annotate(entry.name, notes=change.notes, tags=tags, kept=None)
         if change.deleted is False:
             entry = records.library.undelete(entry_id)

@@ -54,8 +54,8 @@ from backend.tools.jog.release import end_of_jog
 from drivers.errors import DriveError
 from drivers.texts.message import Text, text
 
-#: Limit of messages that wait for a slow page; states, values and drive lists coalesce and are not
-#: counted.
+#: Limit of messages that wait for a slow page; states, values and drive lists
+#: coalesce and are not counted.
 QUEUE = 500
 #: A connection that has not accepted a message for this long [s] is closed.
 SEND_TIMEOUT_S = 10.0

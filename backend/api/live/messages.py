@@ -1,6 +1,6 @@
-"""Messages of the websocket ``/api/v1/live``. Text frames are JSON of these types.
+"""Messages of the websocket ``/api/v1/live``. Text frames contain one of these types as JSON.
 
-Binary frames carry one scope block or several, one behind the other, little endian::
+Binary frames contain one or more scope blocks in sequence, little endian::
 
     u32 magic 0x424B4353 ("SCKB")   u32 subscription   u32 sequence   u32 dropped samples
     u16 n rows   u16 k channels   u32 flags (bit 0: true times follow, bit 1: bases follow,
@@ -10,9 +10,9 @@ Binary frames carry one scope block or several, one behind the other, little end
     [k] f64 bases, to be added to the samples of each channel (only with flag bit 1)
     [n*k] f32 samples in engineering units, row after row; NaN where a value is not valid
 
-Sequence and dropped samples are of one stream of a subscription: channels that the cyclic exchange
-carries and channels that are polled are streams of their own; the others' columns are NaN. After
-another ScopeInfo the sequence begins again.
+Sequence and dropped samples are counted per stream of a subscription: channels of the cyclic
+exchange and polled channels are separate streams; in a block, the columns of other streams are NaN.
+After another ScopeInfo the sequence begins again.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class WatchValues(Message):
 
 
 class JogStart(Message):
-    """Begin to jog; the axis must be enabled, or be allowed to be enabled.
+    """Begin to jog; an axis that is not enabled is enabled for the jog.
 
     The job ends when the renewals stop, the socket closes or control is lost.
     """

@@ -27,8 +27,8 @@ from drivers.errors import Busy, DriveError
 #: Limits of one connection: subscriptions, and waiting requests.
 MOST_SUBSCRIPTIONS = 32
 MOST_REQUESTS = 200
-#: A page that accepts no block for this long [s] is disconnected; lost samples are counted until
-#: then.
+#: A page that accepts no block for this long [s] is disconnected; lost
+#: samples are counted until then.
 SEND_TIMEOUT_S = 10.0
 #: Size limit of a frame [bytes]; the last block may exceed it.
 FRAME_BYTES = 256 * 1024
@@ -59,8 +59,8 @@ class ScopeStreams:
         self._notify = notify
         self._send = send
         self._running: dict[int, _Running] = {}
-        #: Requests run on a task of their own: ending a poll may wait for a mute drive, and STOP
-        #: and jog must not.
+        #: Requests run on a task of their own: ending a poll may wait for a mute drive,
+        #: and STOP and jog must not.
         self._requests: asyncio.Queue[ScopeStart | ScopeStop | None] = asyncio.Queue(MOST_REQUESTS)
         #: Set when a block of any stream is waiting.
         self._ready = asyncio.Event()

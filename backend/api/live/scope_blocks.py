@@ -23,8 +23,8 @@ def encode_block(
 ) -> bytes:
     """Encode a block as a binary frame; columns of channels in other streams are NaN.
 
-    ``numbers`` are the columns of the block's channels among ``count``; ``place`` is the number of
-    the stream.
+    ``numbers`` are the columns of the block's channels among ``count``; ``place`` is
+    the number of the stream.
     """
     rows = len(block.samples)
     values: npt.NDArray[np.float64] = np.full((rows, count), np.nan)
@@ -37,8 +37,8 @@ def encode_block(
         extra = block.times_s.astype("<f8").tobytes()
     largest = np.abs(values, where=~np.isnan(values), out=np.zeros_like(values))
     if rows and largest.max() > _EXACT:
-        # A multi-turn position: float32 represents its change within a block exactly, but not the
-        # value itself.
+        # A multi-turn position: float32 represents its change within a block exactly,
+        # but not the value itself.
         flags |= BASES
         bases = np.nan_to_num(values[0]).astype("<f8")
         values = values - bases

@@ -47,7 +47,7 @@ class SetUp(Message):
 
 
 class JoinAsGuest(Message):
-    """The secret of an invitation's link, and the code told to the guest."""
+    """The secret of an invitation's link, and the code given to the guest."""
 
     link: Annotated[str, Field(min_length=1, max_length=100)]
     code: Code

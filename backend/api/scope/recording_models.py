@@ -159,7 +159,7 @@ class RecordedTrace(Message):
 
 
 class RecordedSamples(Message):
-    """All samples of one section of a recording, at the recorded rate."""
+    """All samples of one section of a recording, without decimation."""
 
     start: datetime = Field(description="time of the first sample of the recording")
     from_s: float

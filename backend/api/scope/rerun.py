@@ -23,7 +23,7 @@ _POLICY = (
 )
 _HEADERS = {"Content-Security-Policy": _POLICY, "Cache-Control": "no-cache"}
 _FOREVER = "public, max-age=31536000, immutable"
-#: Silence [s] after which a page counts as gone: it pulls frames all the time.
+#: Time [s] without a request for a frame after which a page counts as gone.
 SILENT_S = 60.0
 SEND_TIMEOUT_S = 10.0
 

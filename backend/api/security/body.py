@@ -27,9 +27,9 @@ def framing(headers: Iterable[tuple[bytes, bytes]]) -> tuple[str | None, bool]:
     """Return Content-Length as sent, and whether the body is chunked.
 
     Raises:
-        BodyRefused: both headers, or one of them twice. A proxy in front could end the body at
-        another place than we do, and treat the rest as another request (RFC 9112 clauses 6.3 and
-        11.2).
+        BodyRefused: both headers, or one of them twice. A proxy in front could end the
+        body at another place than we do, and treat the rest as another request (RFC
+        9112 clauses 6.3 and 11.2).
     """
     lengths = [value for key, value in headers if key == b"content-length"]
     codings = [value for key, value in headers if key == b"transfer-encoding"]

@@ -1,9 +1,9 @@
 """The gate: checks every request and websocket before any code of a route runs.
 
-The order of the checks: address (Host, Origin), declared route (`backend.api.security.rights`),
-identity (cookie or token), right, origin of a change (CSRF token), control of the axis, size of the
-body. An admitted request runs with `acting` set, so that everything it starts is attributed to its
-person.
+The order of the checks: address (Host, Origin), identity (cookie or token), declared route
+(`backend.api.security.rights`), right, control of the axis, CSRF token of a change, size of
+the body. An admitted request runs with `acting` set, so that everything it starts is
+attributed to its person.
 """
 
 from __future__ import annotations

@@ -30,10 +30,10 @@ DRAIN_S = 60.0
 #: Limit of connections from one address that is not this machine. A page needs about eight.
 MOST_PER_ADDRESS = 100
 
-#: Limit of all connections: above it the longest idle one is closed for a new one. Requests in
-#: progress and websockets have limits of their own, which are lower in total
-#: (`backend.api.admission.requests`, `backend.api.security.socket`), so that there always is an
-#: idle one.
+#: Limit of all connections: above it the longest idle one is closed for a new one.
+#: Requests in progress and websockets have limits of their own, which are lower in
+#: total (`backend.api.admission.requests`, `backend.api.security.socket`), so that
+#: there always is an idle one.
 MOST_CONNECTIONS = 800
 
 #: Control frames of a websocket: burst, and frames per second. Our page answers a ping every 5 s.
@@ -107,8 +107,8 @@ class PatientProtocol(H11Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Count the connection; if it is one too many, close the longest idle one.
 
-        Clients that only hold connections then cannot shut others out: STOP may also come by a new
-        connection.
+        Clients that only hold connections then cannot shut others out: STOP may also
+        come by a new connection.
         """
         super().connection_made(transport)
         _give_up_unread(transport)
@@ -185,8 +185,8 @@ class PatientProtocol(H11Protocol):
     def data_received(self, data: bytes) -> None:
         """Handle data; the time limit runs while the head of a request is incomplete.
 
-        Only a limited number of new requests is parsed per turn; what may be STOP is parsed at
-        once.
+        Only a limited number of new requests is parsed per turn; what may
+        be STOP is parsed at once.
         """
         if self.conn.their_state is not h11.IDLE or data.startswith(_STOP):
             self._received(data)
@@ -213,8 +213,8 @@ class PatientProtocol(H11Protocol):
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
         """Leave the connection to the websocket, which has limits of its own."""
         self._disarm()
-        # The end of a websocket is not reported here; its messages and silence are limited
-        # elsewhere.
+        # The end of a websocket is not reported here; its messages and
+        # silence are limited elsewhere.
         self._uncount()
         super().handle_websocket_upgrade(event)
 

@@ -211,8 +211,8 @@ _API: dict[str, Need] = {
     "POST /drives/{drive_id}/sets": Need(Right.FILES, "drive"),
     "GET /drives/{drive_id}/diff": _LOOK,
     "GET /drives/{drive_id}/three-way": _LOOK,
-    # Lists for the machine's controller are made of stored sets, and noted in the report; comparing
-    # only reads.
+    # Lists for the machine's controller are made of stored sets, and noted in the
+    # report; comparing only reads.
     "POST /handover": _FILES_UPLOAD,
     "POST /drives/{drive_id}/handover": _FILES_UPLOAD,
     "POST /drives/{drive_id}/handover/compare": Need(Right.LOOK, body_bytes=9 << 20),

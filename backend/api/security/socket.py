@@ -13,8 +13,8 @@ from backend.people.throttle import Bucket
 
 #: Our close codes: the session has ended; the page sends more than a person can cause.
 OVER, FLOODED = 4401, 4429
-#: Limit on messages: burst, and messages per second. A held button sends 25 per second, pointer and
-#: cursor 20 each.
+#: Limit on messages: burst, and messages per second. A held button sends 25 per second,
+#: pointer and cursor 20 each.
 _FLOOD = (600.0, 200.0)
 #: Websockets of one session: enough for ten pages with plots, recordings and the axis in 3D.
 MOST_PER_SESSION = 40

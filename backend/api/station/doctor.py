@@ -40,8 +40,8 @@ async def bus_doctor(
 ) -> list[StationDiagnosis]:
     """Find what keeps the stations of an opened EtherCAT or CANopen bus from Operational.
 
-    The most likely cause comes first. Reads registers and objects as they are now; changes no
-    state.
+    The most likely cause comes first. Reads registers and objects as they
+    are now; changes no state.
     """
     doctor = _doctor(bench, url)
     seen = [station] if station is not None else sorted(await doctor.stations_known())
@@ -54,8 +54,8 @@ async def try_setting(
 ) -> JobInfo:
     """Take a drive to Operational with one setting changed, then undo it.
 
-    Nothing is written to the drive's parameters and no axis is enabled. The job's result is
-    TrialResult.
+    Nothing is written to the drive's parameters and no axis is enabled. The
+    job's result is TrialResult.
     """
     require_bus(bench, request.url, connection)
     _doctor(bench, request.url)

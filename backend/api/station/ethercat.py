@@ -183,8 +183,8 @@ async def load_firmware(
 async def _require_loadable(connected: ConnectedDrive, link: EthercatLink, station: int) -> None:
     """Check that the drive is the one that was connected, and is not enabled.
 
-    A drive without valid firmware stays in INIT or BOOT: it cannot be enabled, and only its EEPROM
-    identifies it.
+    A drive without valid firmware stays in INIT or BOOT: it cannot be enabled, and only
+    its EEPROM identifies it.
 
     Raises:
         NotAllowed: another drive answers, or it is enabled.
@@ -266,8 +266,8 @@ def _station_of(connected: ConnectedDrive, link: EthercatLink) -> int | None:
 def calm_segment(bench: Bench, link: EthercatLink, connection: str | None) -> None:
     """Check that the connection may control every drive of the segment and nothing moves.
 
-    The operation that follows keeps the bus busy or resets a drive; neither may happen while
-    another axis moves.
+    The operation that follows keeps the bus busy or resets a drive; neither may happen
+    while another axis moves.
 
     Raises:
         Busy: another person has control of a drive, or an axis moves.
@@ -310,8 +310,8 @@ def _station(
     spec = connected.drive.profile.link("ethercat") if connected else None
     own = [f for f in survey.findings if f.station == seen.station]
     why = seen.al_text
-    # SOEM takes the first slave with a distributed clock as reference; its own deviation is not
-    # written.
+    # SOEM takes the first slave with a distributed clock as reference; its own
+    # deviation is not written.
     reference = seen.station == next(
         (s.station for s in survey.stations if s.distributed_clock), None
     )

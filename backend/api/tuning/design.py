@@ -186,7 +186,7 @@ def _gains(speed_hz: float, integral_hz: float, position_1_s: float, inertia_kgm
 
 @router.post("/drives/{drive_id}/tune/undo")
 async def undo_tuning(bench: TheBench, connected: Controlled, request: Undo) -> Undo:
-    """Restore the values that a change returned as `before`; returns an undo of this in turn.
+    """Restore the values that a change returned as `before`; returns the undo of that.
 
     If the change's `after` is given, a value that was written since is not overwritten.
     """
@@ -244,8 +244,8 @@ _running: _Running = {}
 async def _evaluated_once(file: Path, changed_ns: int) -> sweep_evaluation.SweepResult:
     """Like `_evaluated`; concurrent requests for the same response share one evaluation.
 
-    A page that opens a response sends several requests at once, each of which would occupy a
-    processor.
+    A page that opens a response sends several requests at once, each of which
+    would occupy a processor.
     """
     place = (asyncio.get_running_loop(), file, changed_ns)
     task = _running.get(place)

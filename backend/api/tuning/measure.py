@@ -102,8 +102,8 @@ async def start_tool(
         exchange.taken = True
         limits, axis = request.envelope, connected.axis
         try:
-            # A server that has just started still loads libraries, and could not renew a motion
-            # meanwhile.
+            # A server that has just started still loads libraries, and could not
+            # renew a motion meanwhile.
             await asyncio.to_thread(libraries.load)
             async with AsyncExitStack() as held:
                 for each in (axis,) if partner is None else (axis, partner.axis):
@@ -168,8 +168,8 @@ def _conclude(
 ) -> None:
     """Store the result with the raw data that it was evaluated from.
 
-    If there are several files of a kind (of designs that were undone), the result is of the last
-    one.
+    If there are several files of a kind (of designs that were undone), the
+    result is of the last one.
     """
     kinds = {store.head(file).kind: file for file in files}
     parts = dict.fromkeys(kinds, result) if tool.parts is None else tool.parts(result)

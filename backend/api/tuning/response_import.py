@@ -61,7 +61,7 @@ async def import_recording(
 
 
 def _store(bench: TheBench, name: str, packed: str) -> str:
-    """Store it under the time and a plain form of the file's name; never over another file."""
+    """Store the result under the time and a plain form of the file's name, never over another."""
     stem = re.sub(r"[^\w-]+", "-", PurePath(name.replace("\\", "/")).name.split(".")[0])[:40]
     begin = f"{datetime.now(UTC):%Y%m%d-%H%M%S}-imported-{stem.strip('-') or 'recording'}"
     whole, number = begin + SUFFIX, 2

@@ -50,8 +50,8 @@ class AccountsMarker:
         """Read the marker; None if there is none. A damaged marker is returned with empty values.
 
         Raises:
-            AccountsMissing: the file cannot be read, so that it is unknown whether there are
-            accounts.
+            AccountsMissing: the file cannot be read, so that it is unknown
+            whether there are accounts.
         """
         try:
             content = json.loads(self.path.read_bytes())

@@ -1,12 +1,12 @@
 """Queue for the password hash: one computation at a time, and no crowd delays other clients.
 
-A hash deliberately costs a tenth of a second of a core, and several at a time would take the cores
-from the cyclic exchange. Turns are therefore given in a fixed order: first to known clients (a
-browser that has logged in before, somebody who changes their password), then to the other address
-with the fewest wrong tries, and between equal ones in rotation: clients that guess come after those
-that have not been wrong. Within one address the newest client has the turn and the oldest is
-refused with "try again", so that a crowd of earlier guesses does not delay the client that comes
-after it.
+A hash deliberately costs a tenth of a second of a core, and several at a time would take the
+cores from the cyclic exchange. Turns are therefore given in a fixed order: first to known
+clients (a browser that has logged in before, somebody who changes their password), then to the
+other address with the fewest wrong tries, and between equal ones in rotation: clients that guess
+come after those that have not been wrong. Within one address the newest client has the turn and
+the oldest is refused with "try again", so that a crowd of earlier guesses does not delay the
+client that comes after it.
 """
 
 from __future__ import annotations
