@@ -62,7 +62,7 @@ from drivers.computer import scheduling
 
 PREFIX = "/api/v1"
 _HERE = Path(__file__).resolve()
-#: Where a wheel carries the built page, and where a checkout has it.
+#: Folder of the built page: in a wheel, and in a checkout.
 _PAGE_FOLDERS = (_HERE.parents[1] / "web", _HERE.parents[2] / "webui" / "dist")
 
 _PROBLEMS = (
@@ -119,11 +119,11 @@ def make_app(
     own_addresses: bool = False,
     strict_transport: bool = False,
 ) -> FastAPI:
-    """The application over a bench. ``hosts`` are the Host names that it answers to.
+    """Make the application of a bench. ``hosts`` are the accepted values of the Host header.
 
-    Without ``people`` whoever reaches it is the one user: for the machine's own loopback. For
-    ``behind`` and ``own_addresses`` see `Addresses`; ``strict_transport`` shows browsers to come
-    by HTTPS only.
+    Without ``people`` there are no accounts and everybody who reaches the server is the same user,
+    which is permissible only on the machine's own loopback interface. For ``behind`` and
+    ``own_addresses`` see `Addresses`; ``strict_transport`` makes browsers use HTTPS only.
     """
 
     recordings = Recordings(bench, bench.state_folder / "recordings")
@@ -138,9 +138,10 @@ def make_app(
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         _build_routes(app)
-        # Between answers this thread sleeps; woken, it goes before a browser's longer turns.
+        # This thread sleeps between answers; when woken, it must run before a
+        # browser's longer slices.
         scheduling.short_slice()
-        # Whatever fails on the way up or down, the bench is closed in order: axes lose their power.
+        # Whatever fails during start or end, the bench is closed in order: axes lose their power.
         async with AsyncExitStack() as then:
             recordings.open()
             await known.open()
@@ -153,7 +154,7 @@ def make_app(
             then.push_async_callback(recordings.close)
             then.push_async_callback(scene.close)
             then.push_async_callback(feed.close)
-            # What moves is stopped before a slow disk may keep the server waiting.
+            # Motion is stopped before a slow disk can delay the end of the server.
             then.push_async_callback(bench.jobs.close)
             then.push_async_callback(unattended.close)
             yield
@@ -202,7 +203,7 @@ def make_app(
 
 
 def _build_routes(app: FastAPI) -> None:
-    """Have built now what the first request would wait for a quarter of a second."""
+    """Build the routes now; the first request would otherwise wait a quarter of a second."""
     nowhere = {"type": "http", "method": "GET", "path": PREFIX, "root_path": "", "headers": []}
     for route in app.routes:
         route.matches(nowhere)
@@ -227,7 +228,7 @@ def _add_page(app: FastAPI) -> None:
             )
         wanted = (folder / path).resolve()
         if path and wanted.is_relative_to(folder) and wanted.is_file():
-            # Assets carry a hash of their contents in the name.
+            # The names of assets contain a hash of their contents.
             forever = "public, max-age=31536000, immutable"
             cache = forever if path.startswith("assets/") else "no-cache"
             headers = {"Cache-Control": cache, "Vary": "Accept-Encoding"}

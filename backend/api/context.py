@@ -1,7 +1,7 @@
-"""What every route gets: the bench, who asks, and the permission to change an axis.
+"""Dependencies of all routes: the bench, the person, and control of the axis.
 
-All are coroutines although none waits: FastAPI runs plain functions in a thread each, and every
-answer would wait for its turn twice more.
+All are coroutines although none waits: FastAPI runs plain functions on threads, which would delay
+every answer by two more thread switches.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from drivers.errors import NotAllowed
 
-#: Sent by the page with every change: the id of its live connection, which may hold a lease. The
-#: gate takes away one that is not of the same session, so a route may trust it.
+#: Header that the page sends with every change: the id of its live connection, which
+#: may hold control. The gate removes an id that does not belong to the same session,
+#: so a route may trust it.
 CONNECTION_HEADER = "X-Servodeck-Connection"
 
 
@@ -36,7 +37,7 @@ TheBench = Annotated[Bench, Depends(bench_of)]
 
 
 async def people_of(request: Request) -> People:
-    """The people of this server."""
+    """Accounts and guests of this server."""
     people = request.app.state.people
     if not isinstance(people, People):
         raise TypeError("the application was made without people")
@@ -44,10 +45,10 @@ async def people_of(request: Request) -> People:
 
 
 async def identity_now() -> Identity:
-    """Who asks.
+    """Identity of the person behind this request.
 
     Raises:
-        NotLoggedIn: nobody.
+        NotLoggedIn: there is none.
     """
     actor = acting.get()
     if actor is None:
@@ -60,7 +61,7 @@ Me = Annotated[Identity, Depends(identity_now)]
 
 
 async def member_of(drive_id: str, bench: TheBench) -> ConnectedDrive:
-    """The drive that a path names.
+    """The connected drive whose id is in the path.
 
     Raises:
         NotFound: there is none.
@@ -74,6 +75,6 @@ async def member_of(drive_id: str, bench: TheBench) -> ConnectedDrive:
 TheDrive = Annotated[ConnectedDrive, Depends(member_of)]
 
 
-#: The drive that a path names, for a route that changes it. The gate has made sure that nobody
-#: else has control (backend.api.security.rights).
+#: The drive in the path, for a route that changes it. The gate has checked that nobody else
+#: controls it (backend.api.security.rights).
 Controlled = TheDrive

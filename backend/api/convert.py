@@ -1,4 +1,4 @@
-"""From the server's own types to the messages of the interface."""
+"""Conversion of the server's own types to messages of the interface."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ from profiles.schema import ConfirmStep, Fault, Parameter, Procedure
 
 
 def moment(seconds: float) -> datetime:
-    """Epoch seconds as a time with zone."""
+    """Convert epoch seconds to a time in UTC."""
     return datetime.fromtimestamp(seconds, UTC)
 
 
 def quality(now: LinkQuality) -> models_bench.Quality:
-    """Counters of a link."""
+    """Connection state and counters of a link."""
     return models_bench.Quality(
         connected=now.connected,
         state=words_of(now.state),
@@ -55,7 +55,7 @@ def quality(now: LinkQuality) -> models_bench.Quality:
 
 
 def bus(bench: Bench, url: str, link: Link) -> models_bench.Bus:
-    """An opened bus."""
+    """An opened bus with its quality and cyclic exchange."""
     session = bench.sessions.get(url)
     info = None
     if session is not None and session.state is not None:
@@ -81,7 +81,7 @@ def bus(bench: Bench, url: str, link: Link) -> models_bench.Bus:
 
 
 def lease(bench: Bench, drive: str, connection: str | None) -> models_bench.Lease:
-    """Who controls a drive, seen from ``connection``."""
+    """Control of a drive, as seen from ``connection``."""
     holder = bench.leases.holder(drive)
     if holder is None:
         return models_bench.Lease(holder=None, since=None)
@@ -100,7 +100,7 @@ def lease(bench: Bench, drive: str, connection: str | None) -> models_bench.Leas
 def drive_summary(
     bench: Bench, connected: ConnectedDrive, connection: str | None = None
 ) -> models_bench.DriveSummary:
-    """A drive of the bench."""
+    """Summary of a drive of the bench."""
     drive, found = connected.drive, connected.drive.found
     return models_bench.DriveSummary(
         id=drive.id,
@@ -142,7 +142,7 @@ def drive_summary(
 
 
 def fault(known: Fault) -> models_axis.ActiveFault:
-    """A fault with what to do about it."""
+    """A fault with its causes and remedies."""
     return models_axis.ActiveFault(
         code=known.code,
         name=known.name,
@@ -155,7 +155,7 @@ def fault(known: Fault) -> models_axis.ActiveFault:
 
 
 def axis_state(bench: Bench, connected: ConnectedDrive, now: Snapshot) -> models_axis.AxisState:
-    """State of an axis."""
+    """State of an axis from a snapshot of its monitor."""
     job = bench.jobs.moving(connected.drive.id)
     try:
         name = cia402.MODE_NAMES[Mode(now.mode or 0)]
@@ -193,7 +193,7 @@ def axis_state(bench: Bench, connected: ConnectedDrive, now: Snapshot) -> models
 
 
 def reading(drive: Drive, key: str) -> models_parameters.ParameterValue:
-    """What the drive said last of a parameter."""
+    """Last reading of a parameter."""
     last = drive.readings.get(key) or Reading(key, None, None, None)
     return models_parameters.ParameterValue(
         key=key,
@@ -209,7 +209,7 @@ def reading(drive: Drive, key: str) -> models_parameters.ParameterValue:
 
 
 def readings(drive: Drive, keys: list[str]) -> list[models_parameters.ParameterValue]:
-    """Like `reading` for many, with the marks computed once."""
+    """Like `reading` for many parameters, with unsaved and pending values looked up once."""
     unsaved, pending = drive.unsaved, drive.pending
     result = []
     for key in keys:
@@ -233,7 +233,7 @@ def readings(drive: Drive, keys: list[str]) -> list[models_parameters.ParameterV
 def parameter_row(
     drive: Drive, parameter: Parameter, last: models_parameters.ParameterValue
 ) -> models_parameters.ParameterRow:
-    """Description and value of a parameter."""
+    """Description and last reading of a parameter."""
     why = drive.unreachable_why(parameter)
     energises = motion_of(parameter) == "energises"
     door = alternative_of(drive.profile, parameter) if energises else None
@@ -290,7 +290,7 @@ def procedure(known: Procedure) -> models_axis.ProcedureInfo:
 
 
 def job(known: Job) -> models.JobInfo:
-    """A job."""
+    """State, progress and result of a job."""
     return models.JobInfo(
         id=known.id,
         kind=known.kind,
@@ -324,7 +324,7 @@ def _cancellation(known: Job) -> models.Cancellation | None:
 
 
 def found_drive(bench: Bench, url: str, kind: str, found: Found) -> models_bench.FoundDrive:
-    """A drive seen by a scan."""
+    """A drive found by a scan."""
     user = next(
         (
             connected.drive.id
@@ -355,7 +355,7 @@ def found_drive(bench: Bench, url: str, kind: str, found: Found) -> models_bench
 
 
 def matches(kind: str, found: Found) -> list[models_bench.ProfileMatch]:
-    """Profiles that fit, best first."""
+    """Profiles that match a found drive, best match first."""
     return [
         models_bench.ProfileMatch(
             profile=match.profile.drive,

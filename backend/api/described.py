@@ -1,4 +1,4 @@
-"""The application with a description that says what errors look like (RFC 9457)."""
+"""The application with an OpenAPI document that describes its errors (RFC 9457)."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _SCHEMAS = "#/components/schemas/{model}"
 
 
 def refusals(statuses: Iterable[tuple[int, str]]) -> dict[int | str, dict[str, Any]]:
-    """Answers that every route may refuse with, by status and its description.
+    """Error responses of every route, by status with its description.
 
-    As a reference: with the model itself FastAPI would make a validator of it for every route and
-    status at every start, thousands of them, that nothing uses.
+    As a schema reference: with the model itself FastAPI would build a validator for every route and
+    status at every start, thousands of them, which are never used.
     """
     schema = {"$ref": _SCHEMAS.format(model=Problem.__name__)}
     return {
@@ -29,10 +29,10 @@ def refusals(statuses: Iterable[tuple[int, str]]) -> dict[int | str, dict[str, A
 
 
 class DescribedApp(FastAPI):
-    """FastAPI documents every answer as plain JSON; ours that refuse are problem details."""
+    """FastAPI application that documents its errors as problem details, not as plain JSON."""
 
     def openapi(self) -> dict[str, Any]:
-        """The OpenAPI document."""
+        """Return the OpenAPI document."""
         if self.openapi_schema is None:
             document = super().openapi()
             for operations in document["paths"].values():
@@ -46,7 +46,7 @@ def _describe_problem(schemas: dict[str, Any]) -> None:
     made = Problem.model_json_schema(ref_template=_SCHEMAS)
     parts = made.pop("$defs", {})
     for field in made["properties"].values():
-        # As FastAPI describes an optional field of every other answer.
+        # Omitted as in FastAPI's own description of optional fields.
         if field.get("default", "") is None:
             del field["default"]
     merged = {**parts, **schemas, Problem.__name__: made}

@@ -1,4 +1,4 @@
-"""The one place where errors become HTTP answers (RFC 9457 problem details)."""
+"""The only place that converts errors to HTTP answers (RFC 9457 problem details)."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from drivers.texts.message import Param, Text, as_text, language, text
 
 log = logging.getLogger(__name__)
 
-#: The first that fits counts.
+#: HTTP status by class of error; the first matching class counts.
 STATUS: dict[type[DriveError], int] = {
     NotLoggedIn: 401,
     Forbidden: 403,
@@ -45,8 +45,8 @@ STATUS: dict[type[DriveError], int] = {
     LinkTimeout: 504,
 }
 
-#: By the kind of error, in English and the same for every occurrence (RFC 9457, section 3.1.3). The
-#: page has its own words for each (`problemTitle` in `webui/src/i18n/texts/drive.ts`).
+#: Titles by kind of error, in English and the same for every occurrence (RFC 9457, section 3.1.3).
+#: The page has translations (`problemTitle` in `webui/src/i18n/texts/drive.ts`).
 TITLES = {
     "drive-error": "Drive error",
     "link-timeout": "No answer in time",
@@ -83,13 +83,13 @@ TITLES = {
 
 
 class NotFound(NotAllowed):
-    """The address names nothing that exists."""
+    """The address refers to nothing that exists."""
 
     kind = "not-found"
 
 
 class WrongMethod(DriveError):
-    """The address is there, but not for this method. ``methods`` are those that it has."""
+    """The address exists, but not for this method. ``methods`` are the permitted ones."""
 
     kind = "wrong-method"
 
@@ -99,9 +99,9 @@ class WrongMethod(DriveError):
 
 
 def problem_of(error: Exception) -> Problem:
-    """Problem details of any error, in the language of whoever asks.
+    """Problem details of any error, in the language of the request.
 
-    What is not a DriveError is ours, and says so.
+    An error that is not a DriveError is a defect of servodeck, and is described as one.
     """
     spoken = language()
     if not isinstance(error, DriveError):
@@ -137,17 +137,17 @@ def problem_of(error: Exception) -> Problem:
 
 
 def message_of(message: Text) -> MessageInfo:
-    """A message for the API."""
+    """A message in the form of the API."""
     return MessageInfo.model_validate(message.to_wire())
 
 
 def message_or_none(message: Text | None) -> MessageInfo | None:
-    """A message for the API, where there is one."""
+    """A message in the form of the API; None without one."""
     return None if message is None else message_of(message)
 
 
 def words_of(message: Text | None) -> str:
-    """The sentence in the language of whoever asks; empty where there is none."""
+    """The sentence in the language of the request; empty without a message."""
     return "" if message is None else message.words(language())
 
 
@@ -160,7 +160,7 @@ def _status(error: DriveError) -> int:
 
 
 def answer(problem: Problem) -> JSONResponse:
-    """A problem as an HTTP answer."""
+    """Make the HTTP answer of a problem."""
     return JSONResponse(
         problem.model_dump(mode="json"),
         status_code=problem.status,
@@ -169,7 +169,7 @@ def answer(problem: Problem) -> JSONResponse:
 
 
 def answer_error(error: DriveError) -> JSONResponse:
-    """A refusal as an HTTP answer, with the headers that belong to it (RFC 9110)."""
+    """Make the HTTP answer of an error, with the headers that belong to it (RFC 9110)."""
     response = answer(problem_of(error))
     if isinstance(error, TooOften):
         response.headers["Retry-After"] = str(max(1, round(error.wait_s)))
@@ -181,7 +181,7 @@ def answer_error(error: DriveError) -> JSONResponse:
 
 
 def install(app: FastAPI) -> None:
-    """Attach the handlers."""
+    """Register the exception handlers."""
 
     @app.exception_handler(DriveError)
     async def drive_error(_request: Request, error: DriveError) -> JSONResponse:
@@ -218,7 +218,7 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(ClientDisconnect)
     async def client_gone(request: Request, _error: ClientDisconnect) -> JSONResponse:
-        # No defect: a page was closed while it sent a file. Nobody reads this answer.
+        # Not a defect: a page was closed while it sent a file. Nobody reads this answer.
         log.info("%s %s: the client went within its request", request.method, request.url.path)
         return answer(
             Problem(type="urn:servodeck:http", title=TITLES["http"], status=400, detail="")
@@ -232,5 +232,5 @@ def install(app: FastAPI) -> None:
 
 def _scalar(value: object) -> int | float | str | None:
     if isinstance(value, float) and not math.isfinite(value):
-        return str(value)  # JSON has no such number
+        return str(value)  # JSON has no infinity and no NaN
     return value if isinstance(value, (int, float, str)) else None

@@ -1,4 +1,4 @@
-"""Messages of the HTTP interface: the only source of OpenAPI and of the page's client."""
+"""Messages of the HTTP interface: the only source of the OpenAPI document and the page's client."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ Raw = int | float | str
 
 
 class Message(BaseModel):
-    """Base: unknown fields are refused, so that a misspelt limit is an error."""
+    """Base class: unknown fields are refused, so that a misspelt limit is an error."""
 
     model_config = ConfigDict(extra="forbid")
 
 
-#: Beyond every axis in any unit, and far from where floating point overflows.
+#: Above the range of every axis in any unit, and far below floating-point overflow.
 _MOST = 1e12
-#: A number that a person gives; NaN would pass comparisons with a limit.
+#: A number entered by a person; NaN is refused, as comparisons with a limit would not detect it.
 Finite = Annotated[float, Field(ge=-_MOST, le=_MOST, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=1e-9, le=_MOST, allow_inf_nan=False)]
 
 
 class Problem(BaseModel):
-    """RFC 9457 problem details, with what a person needs to act."""
+    """RFC 9457 problem details, with the facts that a person needs to act."""
 
     type: str = Field(examples=["urn:servodeck:out-of-range"])
     title: str = Field(description="of the type, in English, the same for every occurrence")
@@ -50,13 +50,13 @@ class Problem(BaseModel):
 
 
 class PlainResult(BaseModel):
-    """What a job that is no tool concludes: a scan, reading all parameters, loading a set."""
+    """Result of a job that is not a tool: a scan, reading all parameters, writing a set."""
 
     model_config = ConfigDict(extra="allow")
 
 
 class Cancellation(Message):
-    """Why a job was cancelled, and what to do about it; the sentences are for whoever asked."""
+    """Why a job was cancelled, and the remedy; sentences are in the language of the request."""
 
     cause: str
     cause_message: MessageInfo = Field(description="of cause, as code and facts")
@@ -65,7 +65,7 @@ class Cancellation(Message):
 
 
 class JobInfo(Message):
-    """A piece of long work."""
+    """A job: long work that runs in the background."""
 
     id: str
     kind: str
@@ -89,7 +89,7 @@ class JobInfo(Message):
 
 
 class LogEntry(Message):
-    """The tool's own log."""
+    """One entry of the station's log."""
 
     time: datetime
     level: Literal["info", "warning", "error"]

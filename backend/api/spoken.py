@@ -1,4 +1,4 @@
-"""The language of each request, by its ``Accept-Language``: the page sends that of the page."""
+"""Language of each request, from its ``Accept-Language`` header, which the page sets."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from drivers.texts.message import language_of, speaking
 
 
 class Spoken:
-    """Answers in the language that a request asks for; English where it asks for none of ours."""
+    """Middleware that sets the language of answers; English if none of ours is requested."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """See ASGI."""
+        """Handle one request (ASGI)."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return

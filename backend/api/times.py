@@ -1,4 +1,4 @@
-"""Moments that a request gives."""
+"""Times in requests."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from drivers.errors import OutOfRange
 
 
 def in_utc(moment: datetime | None) -> datetime | None:
-    """The moment in UTC; one without a zone is treated as UTC.
+    """Convert a time to UTC; one without a zone is treated as UTC.
 
     Raises:
         OutOfRange: there is no such time in UTC (at the ends of the calendar).

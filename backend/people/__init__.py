@@ -1,1 +1,1 @@
-"""Who may do what: accounts, sessions, tokens, invitations, and the station's certificate."""
+"""Identity and authorization: accounts, sessions, tokens, invitations, and the TLS certificate."""

@@ -1,8 +1,8 @@
 """Accounts, log-in sessions and tokens.
 
-Everything that a request needs is kept in memory (`Directory`), since STOP must not wait for a
-disk; changes go to the database first. `tend` brings in what another process (the command line)
-changed.
+Everything that a request needs is kept in memory (`Directory`), because STOP must not wait
+for a disk; changes go to the database first. `tend` reads what another process (the command
+line) has changed there.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ from drivers.errors import NotAllowed
 from drivers.texts.message import text
 
 LONGEST_TOKEN = timedelta(days=366)
-#: No account is called so: a name has no line break.
+#: Key that counts wrong set-up codes. It cannot be an account's name, as it contains a line break.
 _SET_UP = "set-up\ncode"
-TOKEN_PREFIX = "sdk_"  # noqa: S105 - what every token begins with
+TOKEN_PREFIX = "sdk_"  # noqa: S105 - prefix of every token
 
 
 def utc_now() -> datetime:
-    """The present moment."""
+    """Current time in UTC."""
     return datetime.now(UTC)
 
 
 class Accounts:
-    """The people of a station.
+    """Accounts, sessions and tokens of a station.
 
-    ``ended`` is called with the id of every session and token that ends, ``lowered`` with the id
-    of each whose account may move nothing any more.
+    ``ended`` is called with the id of every session and token that ends, ``lowered`` with the id of
+    each whose account has lost a right to move axes.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Accounts:
         self._turns = HashTurns()
         self._budgets = LoginBudgets()
         self.devices = KnownDevices()
-        #: Called on a thread when there is an administrator where there may have been none.
+        #: Called on a worker thread after an account was given the role of administrator.
         self.on_set_up: Callable[[], None] = lambda: None
         self.setup_code = spoken_code(3)
 
@@ -68,10 +68,11 @@ class Accounts:
     async def set_up(
         self, code: str, name: str, password: str, address: str, client: str
     ) -> tuple[str, LoginSession]:
-        """The first administrator; the code is in the terminal of the machine.
+        """Make the first administrator; ``code`` is shown in the terminal of the machine.
 
         Raises:
-            Forbidden: there is one already, or the code is wrong. TooOften: too many tries.
+            Forbidden: there is an administrator already, or the code is wrong.
+            TooOften: too many tries.
         """
         self._budgets.require(_SET_UP, address)
         async with self._changing:
@@ -86,12 +87,13 @@ class Accounts:
     async def log_in(
         self, name: str, password: str, address: str, client: str, device: str | None = None
     ) -> tuple[str, LoginSession]:
-        """A session for the right name and password. Returns the cookie and the session.
+        """Begin a session for the right name and password. Returns the cookie and the session.
 
         ``device`` is the cookie by which the browser may be known (`KnownDevices`).
 
         Raises:
-            NotLoggedIn: one of them is wrong; it is not said which. TooOften: too many tries.
+            NotLoggedIn: name or password is wrong; the error does not state which.
+            TooOften: too many tries.
         """
         known = self._known(name, device)
         self._budgets.require(name, address, known)
@@ -100,7 +102,7 @@ class Accounts:
             async with self._changing:
                 await self._load()
             known = self._known(name, device)
-            # Those before may have used up the budget in the meantime.
+            # Tries that were ahead in the queue may have used up the budget in the meantime.
             self._budgets.require(name, address, known)
             self._budgets.tried(name, address, known)
             account = self.directory.find(name)
@@ -112,12 +114,12 @@ class Accounts:
         return await self._begin(account, client)
 
     def _known(self, name: str, device: str | None) -> str:
-        """The browser's id where it has logged in to this account before, else empty."""
+        """Id of the browser if it has logged in to this account before, otherwise empty."""
         found, account = self.devices.known(device), self.directory.find(name)
         return found.id if found and account and found.account == account.id else ""
 
     async def log_out(self, session: str) -> None:
-        """End a session at once; it cannot even press STOP any more."""
+        """End a session at once; after that its cookie is not accepted for STOP either."""
         await self._end([session])
 
     async def _begin(self, account: Account, client: str) -> tuple[str, LoginSession]:
@@ -131,10 +133,10 @@ class Accounts:
     # --- accounts ---------------------------------------------------------------------
 
     async def add(self, name: str, password: str, role: Role) -> Account:
-        """A new account.
+        """Add an account.
 
         Raises:
-            NotAllowed: the name is in use, or name or password is none.
+            NotAllowed: the name is in use, or the name, the password or the role is not acceptable.
         """
         async with self._changing:
             return await self._add(name, password, role)
@@ -157,10 +159,10 @@ class Accounts:
         return account
 
     async def set_role(self, account_id: int, role: Role) -> Account:
-        """Another role; it holds from the next request on.
+        """Change the role of an account; effective from the next request on.
 
         Raises:
-            NotAllowed: nobody would be left who administers.
+            NotAllowed: the role is not one for accounts, or no administrator would be left.
         """
         async with self._changing:
             account = self.directory.account(account_id)
@@ -178,7 +180,7 @@ class Accounts:
             return account
 
     async def set_password(self, account_id: int, password: str, keep: str = "") -> None:
-        """A new password; ends every session of the account but ``keep``."""
+        """Set a new password; ends every session of the account except ``keep``."""
         account = self.directory.account(account_id)
         require_good(password, account.name)
         kept = await self._hash(password)
@@ -191,13 +193,15 @@ class Accounts:
         await self._end(s.id for s in self.directory.sessions(account_id) if s.id != keep)
 
     async def require_password(self, account_id: int, password: str, address: str) -> None:
-        """The present password, before something that another person at this screen must not do.
+        """Check the current password before a change that only its owner may make.
 
         Raises:
-            Forbidden: it is wrong. TooOften: too many tries.
+            Forbidden: the password is wrong.
+            TooOften: too many tries.
         """
         account = self.directory.account(account_id)
-        # Only who has a session of the account comes here: not a stranger's budget.
+        # The caller has a session of the account, so these tries have a
+        # budget apart from strangers'.
         own = f"account {account_id}"
         self._budgets.require(account.name, address, own)
         self._budgets.tried(account.name, address, own)
@@ -211,7 +215,7 @@ class Accounts:
         """Delete an account with its sessions and tokens.
 
         Raises:
-            NotAllowed: nobody would be left who administers.
+            NotAllowed: no administrator would be left.
         """
         async with self._changing:
             account = self.directory.account(account_id)
@@ -227,7 +231,8 @@ class Accounts:
 
     async def _end(self, sessions: Iterable[str]) -> None:
         gone = list(sessions)
-        # Whoever is to be out is out even when the disk is full; the row then goes later.
+        # Sessions end in memory first, so that they end even when the disk is full; the
+        # rows are then deleted later.
         for session in gone:
             self.directory.forget(session)
         if gone:
@@ -238,10 +243,11 @@ class Accounts:
     async def make_token(
         self, account_id: int, name: str, scopes: frozenset[Right], lifetime: timedelta
     ) -> tuple[str, Token]:
-        """A token for a script. Returns the secret, which is not kept, and the token.
+        """Make a token for a script. Returns the secret, which is not stored, and the token.
 
         Raises:
-            NotAllowed: a scope that the owner does not have, or too long a life.
+            NotAllowed: a scope that the owner does not have, no scope, or a
+            lifetime that is too long.
         """
         account = self.directory.account(account_id)
         name = checked_person(name)
@@ -273,16 +279,16 @@ class Accounts:
     # --- the database -----------------------------------------------------------------
 
     async def open(self) -> None:
-        """Read what is kept.
+        """Read accounts, sessions and tokens from the database.
 
         Raises:
-            DatabaseFailed: it cannot be.
+            DatabaseFailed: the database cannot be read.
         """
         async with self._changing:
             await self._load()
 
     async def tend(self) -> None:
-        """Now and then: write down uses, forget what has ended, take in changes from outside."""
+        """Periodic upkeep: store last uses, delete what has ended, read others' changes."""
         used, over = self.directory.unwritten(), self.directory.over()
         async with self._changing:
             if used or over:
@@ -291,5 +297,5 @@ class Accounts:
             await self._load()
 
     async def _load(self) -> None:
-        """Take in what the database holds; only under the lock, so that nothing is overtaken."""
+        """Read the database into memory; only under the lock, so that no newer change is lost."""
         self.directory.take(await self._store.call(read, self._store))

@@ -1,6 +1,6 @@
-"""Changes of what is kept of people, one transaction each. All of them block.
+"""Changes to the stored accounts, sessions and tokens, one transaction each. All of them block.
 
-Raises of each: `DatabaseFailed` where it cannot be written.
+Each raises `DatabaseFailed` when the database cannot be written.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from backend.store.database import Store
 
 
 def add_account(store: Store, name: str, role: Role, password: str, created: datetime) -> Account:
-    """A new account, with the number that the database gives it; ``password`` is the hash."""
+    """Add an account and return it with the id from the database; ``password`` is the hash."""
     with store.writing() as database:
         row = AccountRow(
             name=name,
@@ -35,7 +35,7 @@ def add_account(store: Store, name: str, role: Role, password: str, created: dat
 def change_account(
     store: Store, account_id: int, *, role: Role | None = None, password: str | None = None
 ) -> None:
-    """Another role or password hash; None leaves it."""
+    """Change role or password hash of an account; None leaves the value unchanged."""
     values = {"role": None if role is None else role.value, "password": password}
     given = {name: value for name, value in values.items() if value is not None}
     with store.writing() as database:
@@ -43,13 +43,13 @@ def change_account(
 
 
 def delete_account(store: Store, account_id: int) -> None:
-    """An account, and with it its sessions and tokens."""
+    """Delete an account with its sessions and tokens."""
     with store.writing() as database:
         database.execute(delete(AccountRow).where(AccountRow.id == account_id))
 
 
 def add_session(store: Store, session: LoginSession) -> None:
-    """A log-in."""
+    """Add a log-in session."""
     with store.writing() as database:
         database.add(
             SessionRow(
@@ -63,13 +63,13 @@ def add_session(store: Store, session: LoginSession) -> None:
 
 
 def delete_sessions(store: Store, ids: Iterable[str]) -> None:
-    """Sessions that are over."""
+    """Delete sessions that have ended."""
     with store.writing() as database:
         database.execute(delete(SessionRow).where(SessionRow.id.in_(list(ids))))
 
 
 def add_token(store: Store, token: Token) -> None:
-    """A token for scripts."""
+    """Add a token for scripts."""
     with store.writing() as database:
         database.add(
             TokenRow(
@@ -84,13 +84,13 @@ def add_token(store: Store, token: Token) -> None:
 
 
 def delete_token(store: Store, token_id: str) -> None:
-    """A token that was revoked."""
+    """Delete a token that was revoked."""
     with store.writing() as database:
         database.execute(delete(TokenRow).where(TokenRow.id == token_id))
 
 
 def tend(store: Store, used: Iterable[LoginSession], over: Iterable[str]) -> None:
-    """Write down when sessions were last used, and drop the sessions and tokens that are over."""
+    """Store when sessions were last used, and delete the sessions and tokens that have ended."""
     gone = list(over)
     with store.writing() as database:
         for session in used:

@@ -1,4 +1,4 @@
-"""Secrets and names: what is made, what is kept of it, and how it is compared."""
+"""Secrets and names: how they are made, stored and compared."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ import unicodedata
 from drivers.errors import NotAllowed
 from drivers.texts.message import text
 
-#: Letters and digits that are not mistaken for one another when read aloud or copied by hand.
+#: Letters and digits that cannot be mistaken for one another when read aloud or copied by hand.
 _CLEAR = "ABCDEFGHJKMNPQRSTUVWXYZ23456789"
 
-#: Signs that show nothing (Default_Ignorable_Code_Point, Unicode Standard 15.0
-#: DerivedCoreProperties.txt): with them one name could be written in any number of ways.
+#: Invisible characters (Default_Ignorable_Code_Point, Unicode Standard 15.0
+#: DerivedCoreProperties.txt): they would allow many different spellings of a
+#: name that looks the same.
 _IGNORABLE = re.compile(
     "[\u00ad\u034f\u061c\u115f\u1160\u17b4\u17b5\u180b-\u180f\u200b-\u200f\u202a-\u202e"
     "\u2060-\u206f\u3164\ufe00-\ufe0f\ufeff\uffa0\ufff0-\ufff8"
@@ -24,28 +25,31 @@ _IGNORABLE = re.compile(
 
 
 def new_secret(prefix: str = "") -> str:
-    """32 random bytes, as text."""
+    """Make a secret of 32 random bytes, URL-safe base64 after ``prefix``."""
     return prefix + secrets.token_urlsafe(32)
 
 
 def digest(secret: str) -> str:
-    """What is kept of a cookie or token: both are 32 random bytes, so one hash is enough."""
+    """Hash under which a cookie or token is stored.
+
+    Both are 32 random bytes, so that one SHA-256 (hexadecimal) without salt is enough.
+    """
     return hashlib.sha256(secret.encode()).hexdigest()
 
 
 def csrf_of(secret: str) -> str:
-    """The token that a page sends with every change; it follows from the cookie, not vice versa."""
+    """CSRF token of a session, derived from its cookie; the cookie cannot be derived from it."""
     return hmac.new(secret.encode(), b"servodeck csrf", hashlib.sha256).hexdigest()
 
 
 def spoken_code(groups: int) -> str:
-    """A code to be read aloud: groups of four clear signs, 19.8 bits each."""
+    """Make a code to be read aloud: groups of four unambiguous characters, 19.8 bits each."""
     parts = ("".join(secrets.choice(_CLEAR) for _ in range(4)) for _ in range(groups))
     return "-".join(parts)
 
 
 def same_code(given: str, code: str) -> bool:
-    """Whether somebody typed this code, however they wrote dashes, spaces and case."""
+    """Whether the given code is the right one, regardless of dashes, spaces and case."""
 
     def plain(text: str) -> bytes:
         return "".join(sign for sign in text.upper() if sign.isalnum()).encode()
@@ -54,10 +58,10 @@ def same_code(given: str, code: str) -> bool:
 
 
 def name_key(name: str) -> str:
-    """What a name is counted and looked up by: names that look the same are the same.
+    """Key by which a name is compared and counted: names that look the same have the same key.
 
-    Compatibility forms, case, signs without a shape and white space around and between words make
-    no difference (NFKC_Casefold, Unicode Standard 3.13 D147, which is stable under itself).
+    Compatibility forms, case, invisible characters and white space around and between words make no
+    difference (NFKC_Casefold, Unicode Standard 3.13 D147, for which a second pass changes nothing).
     """
     text = unicodedata.normalize("NFD", _IGNORABLE.sub("", name))
     for _ in range(2):
@@ -66,10 +70,10 @@ def name_key(name: str) -> str:
 
 
 def checked_person(name: str) -> str:
-    """A name of 1 to 60 printable signs, no spaces around it.
+    """Check a name and return it in NFC: 1 to 60 printable characters, no spaces around it.
 
     Raises:
-        NotAllowed: anything else.
+        NotAllowed: the name is anything else.
     """
     name = unicodedata.normalize("NFC", name).strip()
     if not 1 <= len(name) <= 60 or not name.isprintable():
@@ -78,5 +82,5 @@ def checked_person(name: str) -> str:
 
 
 def same_text(given: str, kept: str) -> bool:
-    """Comparison whose time shows nothing."""
+    """Compare in constant time, so that the duration does not reveal where the strings differ."""
     return hmac.compare_digest(given.encode(), kept.encode())

@@ -1,4 +1,4 @@
-"""Accounts, sessions and tokens in memory: what every request asks for.
+"""Accounts, sessions and tokens in memory, for the checks of every request.
 
 STOP must not wait for a disk, so nothing here reads or writes one.
 """
@@ -20,10 +20,10 @@ _WRITE_USE = timedelta(minutes=1)
 
 
 class Directory:
-    """Of one station.
+    """Accounts, sessions and tokens of one station.
 
-    ``ended`` is called with the id of every session and token that ends, ``lowered`` with the id
-    of each whose account may move nothing any more.
+    ``ended`` is called with the id of every session and token that ends, ``lowered`` with the id of
+    each whose account has lost a right to move axes.
     """
 
     def __init__(
@@ -37,18 +37,18 @@ class Directory:
         self._sessions: dict[str, LoginSession] = {}
         self._written: dict[str, datetime] = {}
         self._tokens: dict[str, Token] = {}
-        #: Ended here; a read that began before must not bring them back.
+        #: Ids that ended here; a database read that began earlier must not restore them.
         self._dead: set[str] = set()
 
     # --- what the gate asks -----------------------------------------------------------
 
     @property
     def is_set_up(self) -> bool:
-        """Whether there is an administrator."""
+        """Whether there is an administrator account."""
         return any(a.role is Role.ADMINISTRATOR for a in self._accounts.values())
 
     def session(self, secret: str) -> tuple[Account, LoginSession, bool] | None:
-        """The session of a cookie, and whether it is still alive; None where there is none."""
+        """Account and session of a cookie, and whether the session is valid; None if unknown."""
         session = self._sessions.get(digest(secret))
         account = None if session is None else self._accounts.get(session.account)
         if session is None or account is None:
@@ -59,7 +59,7 @@ class Directory:
         """The account of a session.
 
         Raises:
-            NoSuchPerson: there is no such session.
+            NoSuchPerson: there is no session of this id.
         """
         session = self._sessions.get(session_id)
         if session is None:
@@ -67,26 +67,26 @@ class Directory:
         return self.account(session.account)
 
     def account_of(self, session_id: str) -> Account | None:
-        """The account of a session or token; None where there is none."""
+        """Account of a session or token; None if the id is unknown."""
         known = self._sessions.get(session_id) or self._tokens.get(session_id)
         return None if known is None else self._accounts.get(known.account)
 
     def expires(self, session_id: str) -> datetime | None:
-        """When a session or token ends; None where there is none."""
+        """Time at which a session or token ends; None if the id is unknown."""
         known = self._sessions.get(session_id) or self._tokens.get(session_id)
         return None if known is None else known.expires
 
     def is_remembered(self, session: LoginSession) -> bool:
-        """Whether it is alive, or ended so lately that its page may not know."""
+        """Whether the session is valid, or ended so recently that its page may not know it yet."""
         return self._now() < session.expires + REMEMBERED
 
     def touch(self, session_id: str) -> None:
-        """A person did something with this session."""
+        """Record that a person has just used this session."""
         if (session := self._sessions.get(session_id)) is not None:
             self._sessions[session_id] = replace(session, used=self._now())
 
     def renewed(self, identity: Identity) -> Identity | None:
-        """The same person with the role of this moment, or None when the session is over."""
+        """The same identity with its current role and rights; None if its session has ended."""
         now = self._now()
         session, token = self._sessions.get(identity.session), self._tokens.get(identity.session)
         known = session or token
@@ -97,7 +97,7 @@ class Directory:
         return replace(identity, role=account.role, rights=rights)
 
     def token(self, secret: str) -> tuple[Account, Token] | None:
-        """The owner and the token, or None where it is unknown or has expired."""
+        """Owner and token of a secret; None if it is unknown or has expired."""
         token = self._tokens.get(digest(secret))
         account = None if token is None else self._accounts.get(token.account)
         if token is None or account is None or self._now() >= token.expires:
@@ -107,7 +107,7 @@ class Directory:
     # --- who and what there is --------------------------------------------------------
 
     def all(self) -> list[Account]:
-        """Accounts by name."""
+        """All accounts, sorted by name."""
         return sorted(self._accounts.values(), key=lambda a: name_key(a.name))
 
     def account(self, account_id: int) -> Account:
@@ -122,15 +122,15 @@ class Directory:
         return account
 
     def find(self, name: str) -> Account | None:
-        """The account of this name, however it is spelled; None where there is none."""
+        """Account of this name, compared by `name_key`; None if there is none."""
         key = name_key(name)
         return next((a for a in self._accounts.values() if name_key(a.name) == key), None)
 
     def require_another_administrator(self, account: Account) -> None:
-        """Somebody administers besides this one.
+        """Check that an administrator other than this account exists.
 
         Raises:
-            NotAllowed: nobody would.
+            NotAllowed: the account is the only administrator.
         """
         others = [
             a
@@ -141,7 +141,7 @@ class Directory:
             raise NotAllowed("people.administrator", value=account.name)
 
     def sessions(self, account_id: int | None = None) -> list[LoginSession]:
-        """Living sessions, newest first; of one account where given."""
+        """Valid sessions, newest first; of one account if given."""
         now = self._now()
         found = [
             s
@@ -151,14 +151,14 @@ class Directory:
         return sorted(found, key=lambda s: s.created, reverse=True)
 
     def tokens(self, account_id: int | None = None) -> list[Token]:
-        """Tokens, newest first; of one account where given."""
+        """Tokens, newest first; of one account if given."""
         found = [t for t in self._tokens.values() if account_id in (None, t.account)]
         return sorted(found, key=lambda t: t.created, reverse=True)
 
     # --- what has changed -------------------------------------------------------------
 
     def put(self, account: Account) -> None:
-        """An account that is new or has changed."""
+        """Add or replace an account; `lowered` is called if its role loses a right to move axes."""
         before = self._accounts.get(account.id)
         self._accounts[account.id] = account
         lost = frozenset() if before is None else RIGHTS[before.role] - RIGHTS[account.role]
@@ -168,16 +168,16 @@ class Directory:
                 self._lowered(each)
 
     def begin(self, session: LoginSession) -> None:
-        """A log-in that is written down."""
+        """Add a session that is stored in the database already."""
         self._sessions[session.id] = session
         self._written[session.id] = session.used
 
     def put_token(self, token: Token) -> None:
-        """A new token."""
+        """Add a token."""
         self._tokens[token.id] = token
 
     def forget(self, session: str) -> None:
-        """A session or token is over."""
+        """End a session or token."""
         known = self._sessions.pop(session, None) or self._tokens.pop(session, None)
         self._written.pop(session, None)
         self._dead.add(session)
@@ -185,7 +185,7 @@ class Directory:
             self._ended(session)
 
     def drop_account(self, account_id: int) -> None:
-        """Forget an account with its sessions and tokens."""
+        """Remove an account and end its sessions and tokens."""
         self._accounts.pop(account_id, None)
         gone = [s.id for s in self._sessions.values() if s.account == account_id]
         gone += [t.id for t in self._tokens.values() if t.account == account_id]
@@ -195,7 +195,7 @@ class Directory:
     # --- the database -----------------------------------------------------------------
 
     def unwritten(self) -> list[LoginSession]:
-        """Sessions that were used for a minute or longer since that was written down."""
+        """Sessions whose last use is a minute or more later than the use that is stored."""
         return [
             s
             for s in self._sessions.values()
@@ -203,17 +203,17 @@ class Directory:
         ]
 
     def over(self) -> list[str]:
-        """Ids of the sessions and tokens that nobody needs to know of any more."""
+        """Ids of the sessions and tokens that can be deleted from the database."""
         now = self._now()
         sessions = [s.id for s in self._sessions.values() if now >= s.expires + REMEMBERED]
         return sessions + [t.id for t in self._tokens.values() if now >= t.expires]
 
     def written(self, used: Iterable[LoginSession]) -> None:
-        """These uses are written down."""
+        """Record that the last uses of these sessions are stored."""
         self._written |= {s.id: s.used for s in used}
 
     def take(self, kept: Records) -> None:
-        """What the database holds now; what ended here before it could hold that stays ended."""
+        """Take over the records of the database, except those that ended here in the meantime."""
         for account in self._accounts.keys() - kept.accounts.keys():
             self.drop_account(account)
         gone = (self._sessions.keys() - kept.sessions.keys()) | (

@@ -1,8 +1,8 @@
-"""Time that only goes on: for what may last so long and no longer.
+"""Monotonic time, for limits on a duration.
 
-The wall clock is set: by a person, by a time server after the start, by a supply that failed. A
-grant must end after its minutes all the same. Time in which the computer slept counts, where the
-system reports it.
+The wall clock can be set: by a person, by a time server after the start, or by a power failure. A
+grant must end after its minutes all the same. Time in which the computer was suspended counts,
+where the system reports it.
 """
 
 from __future__ import annotations
@@ -15,5 +15,5 @@ __all__ = ["elapsed_s", "moment_of"]
 
 
 def moment_of(elapsed: float) -> float:
-    """Epoch seconds by the wall clock of now at which `elapsed_s` is, or was, ``elapsed``."""
+    """Convert `elapsed_s` time to epoch seconds, by the current wall clock."""
     return time.time() + elapsed - elapsed_s()

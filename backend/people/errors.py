@@ -1,4 +1,4 @@
-"""What can be wrong with a person's request, as part of the one error tree."""
+"""Errors of authentication and authorization, as part of the one error tree."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from drivers.texts.message import Param, Text, as_text, text
 
 
 class NotLoggedIn(NotAllowed):
-    """Nobody, or somebody whose session has ended (HTTP 401)."""
+    """No valid session or token, or a wrong password or code (HTTP 401)."""
 
     kind = "not-logged-in"
 
 
 class Forbidden(NotAllowed):
-    """Known, but this is not for them; or the request did not come from our own page (403)."""
+    """The person has no right to do this, or the request is not from our own page (HTTP 403)."""
 
     kind = "forbidden"
 
 
 class TooOften(NotAllowed):
-    """Wait before the next try (429). ``wait_s`` is how long."""
+    """Too many tries (HTTP 429); ``wait_s`` is the time until the next one [s]."""
 
     kind = "too-often"
 
@@ -29,6 +29,6 @@ class TooOften(NotAllowed):
 
 
 class NoSuchPerson(NotAllowed):
-    """There is no such account, session, token or invitation (404)."""
+    """There is no such account, session, token or invitation (HTTP 404)."""
 
     kind = "not-found"

@@ -1,4 +1,4 @@
-"""Who asks. Set once per request or message by the gate, read where something is written down."""
+"""The person behind a request: set by the gate per request or message, read by log and audit."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ Kind = Literal["local", "session", "token", "guest"]
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """A person as the gate knows them.
+    """A person as authenticated by the gate.
 
-    ``session`` names the session, token or invitation that they came by; empty for the one user
-    of a station without accounts. ``rights`` are those of the moment; a guest's change with
-    grants, so nobody keeps an identity for longer than one request or message.
+    ``session`` is the id of their session, token or invitation; empty for the one user of a station
+    without accounts. ``rights`` are those at the time of the request; a guest's change with grants,
+    so an identity must not be kept for longer than one request or message.
     """
 
     person: str
@@ -28,7 +28,7 @@ class Identity:
 
     @property
     def is_guest(self) -> bool:
-        """Somebody by invitation, who is not at the machine."""
+        """Whether the person came by invitation, and is therefore not at the machine."""
         return self.kind == "guest"
 
 
@@ -43,19 +43,20 @@ class Actor:
     connection: str | None = None
 
 
-#: The gate sets it; tasks that a request starts inherit it, so a job knows whose it is.
+#: Set by the gate; tasks that a request starts inherit it, so that a job knows who started it.
 acting: ContextVar[Actor | None] = ContextVar("acting", default=None)
 
 
-#: When the request or message arrived that is being carried out (`time.monotonic`); None where the
-#: program acts by itself. STOP that was pressed later takes precedence, however long it waited.
+#: Arrival time of the request or message that is being carried out (`time.monotonic`);
+#: None where the program acts by itself. A STOP pressed after it takes precedence, however
+#: long the request waited.
 arrived_s: ContextVar[float | None] = ContextVar("arrived_s", default=None)
 
 
 def by_itself() -> Context:
-    """A context of work that outlives the request that began it: nobody is named for what it does.
+    """Context, without a person, for work that outlives the request that began it.
 
-    Else what a drive does hours later is informed of the person who connected it.
+    Otherwise the log would attribute what a drive does hours later to the person who connected it.
     """
     context = copy_context()
     context.run(acting.set, None)
@@ -64,12 +65,12 @@ def by_itself() -> Context:
 
 
 def acting_person() -> str:
-    """Name of who acts now; empty where the program acts by itself."""
+    """Name of the person who acts now; empty where the program acts by itself."""
     actor = acting.get()
     return "" if actor is None else actor.identity.person
 
 
 def acting_session() -> str:
-    """The session, token or invitation of who acts now; empty without one."""
+    """Id of the session, token or invitation of the person who acts now; empty without one."""
     actor = acting.get()
     return "" if actor is None else actor.identity.session

@@ -10,16 +10,17 @@ from typing import Literal
 from backend.people.elapsed import elapsed_s
 from drivers.errors import Busy, NotAllowed
 
-#: A request that the holder does not answer passes control on after this long, if nothing moves.
+#: A request that the holder does not answer passes control on after this
+#: time [s], if nothing moves.
 ANSWER_WITHIN_S = 30.0
 LONGEST_HAND_OVER_S = 8 * 3600.0
 
 
 @dataclass(frozen=True, slots=True)
 class Holder:
-    """Who controls an axis. ``connection`` is the live websocket, ``since`` epoch seconds.
+    """Holder of control over an axis. ``connection``: live websocket, ``since``: epoch seconds.
 
-    ``until`` ends a hand-over for a time (`elapsed_s`); then the axis goes back to ``giver``.
+    ``until`` (`elapsed_s`) is the end of a temporary hand-over; the axis then returns to ``giver``.
     """
 
     connection: str
@@ -31,7 +32,7 @@ class Holder:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """A request for control. ``until`` (`elapsed_s`) is when silence counts as consent."""
+    """Request for control. ``until`` (`elapsed_s`) is when a missing answer counts as consent."""
 
     connection: str
     person: str
@@ -43,7 +44,7 @@ NoticeKind = Literal["asked", "refused", "given", "overridden", "returned", "exp
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """Notice for the person at ``connection``; ``person`` is the other one."""
+    """Notice to the person at ``connection``; ``person`` is the other person involved."""
 
     connection: str
     drive: str
@@ -52,7 +53,7 @@ class Notice:
 
 
 class Leases:
-    """Who may write to and move which axis. STOP never asks here."""
+    """Control of axes: who may write to and move which one. STOP is never checked here."""
 
     def __init__(
         self,
@@ -63,7 +64,7 @@ class Leases:
         self._asked: dict[str, Asked] = {}
         self._changed = changed
         self._ticks = ticks
-        #: Called with what somebody must be notified of.
+        #: Called with each notice that somebody must receive.
         self.on_notice: list[Callable[[Notice], None]] = []
 
     def holder(self, drive: str) -> Holder | None:
@@ -71,12 +72,12 @@ class Leases:
         return self._holders.get(drive)
 
     def taken_by(self, drive: str, connection: str | None) -> str | None:
-        """Who controls the drive by another connection than this one; None where nobody does."""
+        """Person who controls the drive through another connection; None if nobody does."""
         holder = self.holder(drive)
         return None if holder is None or holder.connection == connection else holder.person
 
     def asked(self, drive: str) -> Asked | None:
-        """Who asks for control and waits for an answer, or None."""
+        """The pending request for control of an axis, or None."""
         return self._asked.get(drive)
 
     def held_by(self, connection: str) -> list[str]:
@@ -84,7 +85,7 @@ class Leases:
         return [d for d, h in self._holders.items() if h.connection == connection]
 
     def take(self, drive: str, connection: str, person: str) -> Holder:
-        """Take a free axis; taking again is fine.
+        """Take control of a free axis; has no effect where the connection holds it already.
 
         Raises:
             Busy: somebody else holds it.
@@ -96,7 +97,10 @@ class Leases:
         return holder
 
     def give(self, drive: str, connection: str) -> None:
-        """Give an axis back; does nothing for one that is not held by this connection."""
+        """Give up control of an axis; does nothing for one that this connection does not hold.
+
+        Control passes to whoever has requested it, or else to the giver of a temporary hand-over.
+        """
         holder = self._holders.get(drive)
         if holder is None or holder.connection != connection:
             return
@@ -110,7 +114,7 @@ class Leases:
             self._free(drive)
 
     def require(self, drive: str, connection: str | None) -> None:
-        """A change is allowed on a free axis and on one's own.
+        """Check that this connection may change the axis: it is free, or the connection holds it.
 
         Raises:
             Busy: somebody else holds it.
@@ -143,7 +147,7 @@ class Leases:
             self._changed(drive)
 
     def refuse(self, drive: str, connection: str) -> None:
-        """The holder keeps control."""
+        """Refuse a request for control; the holder keeps it."""
         holder, asked = self._holders.get(drive), self._asked.get(drive)
         if holder is not None and asked is not None and holder.connection == connection:
             del self._asked[drive]
@@ -153,10 +157,10 @@ class Leases:
     def hand(
         self, drive: str, connection: str, to: str, person: str, time_s: float | None = None
     ) -> None:
-        """Hand control to another connection, for a time or for good.
+        """Hand control to another connection, temporarily for ``time_s`` or permanently.
 
         Raises:
-            NotAllowed: one does not hold it, or the time is none.
+            NotAllowed: the connection does not hold control, or the time is out of range.
         """
         holder = self._holders.get(drive)
         if holder is None or holder.connection != connection:
@@ -168,13 +172,14 @@ class Leases:
         if to == connection:
             return
         until = None if time_s is None else self._ticks() + time_s
-        # Back to whoever gave it first: a chain of transfers would have no known end.
+        # Control returns to the first giver: a chain of temporary hand-overs
+        # would have no known end.
         giver = None if time_s is None else holder.giver or holder
         self._set(drive, Holder(to, person, time.time(), until, giver))
         self._notify(to, drive, "given", holder.person)
 
     def override(self, drive: str, connection: str, person: str) -> None:
-        """Take control from whoever has it. The caller has the right and has stopped the axis."""
+        """Take control from its holder. The caller has checked the right and stopped the axis."""
         before = self._holders.get(drive)
         if before is not None and before.connection == connection:
             return
@@ -185,7 +190,7 @@ class Leases:
     # --- what ends by itself ----------------------------------------------------------
 
     def drop(self, connection: str) -> list[str]:
-        """The connection is gone: what it held is free, or goes back. Returns those ids."""
+        """Free or return the axes of a connection that is gone. Returns the axes that it held."""
         dropped = self.held_by(connection)
         for drive, asked in list(self._asked.items()):
             if asked.connection == connection:
@@ -199,14 +204,14 @@ class Leases:
         return dropped
 
     def lose(self, connection: str) -> list[str]:
-        """Like `drop`, for a connection that is silent but not closed; it is reported."""
+        """Like `drop`, for a connection that is silent but not closed; its person gets a notice."""
         dropped = self.drop(connection)
         for drive in dropped:
             self._notify(connection, drive, "lost", "")
         return dropped
 
     def tick(self, moves: Callable[[str], bool]) -> None:
-        """Let hand-overs and requests end whose time has come, where nothing moves."""
+        """End hand-overs and requests whose time is over, on axes that do not move."""
         now = self._ticks()
         for drive, holder in list(self._holders.items()):
             if holder.until is not None and now >= holder.until and not moves(drive):

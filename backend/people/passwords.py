@@ -1,4 +1,4 @@
-"""Passwords: what is accepted, and how they are kept (argon2id)."""
+"""Passwords: which are accepted, and how they are hashed (argon2id)."""
 
 from __future__ import annotations
 
@@ -17,19 +17,20 @@ DEFAULT = PasswordHasher(time_cost=3, memory_cost=64 * 1024, parallelism=1)
 
 
 class Passwords:
-    """Hashes and verifies. Both take tens of milliseconds and belong on a thread."""
+    """Hashes and verifies passwords. Both take tens of milliseconds and belong on a thread."""
 
     def __init__(self, hasher: PasswordHasher = DEFAULT) -> None:
         self._hasher = hasher
-        #: Verified where no such account exists, so that the answer takes as long.
+        #: Hash to verify against where the account does not exist, so that
+        #: the answer takes as long.
         self.decoy = hasher.hash("no account has this password")
 
     def hash(self, password: str) -> str:
-        """The string to keep."""
+        """Hash a password; returns the string to store."""
         return self._hasher.hash(password)
 
     def verify(self, kept: str, password: str) -> bool:
-        """Whether this is the password."""
+        """Whether this is the password of the stored hash."""
         try:
             return self._hasher.verify(kept, password)
         except (VerificationError, InvalidHashError):
@@ -37,10 +38,11 @@ class Passwords:
 
 
 def require_good(password: str, name: str) -> None:
-    """Length, and not the name; no rules about character classes (NIST SP 800-63B 5.1.1.2).
+    """Check length, and that it is not the name; no character classes (NIST SP 800-63B 5.1.1.2).
 
     Raises:
-        NotAllowed: too short, too long, the name, or one sign over and over.
+        NotAllowed: too short, too long, the name with fewer than six more characters, or fewer than
+        four different characters.
     """
     if not MIN_LENGTH <= len(password) <= MAX_LENGTH:
         raise NotAllowed(

@@ -1,4 +1,4 @@
-"""What is kept of people, and reading it from the database."""
+"""Records of accounts, sessions and tokens, and reading them from the database."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from backend.people.rights import Right, Role
 from backend.people.tables import AccountRow, SessionRow, TokenRow
 from backend.store.database import Store
 
-#: A session ends this long after its last use, and at the latest this long after the log-in.
+#: A session ends this long after its last use, at the latest this long after the log-in.
 IDLE = timedelta(hours=2)
 LONGEST = timedelta(hours=12)
-#: A session that has ended can still press STOP for so long (its page may not know yet).
+#: A session that has ended can still press STOP for this long (its page may not know yet).
 REMEMBERED = timedelta(hours=24)
 
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """Somebody who may log in."""
+    """An account; ``password`` is the argon2id hash."""
 
     id: int
     name: str
@@ -31,7 +31,7 @@ class Account:
 
 @dataclass(frozen=True, slots=True)
 class LoginSession:
-    """A log-in; ``id`` is the hash of the cookie."""
+    """A log-in session; ``id`` is the hash of the cookie."""
 
     id: str
     account: int
@@ -41,7 +41,7 @@ class LoginSession:
 
     @property
     def expires(self) -> datetime:
-        """When it ends if it is not used any more."""
+        """Time at which the session ends if it is not used any more."""
         return min(self.used + IDLE, self.created + LONGEST)
 
 
@@ -59,7 +59,7 @@ class Token:
 
 @dataclass(frozen=True, slots=True)
 class Records:
-    """Everything that is kept, by its key."""
+    """All stored accounts, sessions and tokens, by id."""
 
     accounts: dict[int, Account]
     sessions: dict[str, LoginSession]
@@ -67,7 +67,7 @@ class Records:
 
 
 def read(store: Store) -> Records:
-    """All records. Blocks.
+    """Read all records. Blocks.
 
     Raises:
         DatabaseFailed: the database cannot be read.

@@ -1,4 +1,4 @@
-"""Rights, and which role has which. A closed vocabulary: a route needs exactly one of these."""
+"""Rights, and the rights of each role. The set is closed: every route needs exactly one right."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class Right(StrEnum):
-    """What somebody may do on this station."""
+    """A permission on this station."""
 
     LOOK = "look"
     """See states, values, files and people."""
@@ -15,30 +15,30 @@ class Right(StrEnum):
     PARAMETERS = "parameters"
     """Write parameters of a drive."""
     MEASURE = "measure"
-    """Measurements that move an axis, and what they suggest."""
+    """Measure with motion of an axis, and apply the results that are suggested."""
     MOTION = "motion"
     """Move an axis, enable it, carry out procedures."""
     STATION = "station"
-    """Buses, drives, profiles: what the station is made of."""
+    """Change buses, drives and profiles of the station."""
     INVITE = "invite"
-    """Invite a guest, grant and withdraw control, hold the enabling button."""
+    """Invite a guest, give and withdraw grants, hold the enabling button."""
     ADMINISTER = "administer"
-    """People and settings; take control from somebody who does not give it."""
+    """Manage people and settings; take control from a holder who does not give it."""
 
 
 class Role(StrEnum):
-    """What somebody is on this station."""
+    """Role of a person on this station."""
 
     VIEWER = "viewer"
     OPERATOR = "operator"
     ADMINISTRATOR = "administrator"
     GUEST = "guest"
-    """Somebody far away, by invitation; has no account."""
+    """A remote person, by invitation; has no account."""
 
 
 _OPERATOR = frozenset(Right) - {Right.ADMINISTER}
 
-#: A guest looks; more only by a grant of the person on site (see `backend.people.support`).
+#: A guest may look; more only by a grant of the person on site (see `backend.people.support`).
 RIGHTS: dict[Role, frozenset[Right]] = {
     Role.VIEWER: frozenset({Right.LOOK}),
     Role.OPERATOR: _OPERATOR,
@@ -46,9 +46,9 @@ RIGHTS: dict[Role, frozenset[Right]] = {
     Role.GUEST: frozenset({Right.LOOK}),
 }
 
-#: What an invitation may allow beyond looking.
+#: Rights that an invitation may allow beyond looking.
 GRANTABLE = frozenset({Right.PARAMETERS, Right.MEASURE, Right.MOTION})
-#: Rights that move metal: a guest needs the enabling button for them.
+#: Rights to move axes: a guest needs the enabling button for them.
 MOVING = frozenset({Right.MEASURE, Right.MOTION})
 #: Roles that an account may have.
 ACCOUNT_ROLES = (Role.VIEWER, Role.OPERATOR, Role.ADMINISTRATOR)

@@ -1,4 +1,4 @@
-"""The people of one station together: who a request comes from."""
+"""Accounts and guests of one station together: identifies the person behind a request."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ log = logging.getLogger(__name__)
 
 
 class People:
-    """Accounts and guests. Without ``accounts_needed`` whoever reaches the server is the one user.
+    """Accounts and guests of a station.
 
-    That is right only on the machine's own loopback; `backend.commands.serve` sees to it.
+    Without ``accounts_needed`` everybody who reaches the server is the same user. That is
+    permissible only on the machine's own loopback interface; `backend.commands.serve` ensures it.
     """
 
     def __init__(
@@ -41,9 +42,9 @@ class People:
     ) -> None:
         self.accounts_needed = accounts_needed
         self._store = Store(folder)
-        #: Called with the id of a session, token or guest that is over.
+        #: Called with the id of a session, token or guest that has ended.
         self.on_ended: list[Callable[[str], None]] = []
-        #: Called with the id of a session or token whose account may move nothing any more.
+        #: Called with the id of a session or token whose account has lost a right to move axes.
         self.on_lowered: list[Callable[[str], None]] = []
         self.accounts = Accounts(
             self._store, passwords or Passwords(), ended=self._ended, lowered=self._lowered
@@ -54,9 +55,10 @@ class People:
         self.support.on_ended.append(self._ended)
 
     async def open(self, *, recovering: bool = False) -> None:
-        """Read the accounts, where there are any to be asked for.
+        """Read the accounts, where the station uses them.
 
-        With ``recovering`` also where they are gone, which the machine's terminal alone may do.
+        ``recovering`` skips the check that they still exist; only the
+        machine's terminal may use it.
 
         Raises:
             AccountsMissing: the station has had accounts, and has no administrator now.
@@ -66,7 +68,7 @@ class People:
             await self.accounts.open()
             file = self._store.sqlite_file
             if file is not None:
-                # Hashes of passwords are nobody else's business; its side files follow its mode.
+                # Only its user may read password hashes; SQLite gives its side files the same mode.
                 file.chmod(0o600)
             set_up = self.accounts.directory.is_set_up
             if not recovering:
@@ -74,7 +76,7 @@ class People:
             await self.mark()
 
     async def mark(self) -> None:
-        """Note outside of the database that there are accounts, where there are."""
+        """Write the marker outside the database, if there are accounts."""
         if self.accounts_needed and self.accounts.directory.is_set_up:
             await asyncio.to_thread(self._set_up)
 
@@ -82,20 +84,20 @@ class People:
         try:
             self.accounts.devices = KnownDevices(self._marker.write().key)
         except StorageFailed as error:
-            # Who is to log in can; only that there are accounts is in one place too few.
+            # Log-in still works; only the second record of the accounts' existence is missing.
             log.error("the note that accounts exist is missing next to the database: %s", error)  # noqa: TRY400
 
     def close(self) -> None:
-        """Let go of the database."""
+        """Close the database."""
         self._store.close()
 
     @property
     def setup_needed(self) -> bool:
-        """Whether the first administrator is still to be made."""
+        """Whether the first administrator does not exist yet."""
         return self.accounts_needed and not self.accounts.directory.is_set_up
 
     def identify(self, cookie: str | None, bearer: str | None) -> Identity | None:
-        """Who has this cookie or token, with the rights of this moment; None for nobody."""
+        """Identity of a cookie or token, with its current rights; None if it is not valid."""
         if not self.accounts_needed:
             return LOCAL
         if bearer is not None:
@@ -117,7 +119,7 @@ class People:
         return self.support.guest(cookie)
 
     def renewed(self, identity: Identity) -> Identity | None:
-        """The same person with the rights of this moment; None when their session is over."""
+        """The same person with their current rights; None if their session has ended."""
         match identity.kind:
             case "local":
                 return identity
@@ -128,17 +130,17 @@ class People:
                 return self.accounts.directory.renewed(identity)
 
     def expires(self, identity: Identity) -> datetime | None:
-        """When this person's session ends; None where it does not."""
+        """Time at which this person's session ends; None if it does not."""
         if identity.is_guest:
             found = self.support.of_session(identity.session)
             return None if found is None else datetime.fromtimestamp(moment_of(found.expires), UTC)
         return self.accounts.directory.expires(identity.session)
 
     def admit(self, identity: Identity, message: str) -> Identity:
-        """The person behind a live connection, at the time of a message.
+        """Current identity of the person behind a live connection, when a message arrives.
 
         Raises:
-            NotLoggedIn: their session is over; STOP is heard all the same.
+            NotLoggedIn: their session has ended and the message is not STOP.
         """
         now = self.renewed(identity)
         if now is None:
@@ -150,7 +152,10 @@ class People:
         return now
 
     def may_stop(self, cookie: str | None) -> Identity | None:
-        """Somebody who was logged in until lately: their page still shows STOP, and it works."""
+        """Identity, without rights, of a session that ended recently.
+
+        Its page still shows STOP, which must work.
+        """
         found = None if cookie is None else self.accounts.directory.session(cookie)
         if found is None:
             return None
@@ -164,7 +169,7 @@ class People:
         return self.accounts.devices.known(device) is not None
 
     def require_accounts(self) -> None:
-        """Whoever may come from afar must be distinguished.
+        """Check that the station has accounts, which remote access requires.
 
         Raises:
             NotAllowed: this station has no accounts.

@@ -1,8 +1,8 @@
-"""Remote support: invitations, guests, grants for minutes, and the enabling button on site.
+"""Remote support: invitations, guests, temporary grants, and the enabling button on site.
 
-Nothing here outlives the server: a restart ends every invitation. A guest looks; more only while
-a grant of the person on site runs, and nothing that moves metal unless that person holds the
-enabling button at that moment.
+Nothing here is stored: a restart of the server ends every invitation. A guest may look;
+more only during a grant of the person on site, and moving an axis only while that person
+holds the enabling button.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from drivers.errors import NotAllowed
 from drivers.texts import limits
 from drivers.texts.message import Text, text
 
-#: The enabling button counts as released this long after the last sign of life. With the 20 ms
-#: between looks (`backend.api.live.watch`) a silent page stops the motion within 200 ms.
+#: The enabling button counts as released this long [s] after the last message. With the 20 ms
+#: between checks (`backend.api.live.watch`) a silent page stops the motion within 200 ms.
 ENABLING_TIMEOUT_S = 0.17
 LONGEST_INVITATION_S = 24 * 3600.0
 LONGEST_GRANT_S = 8 * 3600.0
-#: Wrong codes that end an invitation.
+#: Number of wrong codes after which an invitation ends.
 CODE_TRIES = 5
 MOST_OPEN = 20
 CHAT_KEPT = 200
@@ -40,9 +40,9 @@ State = Literal["open", "joined", "ended"]
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """What a guest may do beyond looking, until when (`elapsed_s`), and on which axis.
+    """Rights of a guest beyond looking, until when (`elapsed_s`), and on which axis.
 
-    ``drive`` None is every axis.
+    ``drive`` None stands for every axis.
     """
 
     rights: frozenset[Right]
@@ -53,7 +53,7 @@ class Grant:
 
 @dataclass(slots=True)
 class Invitation:
-    """One guest. ``expires`` by `elapsed_s`; ``allowed`` bounds what grants may give."""
+    """Invitation of one guest. ``expires`` (`elapsed_s`); ``allowed`` are the grantable rights."""
 
     id: str
     guest: str
@@ -74,7 +74,7 @@ class Invitation:
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """A line of the chat; epoch seconds."""
+    """A line of the chat; ``time`` in epoch seconds."""
 
     number: int
     time: float
@@ -84,26 +84,28 @@ class Said:
 
 
 class Support:
-    """Invitations of a station. ``ticks`` counts seconds that pass, whatever clocks are set to."""
+    """Invitations of a station. ``ticks`` returns monotonic seconds, not the wall clock."""
 
     def __init__(self, ticks: Callable[[], float] = elapsed_s) -> None:
         self._ticks = ticks
         self._invitations: dict[str, Invitation] = {}
         self._throttle = Throttle(10, ticks)
-        #: Invitation to the on-site connection that holds the button, and when it was last heard.
+        #: By invitation: the on-site connection that holds the button, and
+        #: time of its last message.
         self._holds: dict[str, tuple[str, float]] = {}
         self._chat: deque[Said] = deque(maxlen=CHAT_KEPT)
         self._said = 0
-        #: Called after any change that a list of invitations shows.
+        #: Called after any change that is shown in a list of invitations.
         self.on_change: list[Callable[[], None]] = []
-        #: Called with a guest's session when it is over, and when their grant or hold is.
+        #: Called with the id of a guest's session that has ended; the next one with an invitation
+        #: whose grant or button hold has ended.
         self.on_ended: list[Callable[[str], None]] = []
         self.on_disabled: list[Callable[[Invitation, Text], None]] = []
 
     # --- invitations ------------------------------------------------------------------
 
     def all(self) -> list[Invitation]:
-        """Invitations of this session of the server, newest first."""
+        """Invitations since the start of the server, newest first."""
         return sorted(self._invitations.values(), key=lambda i: i.created, reverse=True)
 
     def find(self, invitation_id: str) -> Invitation:
@@ -120,10 +122,11 @@ class Support:
     def invite(
         self, by: str, guest: str, allowed: frozenset[Right], lifetime_s: float
     ) -> tuple[str, Invitation]:
-        """A new invitation. Returns the secret of its link, which is not kept.
+        """Make an invitation. Returns the secret of its link (not stored) and the invitation.
 
         Raises:
-            NotAllowed: too long a life, something that no guest may do, or too many are open.
+            NotAllowed: the lifetime is out of range, a right is not permitted for guests, or too
+            many invitations are open.
         """
         guest = checked_person(guest)
         if not 60.0 <= lifetime_s <= LONGEST_INVITATION_S:
@@ -157,10 +160,11 @@ class Support:
         return secret, made
 
     def join(self, link: str, code: str, address: str) -> tuple[str, Invitation]:
-        """Come in by a link and its code. Returns the cookie and the invitation.
+        """Join by a link and its code. Returns the cookie and the invitation.
 
         Raises:
-            NotLoggedIn: link or code is wrong, used or over. TooOften: too many tries.
+            NotLoggedIn: the link or the code is wrong, used or expired.
+            TooOften: too many tries.
         """
         wait = self._throttle.wait_s(address)
         if wait > 0:
@@ -183,7 +187,7 @@ class Support:
         return secret, found
 
     def revoke(self, invitation_id: str, why: Text) -> Invitation:
-        """End an invitation; its guest is out at once."""
+        """End an invitation and, at once, its guest's session."""
         found = self.find(invitation_id)
         self._end(found, why)
         return found
@@ -191,12 +195,12 @@ class Support:
     # --- guests -----------------------------------------------------------------------
 
     def guest(self, secret: str) -> Identity | None:
-        """Who has this cookie, with the rights of this moment."""
+        """Identity of a guest's cookie, with current rights; None if it is not valid."""
         found = self.of_session(digest(secret))
         return None if found is None else self.identity(found)
 
     def of_session(self, session: str) -> Invitation | None:
-        """The joined invitation of a guest's session, None once it is over."""
+        """The joined invitation of a guest's session; None once it has ended."""
         return next(
             (
                 i
@@ -207,16 +211,16 @@ class Support:
         )
 
     def identity(self, found: Invitation) -> Identity:
-        """A guest with the rights of this moment; without the button nothing that moves."""
+        """Identity of a guest with the rights of the running grant; `require` checks the button."""
         grant = self.running(found)
         rights = RIGHTS[Role.GUEST] | (grant.rights if grant is not None else frozenset())
         return Identity(f"{found.guest} (guest)", Role.GUEST, "guest", found.session, rights)
 
     def require(self, identity: Identity, right: Right, drive: str | None) -> None:
-        """A guest may do this now: granted, for this axis, and the button held if it moves.
+        """Check that a guest may do this now: granted, for this axis, button held if it moves.
 
         Raises:
-            Forbidden: says what is missing.
+            Forbidden: states what is missing.
         """
         found = self.of_session(identity.session)
         grant = None if found is None else self.running(found)
@@ -237,12 +241,14 @@ class Support:
         time_s: float,
         drive: str | None,
     ) -> Invitation:
-        """Let a guest do more for a while; replaces an earlier grant.
+        """Give a guest more rights for a time [s]; replaces an earlier grant.
 
-        One that lacks a right to move or the axis of the earlier one ends what the guest moves.
+        The guest's motion is stopped if the new grant lacks a right to move or the
+        axis of the earlier one.
 
         Raises:
-            NotAllowed: the guest is not here, or the invitation does not allow it.
+            NotAllowed: the guest has not joined, the invitation does not allow a right, no right is
+            named, or the time is out of range.
         """
         found = self.find(invitation_id)
         if found.state != "joined":
@@ -264,7 +270,7 @@ class Support:
         if before is not None and (
             before.rights & MOVING - rights or drive not in (None, before.drive)
         ):
-            # What moves now may be what the new grant does not contain.
+            # The motion that runs now may not be covered by the new grant.
             why = text("people.end-grant-replaced")
             if found.id in self._holds:
                 self._drop_hold(found.id, why)
@@ -274,7 +280,7 @@ class Support:
         return found
 
     def withdraw(self, invitation_id: str, why: Text) -> Invitation:
-        """End a grant; what the guest moves is stopped."""
+        """End a grant and stop the guest's motion."""
         found = self.find(invitation_id)
         if found.grant is not None:
             found.grant = None
@@ -283,17 +289,17 @@ class Support:
         return found
 
     def running(self, found: Invitation) -> Grant | None:
-        """The grant of this moment, or None."""
+        """The grant in force at this moment, or None."""
         grant = found.grant
         return grant if grant is not None and self._ticks() < grant.until else None
 
     # --- the enabling button ----------------------------------------------------------
 
     def press(self, invitation_id: str, connection: str) -> None:
-        """The person on site presses the button for this guest.
+        """Press the enabling button on site for this guest.
 
         Raises:
-            NotAllowed: no grant runs that moves something.
+            NotAllowed: no grant with a right to move is in force.
         """
         found = self.find(invitation_id)
         grant = self.running(found)
@@ -303,19 +309,19 @@ class Support:
         self._changed()
 
     def renew(self, invitation_id: str, connection: str) -> None:
-        """The button is still held. What has expired is not revived."""
+        """Renew the hold of the button. One that has timed out is not revived."""
         hold = self._holds.get(invitation_id)
         if hold is not None and hold[0] == connection and self.enabled(invitation_id):
             self._holds[invitation_id] = (connection, self._ticks())
 
     def release(self, invitation_id: str, connection: str, why: Text) -> None:
-        """The button was let go, or what amounts to it."""
+        """Release the button: it was let go, or another event counts as that."""
         hold = self._holds.get(invitation_id)
         if hold is not None and hold[0] == connection:
             self._drop_hold(invitation_id, why)
 
     def release_all(self, connection: str, why: Text) -> None:
-        """The on-site page is gone."""
+        """Release the buttons of an on-site page that is gone."""
         for invitation_id, (holder, _) in list(self._holds.items()):
             if holder == connection:
                 self._drop_hold(invitation_id, why)
@@ -327,11 +333,11 @@ class Support:
 
     @property
     def any_hold(self) -> bool:
-        """Whether a button is held, so that somebody must watch it."""
+        """Whether any button is held, so that `watch` must run."""
         return bool(self._holds)
 
     def watch(self) -> None:
-        """Every 20 ms while a button is held: notice that its page has fallen silent."""
+        """Release buttons whose pages have gone silent; called every 20 ms while one is held."""
         for invitation_id in list(self._holds):
             if not self.enabled(invitation_id):
                 self._drop_hold(invitation_id, text("people.end-site-silent"))
@@ -344,10 +350,10 @@ class Support:
     # --- chat -------------------------------------------------------------------------
 
     def say(self, identity: Identity, text: str) -> Said:
-        """A line for everybody on the station.
+        """Add a line to the chat that everybody on the station can read.
 
         Raises:
-            NotAllowed: nothing, or too long.
+            NotAllowed: the line is empty or too long.
         """
         text = text.strip()
         if not 1 <= len(text) <= CHAT_LENGTH:
@@ -364,7 +370,7 @@ class Support:
     # --- what ends by itself ----------------------------------------------------------
 
     def tick(self) -> None:
-        """Let invitations and grants end whose time has come."""
+        """End invitations and grants whose time is over."""
         now = self._ticks()
         for found in list(self._invitations.values()):
             if found.state != "ended" and now >= found.expires:

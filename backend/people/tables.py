@@ -1,7 +1,7 @@
-"""Tables of people. Passwords and tokens are kept only as hashes.
+"""Tables of accounts, sessions and tokens. Passwords and tokens are stored only as hashes.
 
-They lie in the station's own file, also where library and audit are shared on a server: nobody
-who can write to that server gets to move axes here, and log-in works when it is away.
+They are in the station's own file even where library and audit are shared on a server: write access
+to that server then gives no control of axes here, and log-in works while it is down.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from backend.store.base import Base, UtcDateTime
 
 
 class AccountRow(Base):
-    """Somebody who may log in. ``name_key`` is the name without its case, for comparison."""
+    """An account. ``name_key`` is the normalized name, for comparison (`credentials.name_key`)."""
 
     __tablename__ = "people_account"
 

@@ -1,4 +1,4 @@
-"""Back-off against guessing, per name and per address; memory is bounded."""
+"""Back-off against guessing, per name and per address, with bounded memory."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 
-#: The first wait, and the longest.
+#: Shortest and longest wait [s].
 FIRST_WAIT_S = 2.0
 LONGEST_WAIT_S = 900.0
-#: After this long without a wrong try everything is forgotten.
+#: Time [s] without a wrong try after which a record is deleted.
 FORGET_S = 3600.0
 _KEEP = 10_000
 
@@ -23,7 +23,7 @@ class _Record:
 
 
 class Throttle:
-    """Doubling waits after ``free_tries`` wrong tries. ``clock`` counts seconds."""
+    """Waits that double with each wrong try after ``free_tries``. ``clock`` returns seconds."""
 
     def __init__(self, free_tries: int, clock: Callable[[], float] = time.monotonic) -> None:
         self._free_tries = free_tries
@@ -31,19 +31,19 @@ class Throttle:
         self._records: OrderedDict[str, _Record] = OrderedDict()
 
     def wait_s(self, *keys: str) -> float:
-        """Seconds until any of these may try again; 0 where they may now."""
+        """Time [s] until all of these keys may try again; 0 if they may now."""
         now = self._clock()
         return max(
             (r.blocked_until - now for k in keys if (r := self._known(k)) is not None), default=0.0
         )
 
     def failures(self, key: str) -> int:
-        """Wrong tries within the last hour without a right one."""
+        """Wrong tries of a key since its last right one; 0 if the last was over an hour ago."""
         record = self._known(key)
         return 0 if record is None else record.failures
 
     def failed(self, *keys: str, free_tries: int | None = None) -> None:
-        """A wrong try. ``free_tries`` is how many this one is judged by, where not as always."""
+        """Count a wrong try. ``free_tries`` replaces the usual number for this try."""
         now = self._clock()
         free = self._free_tries if free_tries is None else free_tries
         for key in keys:
@@ -60,7 +60,7 @@ class Throttle:
             self._records.popitem(last=False)
 
     def succeeded(self, *keys: str) -> None:
-        """The right answer; earlier wrong ones of these are forgotten."""
+        """Reset the counts of these keys after a right try."""
         for key in keys:
             self._records.pop(key, None)
 
@@ -73,7 +73,7 @@ class Throttle:
 
 
 class Bucket:
-    """So many at once, and so many a second after that."""
+    """Token bucket: ``burst`` at once, ``per_second`` on average after that."""
 
     def __init__(
         self, burst: float, per_second: float, clock: Callable[[], float] = time.monotonic
@@ -82,7 +82,7 @@ class Bucket:
         self._left, self._at = burst, clock()
 
     def take(self) -> bool:
-        """Whether there is one more."""
+        """Take one token; returns False if none is left."""
         now = self._clock()
         self._left = min(self._burst, self._left + (now - self._at) * self._rate)
         self._at = now

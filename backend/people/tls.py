@@ -1,9 +1,9 @@
-"""The station's certificate: given, or issued by an authority of the station's own.
+"""TLS certificate of the station: supplied, or issued by the station's own certificate authority.
 
-A phone can be made to trust the authority once; certificates that the station issues later, as
-under another name, are trusted then too. The authority may vouch for the names of this computer,
-for names under .local and for addresses of private networks, and for nothing else (RFC 5280,
-clause 4.2.1.10): with its key stolen nobody can pretend to be a bank.
+Phones can be made to trust the authority once; certificates that the station issues later, for
+example under another name, are then trusted too. The authority may only certify the names of this
+computer, names under .local and addresses of private networks (name constraints, RFC 5280 clause
+4.2.1.10): its key, if stolen, cannot be used to impersonate a bank.
 """
 
 from __future__ import annotations
@@ -26,10 +26,11 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
 
-#: The longest that phones accept, also from an authority that their user has installed.
+#: Longest lifetime that phones accept, also from an authority that their user has installed.
 LIFETIME = timedelta(days=820)
 AUTHORITY_LIFETIME = timedelta(days=10 * 365)
-#: Made again at a start when it has less than this left; the authority outlives what it issues.
+#: A certificate with less lifetime left is renewed at a start; the authority
+#: outlives what it issues.
 RENEW = timedelta(days=180)
 AUTHORITY_FILE = "authority.pem"
 #: Private, link-local and loopback addresses (RFC 1918, 3927, 4193, 4291).
@@ -44,8 +45,10 @@ _Key: TypeAlias = ec.EllipticCurvePrivateKey
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """Files for the server. ``fingerprint`` is SHA-256 as browsers show it, ``authority`` that of
-    the station's authority; empty where the user has brought the certificate.
+    """Certificate files of the server.
+
+    ``fingerprint`` is SHA-256 in the form that browsers show, ``authority`` the same of the
+    station's authority; empty where the user supplies the certificate (``own``).
     """
 
     certificate: Path
@@ -56,10 +59,10 @@ class Certificate:
 
 
 def own_certificate(certificate: Path, key: Path) -> Certificate:
-    """A certificate that the user brings.
+    """Certificate supplied by the user.
 
     Raises:
-        NotAllowed: a file cannot be read, or is no certificate.
+        NotAllowed: a file cannot be read, or is not a certificate.
     """
     try:
         first = x509.load_pem_x509_certificate(certificate.read_bytes())
@@ -70,10 +73,10 @@ def own_certificate(certificate: Path, key: Path) -> Certificate:
 
 
 def station_certificate(folder: Path, names: Iterable[str]) -> Certificate:
-    """The station's certificate with its authority, made on first use; the keys are readable by
-    its user only.
+    """The station's certificate with its authority, made on first use.
 
-    ``names`` are host names and addresses that it is to be valid for.
+    Only the server's user may read the keys. ``names`` are the host names and addresses that the
+    certificate is valid for.
     """
     certificate, key = folder / "certificate.pem", folder / "key.pem"
     wanted = sorted(set(names))
@@ -92,7 +95,7 @@ def authority_file(folder: Path) -> Path:
 
 
 def _authority(folder: Path, names: list[str]) -> tuple[x509.Certificate, _Key]:
-    """The one that is kept, or a new one where it is over or may not vouch for a name."""
+    """The stored authority, or a new one if it expires soon or may not certify one of the names."""
     file, key = folder / AUTHORITY_FILE, folder / "authority-key.pem"
     try:
         known = x509.load_pem_x509_certificate(file.read_bytes())
@@ -112,7 +115,7 @@ def _authority(folder: Path, names: list[str]) -> tuple[x509.Certificate, _Key]:
 
 
 def _found(file: Path, key: Path, names: list[str]) -> tuple[x509.Certificate, _Key]:
-    """Make an authority; everybody who trusted the one before has to be asked again."""
+    """Make a new authority; everybody who trusted the previous one must install this one."""
     secret = ec.generate_private_key(ec.SECP256R1())
     title = f"servodeck authority of {socket.gethostname().lower()}"[:64]
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, title)])
@@ -159,8 +162,8 @@ def _usable(
         return None
     have = set(valid.get_values_for_type(x509.DNSName))
     have |= {str(a) for a in valid.get_values_for_type(x509.IPAddress)}
-    # Who has not installed the authority compares the fingerprint and keeps the exception: an
-    # address that comes and goes must not change it.
+    # Users without the authority compare the fingerprint and store an exception: an address that
+    # comes and goes must not change the certificate.
     return known if {n for n in names if not _is_address(n)} <= have else None
 
 
@@ -170,7 +173,7 @@ def _issue(
     secret = ec.generate_private_key(ec.SECP256R1())
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, f"servodeck {names[0]}"[:64])])
     limits = authority.extensions.get_extension_for_class(x509.NameConstraints).value
-    # One public address among them would make the whole certificate invalid.
+    # A single public address would make the whole certificate invalid.
     names = [name for name in names if _may_vouch(limits.permitted_subtrees or [], name)]
     issuer_key = x509.AuthorityKeyIdentifier.from_issuer_public_key(signs.public_key())
     made = (
@@ -192,7 +195,7 @@ def _issue(
 def _builder(
     subject: x509.Name, issuer: x509.Name, secret: _Key, lifetime: timedelta
 ) -> x509.CertificateBuilder:
-    # The clock of a computer that was just switched on may be behind.
+    # The clock of a computer that was just switched on may be behind the real time.
     begin = datetime.now(UTC) - timedelta(days=1)
     return (
         x509.CertificateBuilder()
@@ -225,7 +228,7 @@ def _keep_key(file: Path, secret: _Key) -> None:
         serialization.PrivateFormat.PKCS8,
         serialization.NoEncryption(),
     )
-    # Written through a file that only its user may read (tempfile makes it 0600).
+    # Written through a temporary file that only its user may read (tempfile makes it 0600).
     write_atomically(file, pem)
     os.chmod(file, 0o600)  # noqa: PTH101 - the same for every system
 
@@ -249,7 +252,7 @@ def _fingerprint(certificate: x509.Certificate) -> str:
 
 
 def machine_names() -> list[str]:
-    """Names and addresses by which this machine may be reached."""
+    """Names and addresses by which this machine can be reached."""
     name = socket.gethostname().lower()
     names = {"localhost", "127.0.0.1", "::1", name}
     if "." not in name:
@@ -259,7 +262,7 @@ def machine_names() -> list[str]:
     except OSError:
         found = []
     names |= {str(address[4][0]).split("%")[0] for address in found}
-    # The address that faces the network; a datagram socket sends nothing by connecting.
+    # Address of the interface with the default route; connecting a datagram socket sends nothing.
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(("192.0.2.1", 9))

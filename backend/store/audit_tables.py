@@ -1,4 +1,4 @@
-"""Tables of the audit: the chain of entries, and its head."""
+"""Tables of the audit: the hash chain of entries, and its head."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from sqlalchemy.orm import Mapped, mapped_column
 
 from backend.store.base import Base
 
-#: SQLite knows only INTEGER as a row number.
+#: SQLite accepts only INTEGER as a row number.
 _NUMBER = BigInteger().with_variant(Integer, "sqlite")
 
 
 class AuditEntry(Base):
-    """One entry. ``body`` is what is hashed; the other columns repeat parts of it for searching.
+    """One entry. ``body`` is the hashed content; other columns repeat parts of it for search.
 
     ``hash`` is the SHA-256 of ``previous`` (64 hexadecimal digits) followed by ``body`` in UTF-8.
     The database refuses to change or delete a row.
@@ -22,7 +22,9 @@ class AuditEntry(Base):
 
     number: Mapped[int] = mapped_column(_NUMBER, primary_key=True, autoincrement=False)
     time: Mapped[str] = mapped_column(String(32), index=True)
-    """ISO 8601 in UTC with microseconds: text, so that what is hashed is what is stored."""
+    """ISO 8601 in UTC with microseconds; stored as text, so that it is
+    identical to the hashed text.
+    """
     station: Mapped[str] = mapped_column(String(100))
     person: Mapped[str] = mapped_column(String(200), index=True)
     kind: Mapped[str] = mapped_column(String(30), index=True)
@@ -34,7 +36,7 @@ class AuditEntry(Base):
 
 
 class AuditHead(Base):
-    """The one row that says where the chain ends; locked while entries are added."""
+    """The single row with the last entry of the chain; locked while entries are added."""
 
     __tablename__ = "audit_head"
 

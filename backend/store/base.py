@@ -1,4 +1,4 @@
-"""What all tables share: one metadata with named constraints, and times that keep their zone."""
+"""Base of all tables: one metadata object with named constraints, and times with a time zone."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sqlalchemy.types import TypeDecorator
 
 
 class Base(DeclarativeBase):
-    """Base of every table. Constraints are named, so that migrations can change them anywhere."""
+    """Base class of every table. Constraints are named, so that migrations can change them."""
 
     metadata = MetaData(
         naming_convention={
@@ -24,16 +24,16 @@ class Base(DeclarativeBase):
 
 
 class UtcDateTime(TypeDecorator[datetime]):
-    """A moment. SQLite stores no zone: it holds UTC there, and comes back as UTC everywhere."""
+    """Time with zone. SQLite stores no zone: UTC is stored, and returned everywhere."""
 
     impl = DateTime(timezone=True)
     cache_ok = True
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """UTC for the database.
+        """Convert to UTC for the database.
 
         Raises:
-            ValueError: a time without zone.
+            ValueError: the time has no zone.
         """
         if value is None:
             return None
@@ -43,7 +43,7 @@ class UtcDateTime(TypeDecorator[datetime]):
         return value.replace(tzinfo=None) if dialect.name == "sqlite" else value
 
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """UTC from the database."""
+        """Return the stored time in UTC."""
         if value is None:
             return None
         return value.replace(tzinfo=UTC) if dialect.name == "sqlite" else value.astimezone(UTC)

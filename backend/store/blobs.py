@@ -1,8 +1,8 @@
-"""Large contents outside the database, by their SHA-256: a folder, or an S3-compatible store.
+"""Large contents outside the database, by SHA-256: in a folder or an S3-compatible store.
 
-Written once, never changed; read back they are compared with their name, so that a damaged one is
-noticed. A blob is stored before the row that names it: a crash between leaves a blob too many,
-never a row too many.
+A blob is written once and never changed; when read, it is compared with its name, so that damage is
+detected. It is stored before the row that refers to it: a crash in between leaves an unused blob,
+never a row without its blob.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ class BlobFailed(StorageFailed):
 
 
 class Blobs:
-    """Contents at a place: a folder's path, ``s3://bucket/prefix``, or another fsspec URL.
+    """Blobs at a place: a folder's path, ``s3://bucket/prefix``, or another fsspec URL.
 
-    Everything blocks and belongs on a thread.
+    All methods block and belong on a worker thread.
     """
 
     def __init__(self, place: str) -> None:
@@ -46,7 +46,7 @@ class Blobs:
             ) from error
 
     def put(self, data: bytes) -> str:
-        """Store contents; returns their name. Storing the same again does nothing.
+        """Store contents; returns their name. Contents already stored are not written again.
 
         Raises:
             BlobFailed: nothing was stored.
@@ -59,14 +59,15 @@ class Blobs:
             if isinstance(self._fs, LocalFileSystem):
                 write_atomically(Path(path), data)
             else:
-                # An object store shows an object only when all of it has arrived.
+                # An object store shows an object only when all of it has arrived, so no
+                # temporary name is needed.
                 self._fs.pipe_file(path, data)
         except Exception as error:
             raise self._failed("stored", error) from error
         return name
 
     def get(self, name: str) -> bytes:
-        """Contents of this name, compared with it.
+        """Read contents and check them against their name.
 
         Raises:
             BlobFailed: missing, damaged, or the place cannot be reached.
@@ -85,7 +86,7 @@ class Blobs:
         return data
 
     def names(self) -> Iterator[str]:
-        """Names of everything that is stored.
+        """Names of all stored blobs.
 
         Raises:
             BlobFailed: the place cannot be reached.
@@ -100,7 +101,7 @@ class Blobs:
                 yield name
 
     def modified(self, name: str) -> datetime:
-        """When contents were stored.
+        """Time at which contents were stored.
 
         Raises:
             BlobFailed: missing, or the place cannot be reached.
@@ -114,7 +115,7 @@ class Blobs:
         return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
 
     def delete(self, name: str) -> None:
-        """Delete contents that nothing names any more; does nothing where there are none.
+        """Delete contents that nothing refers to any more; does nothing if they do not exist.
 
         Raises:
             BlobFailed: the place cannot be reached.
@@ -132,5 +133,5 @@ class Blobs:
         return f"{self._root}/{name[:2]}/{name}"
 
     def _failed(self, what: str, error: Exception) -> BlobFailed:
-        # Every kind of store has its own errors; a botocore error is no OSError.
+        # Every kind of store has its own errors; a botocore error, for example, is not an OSError.
         return BlobFailed("store.contents-not", value=self.place, what=what, error=str(error))

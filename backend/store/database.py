@@ -1,4 +1,4 @@
-"""Opening the database, bringing it up to date, and transactions on worker threads.
+"""Database: opening, migration, and transactions on worker threads.
 
 SQLite by default (``servodeck.db`` in the state folder: WAL, foreign keys, full synchronisation,
 writers one after the other), PostgreSQL by URL. Migrations run when it is opened, in one
@@ -34,29 +34,30 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 FILE = "servodeck.db"
-#: Any number that nothing else on the server uses; all servodeck stations use the same.
+#: Key of the migration lock: any number that nothing else on the server uses;
+#: the same for all stations.
 _MIGRATION_LOCK = 0x5E2D0DEC
 _PATIENCE_S = 5
-#: For the write lock of SQLite. A writer of another process is waited for by asking again and
-#: again, and may be overtaken each time; on a slow disk that takes a while.
+#: For the write lock of SQLite [s]. A process waits for a writer of another process by polling, and
+#: may be overtaken each time; on a slow disk that takes a while.
 _SQLITE_PATIENCE_S = 15
-#: SQLITE_CORRUPT and SQLITE_NOTADB (sqlite.org/rescode.html).
+#: Error codes SQLITE_CORRUPT and SQLITE_NOTADB (sqlite.org/rescode.html).
 _DAMAGED = frozenset({11, 26})
-#: Writers of this process queue here, by file, where none is overtaken for long.
+#: Locks by file, at which writers of this process queue, so that none is overtaken for long.
 _writers: dict[str, threading.Lock] = {}
 
 
 class DatabaseFailed(StorageFailed):
-    """The database cannot be used: disk full, server away, of a newer version."""
+    """The database cannot be used: disk full, server unreachable, or written by a newer version."""
 
     kind = "storage-failed"
 
 
 class Store:
-    """The database of one station. Making it touches nothing; it opens on first use or `open`.
+    """The database of one station. It is opened by `open` or on first use.
 
-    ``database`` is an SQLAlchemy URL (``postgresql://…``, ``sqlite:///…``), or None for the file
-    in ``folder``. Transactions block and belong on threads: `call` runs them there.
+    ``database`` is an SQLAlchemy URL (``postgresql://…``, ``sqlite:///…``), or None for the file in
+    ``folder``. Transactions block and belong on worker threads, where `call` runs them.
     """
 
     def __init__(self, folder: Path, database: str | None = None) -> None:
@@ -64,19 +65,20 @@ class Store:
         self.url = _url(folder, database)
         self._engine: Engine | None = None
         self._identity: tuple[int, int] | None = None
-        #: Whether the folder has ever been seen. A database elsewhere works before it is made.
+        #: Whether the folder has ever existed. A database elsewhere is usable
+        #: before the folder is made.
         self._had_folder = False
         self._opening = threading.Lock()
         self._pool = ThreadPoolExecutor(max_workers=4, thread_name_prefix="store")
 
     @property
     def shown(self) -> str:
-        """The URL without its password."""
+        """The URL without its password, for display."""
         return self.url.render_as_string(hide_password=True)
 
     @property
     def sqlite_file(self) -> Path | None:
-        """The file of an SQLite database, else None."""
+        """The file of an SQLite database, otherwise None."""
         return Path(self.url.database) if self._is_sqlite and self.url.database else None
 
     @property
@@ -84,7 +86,7 @@ class Store:
         return self.url.get_backend_name() == "sqlite"
 
     def open(self) -> Engine:
-        """Connect and bring the tables up to date; does nothing when that has been done. Blocks.
+        """Connect and migrate the tables; does nothing if that was done already. Blocks.
 
         Raises:
             DatabaseFailed: it cannot be reached, or a newer version has written it.
@@ -104,17 +106,17 @@ class Store:
             return self._engine
 
     def close(self) -> None:
-        """Let go of the database. It opens again when it is used again."""
+        """Close the database. It opens again on the next use."""
         with self._opening:
             if self._engine is not None:
                 self._engine.dispose()
                 self._engine = None
 
     def missing(self) -> Text | None:
-        """Why nothing that is written now would be found later; None where it would be.
+        """Reason why data written now would be lost; None if it would be kept.
 
-        A file that was removed or replaced while it is open still takes everything, and then is
-        gone with the process.
+        A file that was removed or replaced while it is open still accepts all writes, which are
+        lost when the process ends.
         """
         if self._engine is None:
             return None
@@ -138,22 +140,22 @@ class Store:
 
     @contextmanager
     def reading(self, *, snapshot: bool = False) -> Iterator[Session]:
-        """A transaction that changes nothing; with ``snapshot`` all its queries see one moment.
+        """Transaction that changes nothing; with ``snapshot`` all its queries see the same state.
 
         Raises:
             DatabaseFailed: see `open`.
         """
         engine = self.open()
-        if snapshot and not self._is_sqlite:  # which reads that way always
+        if snapshot and not self._is_sqlite:  # SQLite always reads a snapshot
             engine = engine.execution_options(isolation_level="REPEATABLE READ")
         with self._translated(), Session(engine, expire_on_commit=False) as session:
             yield session
 
     @contextmanager
     def writing(self) -> Iterator[Session]:
-        """A transaction that is committed at the end, or rolled back when an error leaves it.
+        """Transaction that is committed at the end, or rolled back if an error leaves it.
 
-        On SQLite it holds the write lock from the start, so that it never fails half way.
+        On SQLite it holds the write lock from the start, so that it cannot fail half way.
 
         Raises:
             DatabaseFailed: nothing was changed.
@@ -175,7 +177,7 @@ class Store:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
-        """The only writer of this process, where the database takes only one at a time."""
+        """Hold the writer lock of this process, if the database accepts only one writer."""
         if not self._is_sqlite:
             yield
             return
@@ -190,7 +192,7 @@ class Store:
             lock.release()
 
     async def call(self, work: Callable[P, T], /, *arguments: P.args, **named: P.kwargs) -> T:
-        """Run blocking work on a thread of the store, as the person who asks for it."""
+        """Run blocking work on a thread of the store, in the caller's context (acting person)."""
         context = contextvars.copy_context()
         bound = functools.partial(work, *arguments, **named)
         return await asyncio.get_running_loop().run_in_executor(
@@ -212,7 +214,7 @@ class Store:
         if file is not None:
             try:
                 file.parent.mkdir(parents=True, exist_ok=True)
-                file.touch(mode=0o600)  # accounts are in it
+                file.touch(mode=0o600)  # the file contains accounts
             except OSError as error:
                 raise DatabaseFailed(
                     "store.database-cannot-made",
@@ -220,7 +222,7 @@ class Store:
                     file=str(file),
                     strerror=error.strerror,
                 ) from error
-        # No error text, and so no log, may repeat what was stored: hashes of passwords too.
+        # Error texts, and so logs, must not repeat stored values: password hashes are among them.
         engine = create_engine(
             self.url, hide_parameters=True, connect_args={"timeout": _SQLITE_PATIENCE_S}
         )
@@ -284,7 +286,7 @@ def _url(folder: Path, database: str | None) -> URL:
 
 
 def _prepare_sqlite(connection: object, _record: ConnectionPoolEntry) -> None:
-    """Transactions begin when we say so, and what is committed is on the disk."""
+    """Let SQLAlchemy begin transactions explicitly, and make every commit durable on disk."""
     import sqlite3
 
     if not isinstance(connection, sqlite3.Connection):

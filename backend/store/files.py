@@ -1,4 +1,4 @@
-"""Files that are whole or absent: written under another name, flushed, then renamed into place."""
+"""Atomic file writes: to a temporary name, flushed, then renamed into place."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ _NAME = re.compile(r"^\w[\w .\-]{0,100}$")
 
 
 class StorageFailed(NotAllowed):
-    """A file could not be written; what was there before is unharmed."""
+    """A file could not be written; the previous file is unharmed."""
 
     kind = "storage-failed"
 
 
 def checked_name(name: str, suffix: str) -> str:
-    """A plain file name with ``suffix``; no folders, no leading dot.
+    """Plain file name with ``suffix``; no folders, no leading dot.
 
     Raises:
-        NotAllowed: anything else.
+        NotAllowed: the name is anything else.
     """
     stem = name.removesuffix(suffix)
     if not _NAME.match(stem) or ".." in stem:
@@ -35,11 +35,11 @@ def checked_name(name: str, suffix: str) -> str:
 def write_atomically(path: Path, data: bytes, *, durable: bool = True) -> None:
     """Replace ``path`` by ``data``, or leave it as it was.
 
-    What is not ``durable`` outlives the process but perhaps not the computer; the disk is not
-    waited for.
+    Data that is not ``durable`` survives the end of the process but perhaps not a power failure;
+    the call then does not wait for the disk.
 
     Raises:
-        StorageFailed: disk full, no permission; the old file stays.
+        StorageFailed: for example disk full or no permission; the old file stays.
     """
     try:
         if path.is_dir():

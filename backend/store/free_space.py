@@ -1,11 +1,11 @@
-"""How much of a disk is left, and how much stays free for the rest of the system."""
+"""Free space of a disk, and the reserve that stays free for the rest of the system."""
 
 from __future__ import annotations
 
 import shutil
 from pathlib import Path
 
-#: Recordings and exports end while this much is still free, so that the system lives on (bytes).
+#: Free space at which recordings and exports end, so that the system keeps running [bytes].
 RESERVE_BYTES = 200 * 1024 * 1024
 
 

@@ -1,7 +1,7 @@
-"""Tables of the axes' condition: what health checks measured, and the baselines that were signed.
+"""Tables of axis condition: results of health checks, and signed baselines.
 
-An axis is named by ``axis_key``: by vendor, product and serial number where the drive reports
-them, so that it stays the same axis on another station; else by station and place on the bench.
+``axis_key`` identifies an axis by vendor, product and serial number where the drive reports them,
+so that it is the same axis on another station; otherwise by station and place on the bench.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from backend.store.base import Base, UtcDateTime
 
 
 class HealthRun(Base):
-    """One round of a health check. Never changed once written."""
+    """One round of a health check. A row never changes."""
 
     __tablename__ = "health_run"
     __table_args__ = (Index("ix_health_run_axis_key_taken", "axis_key", "taken"),)
@@ -34,16 +34,17 @@ class HealthRun(Base):
     person: Mapped[str] = mapped_column(String(200), default="")
     settings: Mapped[dict[str, object]] = mapped_column(JSON)
     settings_sha256: Mapped[str] = mapped_column(String(64))
-    """Of the settings on which values depend: only runs of the same ones are compared."""
+    """Hash of the settings that affect values: only runs with the same hash are compared."""
     measurements: Mapped[dict[str, str]] = mapped_column(JSON)
     """Names of the stored raw data, with their SHA-256."""
     round: Mapped[str] = mapped_column(Text)
-    """`backend.tools.health.result.HealthRound` as JSON. Text: thousands are read for one page, and
-    the model's own parser takes a tenth of the time."""
+    """`backend.tools.health.result.HealthRound` as JSON. Stored as text: thousands are read for one
+    page, and the model's own parser takes a tenth of the time.
+    """
 
 
 class HealthBaseline(Base):
-    """A baseline as it was signed: a copy of its runs, with a checksum over all of it."""
+    """A signed baseline: a copy of its runs, with a checksum over the whole copy."""
 
     __tablename__ = "health_baseline"
 

@@ -1,4 +1,4 @@
-"""Tables of the library: things with a name, their versions, tags and contents."""
+"""Tables of the library: named items, their versions, tags and contents."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from backend.store.base import Base, UtcDateTime
 class Item(Base):
     """A parameter set, recording, measurement or report.
 
-    ``station`` is empty where the contents are in the store, so that every station has them; else
-    the name of the station in whose state folder the file lies.
+    ``station`` is empty where the contents are in the store and so available to every station;
+    otherwise it is the station whose state folder contains the file.
     """
 
     __tablename__ = "library_item"
@@ -35,7 +35,7 @@ class Item(Base):
     name: Mapped[str] = mapped_column(String(200))
     notes: Mapped[str] = mapped_column(Text, default="")
     words: Mapped[str] = mapped_column(Text, default="")
-    """Everything that a search looks through, in lower case."""
+    """All searchable text, in lower case."""
     changed: Mapped[datetime] = mapped_column(UtcDateTime, index=True)
     deleted: Mapped[datetime | None] = mapped_column(UtcDateTime)
     versions: Mapped[list[Version]] = relationship(
@@ -47,10 +47,10 @@ class Item(Base):
 
 
 class Version(Base):
-    """One state of an item: its contents and the axis they are of. Never changed once written.
+    """One version of an item: its contents and the axis that they belong to. A row never changes.
 
-    ``sha256`` is of the contents. They lie inline in `Content`, as a blob, or (``place`` "file")
-    in the state folder of the item's station.
+    ``sha256`` is of the contents. They are stored inline in `Content`, as a blob, or (``place``
+    "file") in the state folder of the item's station.
     """
 
     __tablename__ = "library_version"
@@ -73,12 +73,12 @@ class Version(Base):
     serial: Mapped[int | None] = mapped_column(BigInteger, index=True)
     firmware: Mapped[str] = mapped_column(String(100), default="")
     facts: Mapped[dict[str, object]] = mapped_column(JSON, default=dict)
-    """What a list shows of this kind: rows of a set, channels of a recording …"""
+    """Values that lists show for this kind: rows of a set, channels of a recording …"""
     item: Mapped[Item] = relationship(back_populates="versions")
 
 
 class Tag(Base):
-    """A word that people put on an item."""
+    """A tag that people have given an item."""
 
     __tablename__ = "library_tag"
 
@@ -90,7 +90,7 @@ class Tag(Base):
 
 
 class Content(Base):
-    """Contents that are small enough to lie in the database, by their SHA-256."""
+    """Contents that are small enough for the database, by their SHA-256."""
 
     __tablename__ = "library_content"
 

@@ -1,4 +1,4 @@
-"""One servodeck at a time uses a state folder."""
+"""Lock that lets only one servodeck process at a time use a state folder."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from drivers.computer.locks import open_lock_file, try_lock
 
 
 class FolderLock:
-    """A lock that goes with its process, however that ends. ``held`` says whether it is ours.
+    """Lock on a state folder; the system releases it when its process ends, in whatever way.
 
-    A folder that does not exist, or cannot be written, is not locked and counts as ours.
+    ``held`` is True while this process holds it. A folder that does not exist, or cannot be
+    written, is not locked and counts as held.
     """
 
     NAME = "servodeck.lock"
@@ -23,7 +24,7 @@ class FolderLock:
         self.held = False
 
     def take(self) -> bool:
-        """Try to take it; False while another process has it. Holding it already is taking it."""
+        """Try to take the lock; True if it is held, False if another process has it."""
         if self.held:
             return True
         try:
@@ -38,7 +39,7 @@ class FolderLock:
         return True
 
     def give(self) -> None:
-        """Let it go; does nothing for one that is not held."""
+        """Release the lock; does nothing if it is not held."""
         if self._file is not None:
             os.close(self._file)
             self._file = None

@@ -1,7 +1,7 @@
-"""Alembic without its command line: the scripts are packaged with the program.
+"""Alembic without its command line: the migration scripts are packaged with the program.
 
 Every part of the program has a branch of its own (``library``, ``audit`` …), so that each can add
-revisions without knowing of the others; an upgrade goes to the heads of all.
+revisions independently of the others; an upgrade runs to the heads of all branches.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ def _config() -> Config:
 
 
 def known_revisions() -> frozenset[str]:
-    """Names of all revisions that this program knows: those of the files, which are not run."""
+    """Names of all revisions of this program, taken from the file names; no script is executed."""
     return frozenset(file.stem for file in (_FOLDER / "versions").glob("*_[0-9]*.py"))
 
 
 def script() -> ScriptDirectory:
-    """The revisions that this program knows."""
+    """Script directory with all revisions of this program."""
     return ScriptDirectory.from_config(_config())
 
 
 def upgrade(connection: Connection) -> None:
-    """Bring the tables up to date within the connection's transaction."""
+    """Migrate the tables to the heads, within the connection's transaction."""
     config = _config()
     config.attributes["connection"] = connection
     command.upgrade(config, "heads")

@@ -1,11 +1,11 @@
-"""Text in cells of a CSV file, which spreadsheets open."""
+"""Text for cells of CSV files that are opened in spreadsheets."""
 
 from __future__ import annotations
 
-#: A cell that begins so is a formula to a spreadsheet, which may then fetch or run something.
+#: Beginnings that make a spreadsheet treat a cell as a formula, which can fetch or run something.
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "\uff1d", "\uff0b", "\uff0d", "\uff20")
 
 
 def as_text(text: str) -> str:
-    """A cell that stays text: with an apostrophe in front where it would be a formula."""
+    """Text that a spreadsheet keeps as text: a possible formula gets an apostrophe in front."""
     return f"'{text}" if text.lstrip(" \u00a0").startswith(_FORMULA) else text

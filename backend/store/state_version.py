@@ -1,10 +1,9 @@
-"""The version of a state folder: an upgrade migrates it, an older program refuses it.
+"""Version of a state folder: an upgrade migrates the folder, an older program refuses it.
 
-``state.json`` in the state folder says which version of the folder's contents a program has
-written, which program that was, and which revisions its database has. Version 1 is what servodeck
-0.1.0 wrote, which kept no such file. Whatever changes files of the folder so that the program
-before would misread them adds a version and a step to `_STEPS`; new revisions of the database
-count by themselves.
+``state.json`` in the state folder contains the version of the folder's contents, the program that
+wrote it, and the revisions of its database. Version 1 is the contents written by servodeck 0.1.0,
+which wrote no such file. A change to files of the folder that an earlier program would misread
+needs a new version and a step in `_STEPS`; new database revisions need neither.
 """
 
 from __future__ import annotations
@@ -21,20 +20,22 @@ from drivers.errors import NotAllowed
 
 FILE = "state.json"
 VERSION = 2
-#: What 0.1.0 wrote has no file that says so.
+#: Version of folders without the file: written by 0.1.0.
 FIRST = 1
 
 
 class StateRefused(NotAllowed):
-    """The state folder is not one that this program understands; nothing was written."""
+    """The state folder is not of a version that this program supports; nothing was written."""
 
     kind = "state-refused"
 
 
 @dataclass(frozen=True, slots=True)
 class StateVersion:
-    """``version`` of the folder's contents, the ``program`` (its version, empty where not known)
-    that wrote it, and the ``revisions`` that the program's database has.
+    """Contents of ``state.json``.
+
+    ``version`` of the folder's contents, ``program`` version that wrote it (empty where unknown),
+    and ``revisions`` of that program's database.
     """
 
     version: int
@@ -43,7 +44,7 @@ class StateVersion:
 
 
 def read(folder: Path) -> StateVersion | None:
-    """The version of a folder; None where nothing is kept in it. Changes nothing.
+    """Read the version of a folder; None if nothing is stored in it. Changes nothing.
 
     Raises:
         StateRefused: the file is damaged, or cannot be read.
@@ -68,12 +69,12 @@ def _is_used(folder: Path) -> bool:
     try:
         return any(path.name != FolderLock.NAME for path in folder.iterdir())
     except OSError:
-        # What cannot be listed is refused by whoever wants to write there.
+        # A folder that cannot be listed is refused later, by the code that writes to it.
         return False
 
 
 def check(folder: Path) -> StateVersion | None:
-    """The version of a folder that this program understands, as `read`. Changes nothing.
+    """Read the version of a folder and check that this program supports it. Changes nothing.
 
     Raises:
         StateRefused: a newer program has written it, or its version cannot be read.
@@ -81,7 +82,7 @@ def check(folder: Path) -> StateVersion | None:
     found = read(folder)
     if found is None:
         return None
-    from backend.store import migrate  # commands without a database need none of it
+    from backend.store import migrate  # not needed by commands without a database
 
     unknown = found.revisions - migrate.known_revisions()
     if found.version > VERSION or unknown:
@@ -97,17 +98,17 @@ def check(folder: Path) -> StateVersion | None:
 
 
 def bring_up_to_date(folder: Path) -> bool:
-    """Migrate the folder and note its version; True where something was migrated. Blocks.
+    """Migrate the folder and record its version; True if something was migrated. Blocks.
 
-    The caller holds the folder's lock. Each step is noted when it is done, and done again where
-    the process ended before that.
+    The caller holds the folder's lock. Each completed step is recorded, and repeated if the
+    process ended before that.
 
     Raises:
         StateRefused: as `check`; nothing was changed.
-        StorageFailed: it cannot be written; the folder is of the version that was noted last.
+        StorageFailed: the folder cannot be written; it has the version that was recorded last.
     """
     found = check(folder)
-    from backend.store import migrate  # commands without a database need none of it
+    from backend.store import migrate  # not needed by commands without a database
 
     revisions = migrate.known_revisions()
     wanted = StateVersion(VERSION, backend.__version__, revisions)
@@ -135,12 +136,12 @@ def _note(folder: Path, state: StateVersion) -> None:
 
 
 def _from_first(_folder: Path) -> None:
-    """Version 2 keeps what 0.1.0 wrote as it is, next to restore lists by a drive's identity.
+    """Step to version 2: no file changes; version 2 adds restore lists named by a drive's identity.
 
-    Restore lists in ``owed/`` are adopted when their drive answers (`RestoreStore`), since
-    only then its serial number is known; the database has migrations of its own.
+    Restore lists in ``owed/`` are adopted when their drive answers (`RestoreStore`), as its serial
+    number is unknown before; the database has migrations of its own.
     """
 
 
-#: By version what makes the next one of it; done twice it does no harm.
+#: By version: the step to the next version. Repeating a step does no harm.
 _STEPS: Mapping[int, Callable[[Path], None]] = {FIRST: _from_first}

@@ -1,1 +1,1 @@
-"""Jobs, the station's log, and a clock that only goes forward."""
+"""Jobs, the station's log, reading in a separate process, and loading of slow libraries."""

@@ -1,8 +1,8 @@
-"""Reading a large file in a process of its own, which goes after STOP and the buses.
+"""Reading a large file in a separate process, with lower priority than STOP and the buses.
 
 On a thread of the server such a reading shares the interpreter with the event loop: a regular
-expression or a JSON decoder over some megabytes lets nothing else run until it has ended, and a
-long loop in Python takes its turn again after each step of the loop.
+expression or a JSON decoder over some megabytes blocks everything else until it ends, and a long
+Python loop takes the interpreter back after each step of the event loop.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ from drivers.texts import limits
 P = ParamSpec("P")
 T = TypeVar("T")
 
-#: A reading of fewer bytes costs less than the start of a process.
+#: Reading fewer bytes costs less than starting a process.
 SMALL_BYTES = 256 << 10
-#: The longest reading, and the address space that it may use.
+#: Limits of a reading: duration [s] and address space [MiB].
 LIMIT_S = 60.0
 LIMIT_MIB = 768
-#: Readings at once: each may keep one processor busy.
+#: Readings at a time: each may use one processor fully.
 AT_ONCE = 1
 _at_once: dict[asyncio.AbstractEventLoop, asyncio.Semaphore] = {}
 
 
 class ReadingEnded(NotAllowed):
-    """A file whose reading took too long or too much memory."""
+    """Reading a file took too long or too much memory."""
 
 
 async def read_apart(
     size_bytes: int, work: Callable[P, T], /, *arguments: P.args, **named: P.kwargs
 ) -> T:
-    """Call a function of a module with arguments that can be pickled; so can its result.
+    """Call a module-level function in a separate process; arguments and result must be picklable.
 
-    ``size_bytes`` is what there is to be read: a small file is read on a thread. A `DriveError` of
-    ``work`` is raised here.
+    ``size_bytes`` is the amount to be read: a small file is read on a thread instead. A
+    `DriveError` of ``work`` is raised here.
 
     Raises:
         ReadingEnded: it takes longer than `LIMIT_S` or more memory than `LIMIT_MIB`.
@@ -67,7 +67,7 @@ async def read_apart(
 
 
 class Answer(NamedTuple):
-    """What a process printed until its end, and its exit code."""
+    """Standard output, error output and exit code of a process."""
 
     out: bytes
     said: bytes
@@ -75,17 +75,17 @@ class Answer(NamedTuple):
 
     @property
     def last_line(self) -> str:
-        """The last line of its error output."""
+        """The last line of the process's error output."""
         return (self.said.decode("utf-8", "replace").strip().splitlines() or ["it said nothing"])[
             -1
         ]
 
 
 async def answer_of(module: str, *arguments: str, task: object, limit_s: float) -> Answer:
-    """Run a module of ours in a process that reads ``task``, pickled; it ends with the caller.
+    """Run one of our modules in a process that reads the pickled ``task``; it ends with the caller.
 
     Raises:
-        TimeoutError: it takes longer than ``limit_s``.
+        TimeoutError: it takes longer than ``limit_s`` [s].
     """
     sent = await asyncio.to_thread(pickle.dumps, task)
     process = await asyncio.create_subprocess_exec(
@@ -114,18 +114,18 @@ def _loaded(out: bytes) -> tuple[Any, Exception | None]:
 
 
 def main() -> None:
-    """Carry out the one reading of this process."""
+    """Carry out the task of this process: read it from standard input, write the pickled answer."""
     yield_processor()
     limit_memory(LIMIT_MIB << 20)
     answer = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what a library prints is no part of the answer
+    os.dup2(2, 1)  # output printed by a library must not get into the answer
     with contextlib.suppress(MemoryError):
         work, arguments, named = pickle.load(sys.stdin.buffer)  # noqa: S301 - from our own parent
         try:
             out = pickle.dumps((work(*arguments, **named), None))
         except MemoryError:
             raise
-        except Exception as error:  # raised again where the reading was asked for
+        except Exception as error:  # raised again in the parent process
             out = pickle.dumps((None, error))
         answer.write(out)
     answer.close()

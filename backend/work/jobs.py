@@ -1,4 +1,4 @@
-"""Long work: started, watched and cancelled; at most one motion job per axis."""
+"""Jobs: long work that is started, watched and cancelled; at most one motion job per axis."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SERVER_ENDS = text("work.server-ends")
 
 
 class Progress:
-    """Handed to the work, which says how far it is. Both are shown as given."""
+    """Progress of a job, reported by its work and shown unchanged."""
 
     def __init__(self, changed: Callable[[], None]) -> None:
         self.fraction = 0.0
@@ -32,11 +32,11 @@ class Progress:
 
     @property
     def step(self) -> str:
-        """What is being done, in English."""
+        """The current step, in English."""
         return self.step_text.words()
 
     def __call__(self, fraction: float, step: Text | str) -> None:
-        """``fraction`` 0…1 done, ``step`` what is being done."""
+        """Report progress: ``fraction`` 0…1, and ``step``, the current step."""
         self.fraction = min(1.0, max(0.0, fraction))
         self.step_text = as_text(step)
         self._changed()
@@ -46,12 +46,12 @@ class Progress:
 class Job:
     """One piece of work. Times are seconds since the epoch.
 
-    ``motion``: it holds its axis, so that no other such job can begin. ``stoppable``: STOP
-    cancels it; not so for work that holds the axis still and must not be left half done.
-    ``partner`` is the other axis that it moves and holds, of a machine with two.
-    ``actor`` is who began it, through which live connection; None where the program did.
-    ``cancel_cause`` is the first reason for which it was cancelled; it counts where ``state`` is
-    cancelled, as work that has just come to its end stays done.
+    ``motion``: the job occupies its axis, so that no other motion job can begin. ``stoppable``:
+    STOP cancels the job; False for work that holds the axis at standstill and must not be left half
+    done. ``partner`` is the second axis that the job moves and occupies, on a machine with two.
+    ``actor`` is the person who began the job and their live connection; None if the program did.
+    ``cancel_cause`` is the first cause of cancellation; it is valid only if ``state`` is cancelled,
+    as work that ends at that moment stays done.
     """
 
     id: str
@@ -74,18 +74,18 @@ class Job:
 
     @property
     def moved(self) -> tuple[str, ...]:
-        """The axes that it moves or holds still; none where it is no motion."""
+        """The axes that the job moves or holds still; none if it is not a motion job."""
         if not self.motion:
             return ()
         return tuple(each for each in (self.drive, self.partner) if each is not None)
 
     @property
     def title(self) -> str:
-        """What it is, in English."""
+        """Title of the job, in English."""
         return self.title_text.words()
 
     def cancel(self, why: Text) -> None:
-        """Cancel the work, which then runs its cleanup; ``why`` is kept where it is the first."""
+        """Cancel the work, which then runs its cleanup; only the first ``why`` is kept."""
         if self.task is None or not _runs(self):
             return
         if self.cancel_cause is None:
@@ -93,7 +93,7 @@ class Job:
         self.task.cancel()
 
     async def wait(self) -> None:
-        """Until the job has ended, however it ended."""
+        """Wait until the job has ended, with any outcome."""
         if self.task is not None:
             await asyncio.wait([self.task])
 
@@ -104,12 +104,12 @@ Work = Callable[[Progress], Awaitable[JobResult | None]]
 class JobRunner:
     """Starts jobs and keeps the last hundred that ended.
 
-    ``permit`` is called with the drive's id when a motion job begins; it may refuse by raising.
-    ``granted`` gives what a job holds for its length: its permission to move its axis.
+    ``permit`` is called with a drive's id when a motion job begins, and may refuse by raising.
+    ``granted`` returns the context that a job holds while it runs: its grant to move the axis.
     """
 
     KEEP = 100
-    #: Jobs at once that move nothing: of one kind for one drive (or for none), and all together.
+    #: Limits of jobs without motion: of one kind for one drive (or for none), and in total.
     MOST_OF_A_KIND, MOST = 4, 32
 
     def __init__(
@@ -128,7 +128,7 @@ class JobRunner:
         self._last_reported: dict[str, float] = {}
 
     def all(self) -> list[Job]:
-        """Jobs, oldest first."""
+        """All jobs, oldest first."""
         return list(self._jobs.values())
 
     def get(self, job_id: str) -> Job | None:
@@ -140,10 +140,10 @@ class JobRunner:
         return next((j for j in self._jobs.values() if drive in j.moved and _runs(j)), None)
 
     def _require_room(self, kind: str, drive: str | None) -> None:
-        """Jobs that nothing else bounds do not take the computer from STOP and from what moves.
+        """Check the number of running jobs, so that they leave processor time for STOP and motion.
 
         Raises:
-            Busy: too many run.
+            Busy: too many jobs run.
         """
         running = [job for job in self._jobs.values() if _runs(job) and not job.motion]
         same = sum(job.kind == kind and job.drive == drive for job in running)
@@ -165,14 +165,14 @@ class JobRunner:
         stoppable: bool = True,
         by_person: bool = True,
     ) -> Job:
-        """Start work.
+        """Start a job.
 
-        Motion that is not begun ``by_person`` does not ask ``permit``: it takes back no STOP, so
-        it must leave the axis where it is.
+        A motion job that is not begun ``by_person`` skips ``permit``: it does not cancel an earlier
+        STOP, so it must leave the axis where it is.
 
         Raises:
-            Busy: a motion job already holds this axis, its bus is being changed, or as many jobs
-                run as may.
+            Busy: a motion job already holds this axis, its bus is being
+            changed, or too many jobs run.
         """
         moved = [each for each in (drive, partner) if motion and each is not None]
         for each in moved:
@@ -202,13 +202,13 @@ class JobRunner:
         return job
 
     async def cancel(self, job: Job, why: Text = _BY_COMMAND) -> None:
-        """Cancel because of ``why``, and wait for the job's cleanup."""
+        """Cancel a job because of ``why``, and wait for its cleanup."""
         if job.task is not None and _runs(job):
             job.cancel(why)
             await job.wait()
 
     async def close(self) -> None:
-        """Cancel everything and wait for the cleanups."""
+        """Cancel all jobs and wait for their cleanups."""
         await asyncio.gather(*(self.cancel(job, _SERVER_ENDS) for job in self.all()))
 
     async def _run(self, job: Job, work: Work) -> None:
@@ -222,20 +222,20 @@ class JobRunner:
         except DriveError as error:
             job.state, job.error = "failed", error
         except Exception as error:
-            # Shown to the user as an internal error; a job must never vanish without a word.
+            # Shown to the user as an internal error; a job must never disappear without a message.
             job.state, job.error = "failed", error
         finally:
             job.ended = time.time()
             self._changed(job)
 
     def _settle(self, job: Job) -> None:
-        """A task that was cancelled before its first step never came into `_run`."""
+        """End a job whose task was cancelled before its first step, and so never entered `_run`."""
         if _runs(job):
             job.state, job.ended = "cancelled", time.time()
             self._changed(job)
 
     def _notify(self, job: Job) -> None:
-        """Progress at 10 Hz at most; the end is always shown by `_run`."""
+        """Report progress at 10 Hz at most; `_run` always reports the end."""
         now = time.monotonic()
         if now - self._last_reported.get(job.id, 0.0) >= 0.1:
             self._last_reported[job.id] = now

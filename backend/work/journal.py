@@ -1,4 +1,4 @@
-"""The tool's own log: what happened when, to which drive, by whom. Bounded in memory."""
+"""The station's log: what happened when, to which drive, by whom. Bounded in memory."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Level = Literal["info", "warning", "error"]
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One line; ``time`` in epoch seconds, ``message`` is what happened, as code and facts."""
+    """One line of the log: ``time`` in epoch seconds, ``message`` the event as code and facts."""
 
     time: float
     level: Level
@@ -26,12 +26,12 @@ class Entry:
 
     @property
     def text(self) -> str:
-        """What happened, in English."""
+        """The event, in English."""
         return self.message.words()
 
 
 class Journal:
-    """The last two thousand entries, and whoever wants to hear of new ones."""
+    """The last two thousand entries, and listeners for new ones."""
 
     KEEP = 2000
 
@@ -51,12 +51,12 @@ class Journal:
         drive: str | None = None,
         person: str = "",
     ) -> None:
-        """Write an entry with the present time; without ``person`` it is of whoever acts."""
+        """Add an entry with the current time; ``person`` defaults to the person who acts now."""
         entry = Entry(time.time(), level, drive, person or acting_person(), line)
         self._entries.append(entry)
         for listener in self._listeners:
             listener(entry)
 
     def entries(self, drive: str | None = None) -> list[Entry]:
-        """Entries, newest first; only those of ``drive`` where given."""
+        """Entries, newest first; only those of ``drive`` if given."""
         return [e for e in reversed(self._entries) if drive is None or e.drive == drive]

@@ -1,1 +1,1 @@
-"""How many may be there at once, so that nobody's crowd keeps STOP or another person out."""
+"""Limits on connections and requests, so that a crowd cannot shut out STOP or a person."""

@@ -1,8 +1,8 @@
-"""Connections that were accepted and have said nothing yet: bounded, the oldest go first.
+"""Limit on accepted connections that have sent nothing yet: the oldest are closed first.
 
-Until a TLS handshake is done the server's protocol has no data of a connection, and each takes a
-file descriptor; with none left nobody is accepted any more, STOP included. So the listening
-socket itself counts them.
+Until a TLS handshake is complete the server's protocol has no data of a connection, yet each one
+occupies a file descriptor; without free descriptors no connection is accepted any more, not even
+for STOP. The listening socket itself therefore counts them.
 """
 
 from __future__ import annotations
@@ -12,14 +12,15 @@ import contextlib
 import socket
 from collections import OrderedDict
 
-#: Without a handshake at a time. One takes some milliseconds.
+#: Connections without a completed handshake at a time. A handshake takes some milliseconds.
 MOST_SILENT = 128
-#: Accepted in one turn of the event loop, which does all that is ready before it looks again.
+#: Connections accepted in one turn of the event loop, which carries out all that is
+#: ready before it polls again.
 PER_TURN = 64
 
 
 class AcceptingSocket(socket.socket):
-    """A listening socket that lets go of the oldest silent connection for a new one."""
+    """Listening socket that closes the oldest silent connection to make room for a new one."""
 
     def __init__(self, family: int, kind: int, protocol: int) -> None:
         super().__init__(family, kind, protocol)
@@ -27,10 +28,11 @@ class AcceptingSocket(socket.socket):
         self._left = PER_TURN
 
     def accept(self) -> tuple[socket.socket, object]:
-        """As usual; a connection is silent until `begun`.
+        """Accept as usual; the connection counts as silent until `begun`.
 
         Raises:
-            BlockingIOError: nobody is there, or enough came in this turn of the loop.
+            BlockingIOError: no connection is waiting, or enough were accepted
+            in this turn of the loop.
         """
         if self._left <= 0:
             raise BlockingIOError
@@ -42,7 +44,8 @@ class AcceptingSocket(socket.socket):
         self._silent[line.fileno()] = line
         while len(self._silent) > MOST_SILENT:
             _, oldest = self._silent.popitem(last=False)
-            # Its transport sees the end and closes it; one that is closed already has no number.
+            # Its transport sees the end and closes it; a socket that is closed
+            # already has no descriptor.
             if oldest.fileno() >= 0:
                 with contextlib.suppress(OSError):
                     oldest.shutdown(socket.SHUT_RDWR)
@@ -52,5 +55,5 @@ class AcceptingSocket(socket.socket):
         self._left = PER_TURN
 
     def begun(self, descriptor: int) -> None:
-        """The protocol has the connection of this descriptor now."""
+        """Record that the protocol has taken over the connection with this descriptor."""
         self._silent.pop(descriptor, None)

@@ -1,6 +1,6 @@
-"""How many requests begin and run at once, and how often somebody unknown may ask.
+"""Limits on requests that begin and run at once, and on the request rate of unknown clients.
 
-STOP is neither counted nor kept waiting.
+STOP is neither counted nor delayed.
 """
 
 from __future__ import annotations
@@ -14,23 +14,25 @@ from backend.people.errors import TooOften
 from backend.people.login.budgets import address_group
 from backend.people.throttle import Bucket
 
-#: Requests under way at once: all but STOP, those of nobody known, and of these from one address.
+#: Requests in progress at once: all but STOP, those of unknown clients, and
+#: of these from one address.
 MOST_REQUESTS, MOST_OF_STRANGERS, MOST_OF_PLACE = 400, 200, 40
-#: More requests of nobody known, only for addresses from which none is under way: a few addresses
-#: that keep theirs under way do not shut out all others.
+#: Additional requests of unknown clients, only for addresses without a request in progress: a few
+#: addresses with long requests then do not shut out all others.
 MOST_FIRST_OF_PLACES = 100
 #: Requests that begin in one turn of the event loop; a turn with nothing else to do is short.
 PER_TURN = 1
-#: Requests of nobody known from one address: so many at once, and a second.
+#: Rate of requests of unknown clients from one address: burst, and requests per second.
 _STRANGERS = (200.0, 50.0)
 _KEEP = 4096
 
 
 class Beginnings:
-    """So many requests begin in one turn of the event loop; the others wait for the next ones.
+    """Lets a limited number of requests begin per turn of the event loop; the others wait in order.
 
-    A turn does all that is ready. With hundreds of requests in one, STOP, which is read in the
-    turn after, would wait for all of them; so their work is spread, and STOP goes past it.
+    A turn carries out all that is ready. With hundreds of requests in one turn, STOP, which is
+    read in the next turn, would wait for all of them; so their work is spread over turns, and
+    STOP bypasses the queue.
     """
 
     def __init__(self) -> None:
@@ -39,7 +41,7 @@ class Beginnings:
         self._turning = False
 
     def begin(self, work: Callable[[], None]) -> None:
-        """Do this now, or in one of the next turns; what came before goes first."""
+        """Run ``work`` now or in one of the next turns, in the order of the calls."""
         self._keep_turning()
         if self._left > 0 and not self._waiting:
             self._left -= 1
@@ -48,7 +50,7 @@ class Beginnings:
             self._waiting.append(work)
 
     async def turn(self) -> None:
-        """Return when this request may begin."""
+        """Wait until this request may begin."""
         mine: asyncio.Future[None] = asyncio.get_running_loop().create_future()
 
         def called() -> None:
@@ -74,7 +76,7 @@ class Beginnings:
 
 
 class Admission:
-    """Of one server. ``place`` is an address; a browser that is known counts as nobody's crowd."""
+    """Limits of one server. ``place`` is an address; known browsers are not counted by address."""
 
     def __init__(self) -> None:
         self.beginnings = Beginnings()
@@ -83,10 +85,10 @@ class Admission:
         self._buckets: OrderedDict[str, Bucket] = OrderedDict()
 
     def require_rate(self, address: str) -> None:
-        """Somebody unknown from this address may ask now.
+        """Check the request rate of an unknown client at this address.
 
         Raises:
-            TooOften: they have asked too often.
+            TooOften: there were too many requests.
         """
         place = address_group(address)
         bucket = self._buckets.pop(place, None) or Bucket(*_STRANGERS)
@@ -101,7 +103,7 @@ class Admission:
         """Count a request while it runs.
 
         Raises:
-            TooOften: too many run.
+            TooOften: too many requests run.
         """
         if stop:
             yield

@@ -1,1 +1,1 @@
-"""Search, export and check of the audit; the record of every change."""
+"""Search, export and check of the audit, and recording of changes made through the interface."""

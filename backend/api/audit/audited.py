@@ -1,8 +1,8 @@
-"""Changes through the interface and the audit: none forgotten, none reported before it is safe.
+"""Recording of HTTP changes in the audit: complete, and stored before the change is confirmed.
 
-What changes a drive's parameters, control, people or the library is reported where it happens, with
-values. Every other change is recorded here, so that no new route can forget it: what it asked for,
-and what was there before where the route says so (`backend.audit.asked.note_before`).
+Changes of drive parameters, control, people and the library are recorded where they happen, with
+values. Every other change is recorded here, so that no new route can omit it: the requested values,
+and the earlier ones where the route provides them (`backend.audit.asked.note_before`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from backend.audit.facts import Action, Kind
 from backend.people.rights import Right
 from backend.tools.registry import TOOLS
 
-#: Longest that an answer waits. The change itself never does.
+#: Longest time [s] that an answer waits for the audit. The change itself never waits.
 WAIT_S = 1.0
 _ACTIONS: dict[str, Action] = {
     "POST": "made",
@@ -28,8 +28,8 @@ _ACTIONS: dict[str, Action] = {
     "DELETE": "deleted",
 }
 _DRIVE = "/drives/{drive_id}"
-#: Routes whose changes are recorded where they happen: value by value, as jobs, or as what people
-#: do. `tests/security/test_every_change_is_reported.py` asks each of them.
+#: Routes whose changes are recorded where they happen: as single values, as jobs, or as actions of
+#: people. `tests/security/test_every_change_is_reported.py` checks each of them.
 REPORTED_THERE = frozenset(
     f"{method} {API}{path}"
     for method, paths in {
@@ -62,8 +62,8 @@ REPORTED_THERE = frozenset(
     }.items()
     for path in paths
 )  # fmt: skip
-#: Routes that compute or read, and change nothing that stays. (Some records of faults are read
-#: through a selector, which is written and restored; each such write is reported as a write.)
+#: Routes that compute or read, and change nothing permanently. (Some fault records are read through
+#: a selector, which is written and restored; each such write is recorded as a write.)
 CHANGES_NOTHING = frozenset(
     f"POST {API}{path}"
     for path in (
@@ -77,9 +77,9 @@ _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
 class AuditedAnswers:
-    """Wraps the application. STOP's answer waits for nothing.
+    """Middleware that records changes. The answer to STOP waits for nothing.
 
-    ``name_of`` gives an axis's name for its id.
+    ``name_of`` returns the name of an axis for its id.
     """
 
     def __init__(
@@ -92,13 +92,14 @@ class AuditedAnswers:
         self._policy = Policy()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """One request."""
+        """Handle one request."""
         changes = scope["type"] == "http" and scope["method"] not in _READING
         if not changes or scope["path"] == self._stop_path:
             await self._app(scope, receive, send)
             return
         matched = next(iter(self._policy.needs(scope["method"], scope["path"])), None)
-        # The name may be gone when the answer comes: a drive that was removed from the axis list.
+        # Looked up now: the name is gone after the request if it removes the
+        # drive from the axis list.
         axis = self._name_of(matched.drive) if matched and matched.drive else ""
         body = _Body(receive)
         query = dict(parse_qsl(scope["query_string"].decode("latin-1")))
@@ -108,7 +109,7 @@ class AuditedAnswers:
             if message["type"] == "http.response.start":
                 if matched is not None and message["status"] < 400:
                     self._notify(matched, scope, axis, said)
-                # While the audit has a problem everybody is informed of it; waiting would not help.
+                # While the audit has a problem, every page shows it; waiting would not help.
                 if not self._audit.problem:
                     await self._audit.settled(WAIT_S)
             await send(message)
@@ -120,7 +121,7 @@ class AuditedAnswers:
             asked.reset(token)
 
     def _notify(self, matched: Matched, scope: Scope, axis: str, said: Asked) -> None:
-        """Record a change that nobody else shows."""
+        """Record a change that is recorded nowhere else."""
         if matched.route in REPORTED_THERE or matched.route in CHANGES_NOTHING:
             return
         path: str = scope["path"]
@@ -140,14 +141,14 @@ class AuditedAnswers:
 
 
 class _Body:
-    """The receiving side of a request, of which the start is kept in case it is a small JSON."""
+    """Receiving side of a request; keeps the start of the body, which may be small JSON."""
 
     def __init__(self, receive: Receive) -> None:
         self._receive = receive
         self.start = b""
 
     async def receive(self) -> Message:
-        """The next message for the application."""
+        """Return the next message for the application."""
         message = await self._receive()
         if message["type"] == "http.request" and len(self.start) <= MOST_BYTES:
             self.start += message.get("body", b"")[: MOST_BYTES + 1]

@@ -38,14 +38,14 @@ class AuditEvent(Message):
 
 
 class AuditPage(Message):
-    """Entries, newest first. ``next`` is what to give as ``before`` for the ones after them."""
+    """Entries, newest first. ``next`` is the value of ``before`` for the following page."""
 
     events: list[AuditEvent]
     next: int | None
 
 
 class AuditNames(Message):
-    """What can be chosen in a filter."""
+    """Values that can be chosen in a filter."""
 
     persons: list[str]
     axes: list[str]

@@ -77,7 +77,7 @@ async def search_audit(
     before: Annotated[int | None, Query(ge=1, lt=1 << 63)] = None,
     limit: Annotated[int, Query(ge=1, le=500)] = 100,
 ) -> AuditPage:
-    """Entries, newest first."""
+    """List entries, newest first."""
     wanted = _filter(kind, person, axis, station, words, since, until)
     records = bench.records
     found = await records.store.call(records.trail.search, wanted, before=before, limit=limit)
@@ -87,7 +87,7 @@ async def search_audit(
 
 @router.get("/names")
 async def audit_names(bench: TheBench) -> AuditNames:
-    """What can be chosen in a filter."""
+    """List the values that can be chosen in a filter."""
     found = await bench.records.store.call(bench.records.trail.names)
     return AuditNames(
         persons=found["person"], axes=found["axis"], stations=found["station"], kinds=list(KINDS)
@@ -97,7 +97,7 @@ async def audit_names(bench: TheBench) -> AuditNames:
 @router.get("/status")
 async def audit_status(bench: TheBench) -> AuditStatus:
     """Whether events reach the database."""
-    # What is written into a file that is gone is lost, and no event may have come to report it.
+    # Data written to a file that was removed are lost, perhaps before any event could report it.
     problem = bench.audit.problem or bench.records.store.missing()
     return AuditStatus(
         problem=words_of(problem),
@@ -140,7 +140,7 @@ async def export_audit(
     since: datetime | None = None,
     until: datetime | None = None,
 ) -> StreamingResponse:
-    """Entries as a table, or as JSON lines with hashes, oldest first."""
+    """Export entries as a table, or as JSON lines with hashes, oldest first."""
     wanted = _filter(kind, person, axis, station, words, since, until)
     if wanted.since and wanted.until and wanted.since >= wanted.until:
         raise OutOfRange("api-audit.since-must-before-until")
@@ -148,7 +148,7 @@ async def export_audit(
     store = bench.records.store
 
     def some() -> str:
-        """Several lines at once: each trip to a thread has its price."""
+        """Several lines at once: each call on another thread costs time."""
         part = []
         for line in lines:
             part.append(line)
@@ -156,7 +156,7 @@ async def export_audit(
                 break
         return "".join(part)
 
-    first = await store.call(some)  # an error of the database is still an answer of its own
+    first = await store.call(some)  # an error of the database can still be answered as an error
 
     async def body() -> AsyncIterator[str]:
         part = first

@@ -1,4 +1,4 @@
-"""Motion requests to the settings of the tools: the only place where travel units are converted."""
+"""Conversion of motion requests to tool settings: the only place that converts travel units."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from backend.tools.jog.run import JogSettings
 from backend.tools.moves.homing import HomingSettings
 from backend.tools.moves.move import MoveSettings, SequenceSettings
 
-#: Speed limit of an envelope whose request names no speed: margin over the drive's own limits.
+#: Speed limit [rpm] of an envelope without a requested speed, above the drive's own limits.
 _SPEED_UNLIMITED_RPM = 20_000.0
 _SEQUENCE_MOVE_S = 60.0
 
@@ -28,7 +28,8 @@ async def unit_of(bench: Bench, connected: ConnectedDrive, name: str) -> TravelU
     """The travel unit that a request names.
 
     Raises:
-        NotAllowed: this axis has no such unit. DriveError: its gearing cannot be read.
+        NotAllowed: this axis has no such unit.
+        DriveError: its gearing cannot be read.
     """
     if name == REVOLUTIONS.name:
         return REVOLUTIONS
@@ -54,7 +55,7 @@ def _rpm(unit: TravelUnit, speed: float | None) -> float | None:
 
 
 def move_settings(request: MoveRequest, unit: TravelUnit) -> MoveSettings:
-    """One move; a torque target has no travel unit."""
+    """Settings of one move; a torque target has no travel unit."""
     target = {"PP": unit.rev, "PV": unit.rpm}.get(request.mode, float)(request.target)
     speed = _rpm(unit, request.speed)
     greatest = speed or (abs(target) if request.mode == "PV" else None)
@@ -77,7 +78,7 @@ def move_settings(request: MoveRequest, unit: TravelUnit) -> MoveSettings:
 
 
 def sequence_settings(request: SequenceRequest, unit: TravelUnit) -> SequenceSettings:
-    """Back and forth."""
+    """Settings of a reciprocating move between two positions."""
     speed = unit.rpm(request.speed)
     return SequenceSettings(
         first=unit.rev(request.first),
@@ -93,7 +94,7 @@ def sequence_settings(request: SequenceRequest, unit: TravelUnit) -> SequenceSet
 
 
 def generator_settings(request: GenerateRequest, unit: TravelUnit) -> GeneratorSettings:
-    """A test signal; amplitude and slope are in the unit of the mode's quantity."""
+    """Settings of a test signal; amplitude and slope are in the unit of the mode's quantity."""
     convert = {"CSP": unit.rev, "CSV": unit.rpm}.get(request.mode, float)
     return GeneratorSettings(
         mode=request.mode,
@@ -114,7 +115,7 @@ def generator_settings(request: GenerateRequest, unit: TravelUnit) -> GeneratorS
 
 
 def homing_settings(request: HomeRequest, unit: TravelUnit) -> HomingSettings:
-    """A search for home; what is not given stays as the drive has it."""
+    """Settings of homing; values that are not given stay as they are in the drive."""
     switch = _rpm(unit, request.speed_switch)
     return HomingSettings(
         method=request.method,
@@ -133,7 +134,7 @@ def homing_settings(request: HomeRequest, unit: TravelUnit) -> HomingSettings:
 
 
 def jog_settings(request: JogStart, unit: TravelUnit) -> JogSettings:
-    """Hold to run."""
+    """Settings of a jog (hold-to-run)."""
     return JogSettings(
         direction=request.direction,
         speed_rpm=unit.rpm(request.speed),

@@ -1,4 +1,4 @@
-"""What STOP reached, and axes that turn without a reason, as messages of the interface."""
+"""Conversion of STOP verdicts, and of unexpected motion, to messages of the interface."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from drivers.texts.message import text
 
 
 def turning(found: Turning | None) -> models_axis.TurningInfo | None:
-    """An axis that turns although nobody may move it."""
+    """An axis that moves although no motion is permitted."""
     if found is None:
         return None
     return models_axis.TurningInfo(kind=found.kind.value, speed=found.speed, unit=found.unit)
 
 
 def axis_stop(found: AxisStop) -> models_axis.AxisStopInfo:
-    """What STOP reached at one axis."""
+    """Verdict and steps of STOP at one axis."""
     steps = [
         models_axis.StopStepInfo(
             code=step.code.value,
@@ -52,7 +52,7 @@ def axis_stop(found: AxisStop) -> models_axis.AxisStopInfo:
 def stop_result(
     bench: Bench, wanted: Sequence[str], found: Sequence[AxisStop]
 ) -> models_axis.StopResult:
-    """Verdicts of these drives; one without a verdict has not been stopped."""
+    """Verdicts of the drives in ``wanted``; a drive without a verdict counts as not stopped."""
     failed = {
         each.drive: why
         for each in found

@@ -1,4 +1,4 @@
-"""Routes of a family's functions: description, fault history, gear, watch list, braking."""
+"""Routes of the functions of a drive family: fault history, gear, watch list, braking."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ from profiles.functions import FaultHistory, Functions
 
 router = APIRouter()
 _DRIVE = "/drives/{drive_id}"
-#: Speed limit of an envelope that bounds no speed.
+#: Speed limit [rpm] of an envelope that does not limit the speed.
 _ANY_RPM = 20_000.0
 
 
 async def store_of(request: Request) -> AxisStore:
-    """What this bench keeps of its axes."""
+    """The stored records of the axes of this bench."""
     store = request.app.state.axis_store
     if not isinstance(store, AxisStore):
         raise TypeError("the application was made without an axis store")
@@ -60,7 +60,7 @@ TheStore = Annotated[AxisStore, Depends(store_of)]
 
 @router.get(f"{_DRIVE}/functions")
 async def describe_functions(connected: TheDrive) -> Functions:
-    """What the pages need of this family beyond its parameters; nothing is read from the drive."""
+    """Describe the functions of this family beyond its parameters; the drive is not read."""
     return functions_of(connected.drive.profile)
 
 
@@ -69,7 +69,7 @@ async def describe_functions(connected: TheDrive) -> Functions:
 
 @router.get(f"{_DRIVE}/fault-history")
 async def fault_history(connected: TheDrive) -> FaultHistoryInfo:
-    """The drive's own record, read now where that takes no write; else how it is kept."""
+    """Read the drive's fault record, unless that takes a write; then only describe the record."""
     history = history_of(connected.drive)
     if history is None or history.kind != "slots":
         return _history(connected.drive, history, None)
@@ -78,7 +78,7 @@ async def fault_history(connected: TheDrive) -> FaultHistoryInfo:
 
 @router.post(f"{_DRIVE}/fault-history/read")
 async def read_fault_history(bench: TheBench, connected: Controlled) -> FaultHistoryInfo:
-    """The drive's own record, read now; a selector is written and restored where it takes one."""
+    """Read the drive's fault record; a selector is written and restored where needed."""
     entries = await read_history(connected.axis)
     bench.journal.add(
         text("journal.fault-history-read", drive=connected.drive.name), drive=connected.drive.id
@@ -114,7 +114,8 @@ def _past(past: PastFault) -> PastFaultInfo:
         causes=list(fault.causes) if fault else [],
         remedies=list(fault.remedies) if fault else [],
         reset=fault.reset if fault else "",
-        # Frozen in the drive: a later read of the same selector would show another record.
+        # Values frozen in the drive with this fault: a later read through the same selector
+        # would return another record.
         values=[_frozen(reading) for reading in past.values],
         error=words_of(past.problem),
         error_message=message_or_none(past.problem),
@@ -139,9 +140,9 @@ def _frozen(reading: Reading) -> ParameterValue:
 async def start_identification(
     bench: TheBench, connected: Controlled, request: IdentifyRequest
 ) -> JobInfo:
-    """Let the drive identify motor and load by itself; the motor moves."""
+    """Start the drive's own identification of motor and load; the motor moves."""
     identification.require_identification(connected.axis)
-    # The drive chooses the speed: only travel, torque and time are bounded here.
+    # The drive chooses the speed: only travel, torque and time are limited here.
     envelope = Envelope(request.travel_limit, _ANY_RPM, request.torque_limit, request.timeout_s)
     settings = identification.IdentifySettings(envelope, request.confirmed)
     job = bench.jobs.start(
@@ -163,7 +164,7 @@ async def start_identification(
 
 @router.get(f"{_DRIVE}/record")
 async def axis_record(connected: TheDrive, store: TheStore) -> AxisRecordInfo:
-    """Mechanics and watch list of an axis, and what its drive bounds motions to."""
+    """Read mechanics and watch list of an axis, and the gentlest ramp that its drive accepts."""
     return _record(connected, store.get(connected.drive.id))
 
 
@@ -171,7 +172,7 @@ async def axis_record(connected: TheDrive, store: TheStore) -> AxisRecordInfo:
 async def keep_mechanics(
     connected: Controlled, store: TheStore, request: MechanicsUpdate
 ) -> AxisRecordInfo:
-    """Keep the mechanics, so that pages show travel. Nothing is written to the drive."""
+    """Store the mechanics, so that pages show travel. Nothing is written to the drive."""
     if request.mechanics is not None:
         request.mechanics.travel_per_load_turn()
     old = store.get(connected.drive.id)
@@ -184,7 +185,7 @@ async def keep_mechanics(
 async def keep_watch(
     connected: Controlled, store: TheStore, request: WatchUpdate
 ) -> AxisRecordInfo:
-    """Keep the watch list.
+    """Store the watch list.
 
     Raises:
         NotFound: a key is not a parameter of this drive.
@@ -216,7 +217,7 @@ def _record(connected: ConnectedDrive, record: AxisRecord) -> AxisRecordInfo:
 
 @router.post(f"{_DRIVE}/gear/plan")
 async def plan_gear(connected: TheDrive, request: Mechanics) -> GearPlanInfo:
-    """What the gear would be for these mechanics. Nothing is written."""
+    """Calculate the gear for these mechanics. Nothing is written."""
     plan = await gear.plan(connected.axis, request)
     readings = await connected.drive.read_many([value.parameter.key for value in plan.values])
     rpm = await _greatest_rpm(connected)
@@ -251,7 +252,7 @@ async def plan_gear(connected: TheDrive, request: Mechanics) -> GearPlanInfo:
 
 
 def counted(connected: ConnectedDrive, plan: GearPlan) -> list[str]:
-    """Parameters that count in user increments, while the gear really changes."""
+    """Parameters in user increments, whose meaning changes; none if the gear stays the same."""
     now = connected.drive.readings
     same = all(
         (reading := now.get(value.parameter.key)) is not None and reading.raw == value.raw
@@ -261,7 +262,7 @@ def counted(connected: ConnectedDrive, plan: GearPlan) -> list[str]:
 
 
 async def _greatest_rpm(connected: ConnectedDrive) -> float | None:
-    """Greatest motor speed, or the rated one, where the drive reports it in rpm."""
+    """Maximum motor speed, otherwise rated speed, if the drive reports it in rpm; else None."""
     for role in ("max_speed", "rated_speed"):
         parameter = connected.drive.profile.by_role.get(role)
         if parameter is None or parameter.unit != "rpm" or connected.drive.key(role) is None:
@@ -269,7 +270,7 @@ async def _greatest_rpm(connected: ConnectedDrive) -> float | None:
         try:
             value = (await connected.drive.read(parameter.key)).value
         except DriveError:
-            continue  # only a comfort of the calculator
+            continue  # only the speed in the preview is missing then
         if isinstance(value, (int, float)) and value > 0:
             return float(value)
     return None
@@ -279,7 +280,7 @@ async def _greatest_rpm(connected: ConnectedDrive) -> float | None:
 async def write_gear(
     bench: TheBench, connected: Controlled, store: TheStore, request: Mechanics
 ) -> GearWritten:
-    """Write the gear for these mechanics, all or nothing, and keep the mechanics."""
+    """Write the gear for these mechanics, all values or none, and store the mechanics."""
     with bench.motion.keeping_still(connected):
         plan = await gear.plan(connected.axis, request)
         change = await gear.write_gear(connected.axis, plan.values)
@@ -307,7 +308,7 @@ async def write_gear(
 
 @router.post("/calculate/braking")
 async def calculate_braking(request: BrakingRequest) -> BrakingInfo:
-    """Energy of a braked mass and the resistor that takes it."""
+    """Calculate the energy of braking and the braking resistor that absorbs it."""
     built_in = None
     if request.built_in_ohm is not None and request.built_in_w is not None:
         built_in = regeneration.Resistor(request.built_in_ohm, request.built_in_w)

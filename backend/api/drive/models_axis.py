@@ -12,7 +12,7 @@ from backend.tools.wire_message import MessageInfo
 
 
 class ActiveFault(Message):
-    """A fault or warning that is present now."""
+    """A fault or warning that is active now."""
 
     code: str
     name: str
@@ -24,7 +24,7 @@ class ActiveFault(Message):
 
 
 class TurningInfo(Message):
-    """An axis that turns although nobody may move it."""
+    """An axis that moves although no motion is permitted."""
 
     kind: Literal["disabled", "without_grant"] = Field(
         description="without power: by hand or by gravity, or the drive's own jog; or enabled"
@@ -82,7 +82,7 @@ class TransitionRequest(Message):
 
 
 class ProcedureInfo(Message):
-    """A named sequence of the profile."""
+    """A procedure of the profile: a named sequence of steps."""
 
     name: str
     title: str
@@ -103,13 +103,13 @@ class ProcedureRequest(Message):
 
 
 class StopRequest(Message):
-    """STOP; all drives where none is named."""
+    """STOP of one drive; of all drives if none is named."""
 
     drive: str | None = None
 
 
 class StopStepInfo(Message):
-    """One thing that STOP did, or tried in vain."""
+    """One action of STOP, successful or not."""
 
     code: Literal[
         "quick_stop", "halt", "speed_control_taken", "quick_stop_option_set",
@@ -125,7 +125,7 @@ class StopStepInfo(Message):
 
 
 class AxisStopInfo(Message):
-    """What STOP reached at one axis, by its measured motion."""
+    """Verdict of STOP at one axis, from its measured motion."""
 
     drive: str
     verdict: Literal["stopped", "coasting", "still_moving", "unreachable"]
@@ -141,7 +141,7 @@ class AxisStopInfo(Message):
 
 
 class StopResult(Message):
-    """What STOP reached."""
+    """Result of STOP."""
 
     stopped: list[str] = Field(description="drives whose axis is at standstill by what it measures")
     failed: dict[str, str] = Field(

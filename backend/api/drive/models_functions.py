@@ -15,7 +15,7 @@ from backend.tools.wire_message import MessageInfo
 
 
 class PastFaultInfo(Message):
-    """One fault that the drive remembers, with what it froze."""
+    """One fault in the drive's record, with the values frozen with it."""
 
     name: str = Field(description="which record: last fault, record 3 …")
     name_message: MessageInfo | None = Field(
@@ -34,7 +34,7 @@ class PastFaultInfo(Message):
 
 
 class FaultHistoryInfo(Message):
-    """How a drive keeps past faults, and those that were read."""
+    """How a drive keeps past faults, and the ones that were read."""
 
     kind: Literal["slots", "selected", "unreadable", "unknown"]
     size: int
@@ -47,7 +47,7 @@ class FaultHistoryInfo(Message):
 
 
 class TerminalFunction(Message):
-    """A function that a terminal can be given."""
+    """A function that can be assigned to a terminal."""
 
     code: int
     name: str
@@ -55,7 +55,7 @@ class TerminalFunction(Message):
 
 
 class TerminalInfo(Message):
-    """One terminal: what it is at, and what it is for."""
+    """One terminal: its state and its function."""
 
     name: str
     direction: Literal["in", "out"]
@@ -75,7 +75,7 @@ class TerminalInfo(Message):
 
 
 class ForcingInfo(Message):
-    """A way to overrule terminals, and the session that does."""
+    """A way to force terminals, and the session that does."""
 
     name: Literal["outputs", "simulation"]
     title: str
@@ -100,13 +100,13 @@ class IoInfo(Message):
 
 
 class ForcingStart(Message):
-    """Begin a session; the warning was agreed to."""
+    """Begin a forcing session; ``confirmed`` states that the user agreed to the warning."""
 
     confirmed: bool = False
 
 
 class ForcingValues(Message):
-    """Terminals to overrule (null releases). Empty: the page is alive."""
+    """Terminals to force (null releases). An empty request only renews the session."""
 
     values: dict[str, bool | None] = Field(default_factory=dict, max_length=64)
 
@@ -122,7 +122,7 @@ class ProbeRequest(Message):
 
 
 class GearValueInfo(Message):
-    """One parameter of the gear: what it is and what it would be."""
+    """One parameter of the gear: present and planned raw value."""
 
     key: str
     name: str
@@ -131,7 +131,7 @@ class GearValueInfo(Message):
 
 
 class GearPlanInfo(Message):
-    """What would be written, and what follows from it."""
+    """Planned values of the gear, and their consequences."""
 
     unit: str
     values: list[GearValueInfo]
@@ -155,14 +155,14 @@ class GearPlanInfo(Message):
 
 
 class GearWritten(Message):
-    """The gear as written."""
+    """Result of writing the gear."""
 
     before: dict[str, int] = Field(description="raw values that undo it")
     waits: dict[str, str] = Field(description="key to what must happen before it acts")
 
 
 class AxisRecordInfo(Message):
-    """What the bench keeps of an axis, its mechanics and the watch list, and its gentlest ramp."""
+    """Stored mechanics and watch list of an axis, and the gentlest ramp of its drive."""
 
     mechanics: Mechanics | None
     gentlest_ramp_rpm_s: float | None = Field(
@@ -174,19 +174,19 @@ class AxisRecordInfo(Message):
 
 
 class MechanicsUpdate(Message):
-    """Keep the mechanics of an axis; null forgets them."""
+    """Store the mechanics of an axis; null deletes them."""
 
     mechanics: Mechanics | None
 
 
 class WatchUpdate(Message):
-    """The watch list of an axis, in order."""
+    """Watch list of an axis, in order."""
 
     keys: Annotated[list[str], Field(max_length=64)]
 
 
 class BrakingRequest(Message):
-    """What is braked, and with what. SI units; what is unknown is null."""
+    """The braking cycle and the resistors. SI units except rpm; unknown values are null."""
 
     inertia_kgm2: Positive
     speed_rpm: Positive
@@ -204,7 +204,7 @@ class BrakingRequest(Message):
 
 
 class BrakingInfo(Message):
-    """Energies of one stop in J, powers in W, resistances in Ω."""
+    """Result of the braking calculation: energies of one stop [J], powers [W], resistances [Ω]."""
 
     kinetic_j: float
     returned_j: float
@@ -219,7 +219,7 @@ class BrakingInfo(Message):
 
 
 class IdentifyRequest(Message):
-    """Let the drive identify motor and load; travel in the axis' unit from the start point."""
+    """Identification of motor and load by the drive; travel [rev] from the start point."""
 
     confirmed: bool = False
     travel_limit: Positive

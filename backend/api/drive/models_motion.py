@@ -1,4 +1,4 @@
-"""Messages that ask for a motion, and the homing methods that a drive offers."""
+"""Requests for motion, and the homing methods of a drive."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class MoveRequest(Message):
 
 
 class SequenceRequest(Message):
-    """Back and forth between two positions."""
+    """Reciprocating move between two positions."""
 
     first: Finite
     second: Finite
@@ -63,7 +63,7 @@ class GenerateRequest(Message):
 
 
 class HomeRequest(Message):
-    """Homing."""
+    """Homing by one of the drive's methods."""
 
     method: int
     speed_switch: Positive | None = None

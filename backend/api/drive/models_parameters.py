@@ -54,7 +54,7 @@ class ParameterInfo(Message):
 
 
 class ParameterValue(Message):
-    """What the drive said last."""
+    """Last reading of a parameter."""
 
     key: str
     raw: Raw | None
@@ -72,7 +72,7 @@ class ParameterValue(Message):
 
 
 class ParameterRow(ParameterInfo):
-    """Description and value."""
+    """Description and last reading of a parameter."""
 
     reading: ParameterValue
 
@@ -89,7 +89,7 @@ class ParameterWrite(Message):
     @classmethod
     def _no_truth(cls, given: object) -> object:
         if isinstance(given, bool):
-            # Else it would become 1 or 0 of whatever unit the parameter has.
+            # It would otherwise become 1 or 0 in the parameter's unit.
             raise ValueError(  # noqa: TRY004 - pydantic reports these only
                 "true and false are no values of a parameter: give the number"
             )
@@ -97,7 +97,7 @@ class ParameterWrite(Message):
 
 
 class MotionSettingWrite(ParameterWrite):
-    """A new value of a setting that can start a motion, and why it is set."""
+    """A new value of a setting that can start a motion, and the reason for it."""
 
     reason: str = Field(
         default="", max_length=300, description="why it is set; shown in log and audit"
@@ -105,7 +105,7 @@ class MotionSettingWrite(ParameterWrite):
 
 
 class ParameterWrites(Message):
-    """Several new values, written in turn; a failure does not stop the rest."""
+    """Several new values, written one after the other; a failure does not stop the rest."""
 
     values: dict[str, ParameterWrite] = Field(max_length=2000)
 

@@ -1,4 +1,4 @@
-"""Messages about scales: what a raw position, speed or acceleration of an axis means."""
+"""Messages about scales: the meaning of raw position, speed and acceleration of an axis."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ScaleInfo(Message):
 
 
 class SmallMovesInfo(Message):
-    """Small moves by increments since this axis is connected."""
+    """Small moves by increments since this axis was connected."""
 
     moved: int = Field(description="increments of the last one")
     raw_per_inc_s: float | None = Field(
@@ -47,7 +47,7 @@ class ScalesInfo(Message):
 
 
 class ScalesUpdate(Message):
-    """Scales from a data sheet; what is left out stays as it was taught before."""
+    """Scales from a data sheet; values that are left out stay as they were stated before."""
 
     counts_per_rev: float | None = Field(default=None, gt=0, le=1e12)
     raw_per_rpm: float | None = Field(default=None, gt=0, le=1e12)
@@ -55,7 +55,7 @@ class ScalesUpdate(Message):
 
 
 class TurnedUpdate(Message):
-    """How far the shaft turned in the last small move, as a person saw it."""
+    """Rotation of the shaft in the last small move, as observed by a person."""
 
     turned_rev: float = Field(ge=-1e6, le=1e6)
 
@@ -69,7 +69,7 @@ class SmallMoveRequest(Message):
 
 
 class SmallMoveResult(Message):
-    """What a small move showed."""
+    """Result of a small move."""
 
     kind: Literal["small_move"] = "small_move"
     moved_increments: int

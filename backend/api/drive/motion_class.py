@@ -1,4 +1,4 @@
-"""Routes for the motion classes of objects: why one has its class, and who may give it another."""
+"""Routes of the motion classes of objects: origin of a class, and changing it."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _answer(profile: str, key: str) -> MotionClass:
 
 @router.get(_PATH)
 async def motion_class(profile: ProfileName, key: Key) -> MotionClass:
-    """Whether writing an object can cause motion, who says so and why."""
+    """Read whether writing an object can cause motion, with origin and reason of that class."""
     return await asyncio.to_thread(_answer, profile, key)
 
 
@@ -72,12 +72,13 @@ async def set_motion_class(
     key: Key,
     request: MotionClassRequest,
 ) -> MotionClass:
-    """Say what writing an object of an imported profile does, on one's own responsibility.
+    """Set the motion class of an object of an imported profile, on one's own responsibility.
 
-    Another class than ``energises`` takes the right to move as well.
+    A class other than ``energises`` also requires the right to move.
     """
     if request.motion != "energises":
-        # It opens the parameter table to the object: only who may move an axis may say so.
+        # It makes the object writable in the parameter table, so it requires
+        # the right to move an axis.
         require_right(people, me, Right.MOTION, None)
     await asyncio.to_thread(_note, profile, key)
     try:
@@ -96,7 +97,7 @@ async def set_motion_class(
 
 @router.delete(_PATH)
 async def forget_motion_class(bench: TheBench, profile: ProfileName, key: Key) -> MotionClass:
-    """Take a class back that a person gave: the object counts as energising again."""
+    """Remove a class that a person set: the object counts as energising again."""
     await asyncio.to_thread(_note, profile, key)
     try:
         parameter = await asyncio.to_thread(forget, profile, key)
@@ -120,7 +121,7 @@ def _refused(key: str, error: CannotClassify) -> NotAllowed:
 
 
 async def _changed(bench: Bench, profile: str, parameter: Parameter) -> MotionClass:
-    """Drives on the bench have the new class at once."""
+    """Apply the new class to the drives on the bench at once."""
     known = await asyncio.to_thread(load_profile, profile)
     for connected in bench.connected_drives.values():
         if connected.drive.profile.drive == profile:

@@ -1,4 +1,4 @@
-"""What a motion changed for its own length and could not restore: restore it, or leave it."""
+"""Routes of the restore list: values that a motion borrowed and could not restore."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ router = APIRouter(prefix="/drives/{drive_id}")
 async def put_back(bench: TheBench, people: ThePeople, me: Me, connected: Controlled) -> JobInfo:
     """Restore every pending value of the drive, while its axis is at standstill.
 
-    Where one of them can put energy into the motor (a mode, the function of a terminal), the right
-    to move is needed, too.
+    If one of them can energise the motor (a mode, the function of a terminal), the right
+    to move is also required.
     """
     drive = connected.drive
     if not drive.pending_restores:
@@ -35,7 +35,7 @@ async def put_back(bench: TheBench, people: ThePeople, me: Me, connected: Contro
 
 @router.delete("/pending-restores")
 async def keep_as_it_is(bench: TheBench, connected: Controlled) -> DriveSummary:
-    """The values shall stay as they are now; nothing is written."""
+    """Leave the values as they are and clear the restore list; nothing is written."""
     entries = connected.drive.pending_restores.entries
     connected.drive.pending_restores.settle([entry.key for entry in entries])
     for entry in entries:

@@ -57,13 +57,13 @@ router = APIRouter(prefix="/drives/{drive_id}")
 
 @router.get("/state")
 async def state(bench: TheBench, connected: TheDrive) -> AxisState:
-    """State of the axis, read now."""
+    """Read the state of the axis now."""
     return convert.axis_state(bench, connected, await connected.monitor.refresh())
 
 
 @router.get("/faults")
 async def faults(connected: TheDrive) -> list[ActiveFault]:
-    """Faults and warnings that are present, read now."""
+    """Read the faults and warnings that are active now."""
     return [convert.fault(fault) for fault in await connected.axis.active_faults()]
 
 
@@ -71,7 +71,7 @@ async def faults(connected: TheDrive) -> list[ActiveFault]:
 async def transition(
     bench: TheBench, connected: Controlled, request: TransitionRequest
 ) -> AxisState:
-    """Drive the power state machine. Enabling aims the setpoint at where the axis is."""
+    """Drive the power state machine. Enabling sets the setpoint to the actual position first."""
     goal = State(request.goal)
     mode = None if request.mode is None else _mode(connected, request.mode)
     await _alone(bench, connected, goal.value, lambda: connected.axis.transition(goal, mode))
@@ -85,12 +85,12 @@ async def transition(
 async def _alone(
     bench: Bench, connected: ConnectedDrive, title: str, work: Callable[[], Awaitable[object]]
 ) -> None:
-    """Change the power state as a motion job: no other motion begins meanwhile, STOP ends it.
+    """Change the power state as a motion job: no other motion can begin, and STOP cancels it.
 
     Raises:
         Busy: the axis is moved by a job.
         NotAllowed: STOP was pressed.
-        DriveError: what the work says.
+        DriveError: the work failed.
     """
 
     async def run(_progress: Progress) -> JobResult | None:
@@ -146,7 +146,7 @@ async def fault_reset(bench: TheBench, connected: Controlled) -> AxisState:
 
 @router.get("/parameters")
 async def list_parameters(connected: TheDrive) -> list[ParameterRow]:
-    """All parameters with their last readings; nothing is read from the drive."""
+    """List all parameters with their last readings; nothing is read from the drive."""
     drive = connected.drive
     last = convert.readings(drive, [p.key for p in drive.profile.parameters])
     return [
@@ -159,7 +159,7 @@ async def list_parameters(connected: TheDrive) -> list[ParameterRow]:
 async def write_parameters(
     bench: TheBench, connected: Controlled, request: ParameterWrites
 ) -> list[WriteResult]:
-    """Write several, one after the other; a failure does not stop the rest."""
+    """Write several parameters, one after the other; a failure does not stop the rest."""
     results: list[WriteResult] = []
     for key, value in request.values.items():
         try:
@@ -192,7 +192,7 @@ async def write_parameter(
 
 
 def _choose(known: Iterable[str]) -> str:
-    """The remedy for a name that is none."""
+    """Remedy for an unknown name: the names that exist."""
     there = ", ".join(known)
     return f"choose one of: {there}" if there else "this drive has none: use another way"
 
@@ -214,7 +214,7 @@ async def _write(
     old = drive.readings.get(parameter.key)
     value, raw = (request.value, False) if request.raw is None else (request.raw, True)
     matters = drive.matters_to_motion(parameter.key) or held_still(parameter)
-    # What energises is refused whatever moves; the rest waits until nothing does.
+    # Objects that energise are refused in any case (by `write`), the others while something moves.
     still = matters and motion_of(parameter) != "energises"
     with bench.motion.keeping_still(connected) if still else contextlib.nullcontext():
         if still and drive.commands_motion(parameter.key):
@@ -242,9 +242,9 @@ async def write_motion_setting(
 ) -> ParameterValue:
     """Write a setting that can start a motion at once; only while the motor has no power.
 
-    Functions of terminals, control sources and the mapping of process data. The shaft is watched:
-    where it begins to turn, the setting is restored and the axis is stopped. The grant is for this
-    one write and ends with it; ``reason`` is in log and audit.
+    These are functions of terminals, control sources and the mapping of process data. The shaft is
+    watched: if it begins to turn, the setting is restored and the axis is stopped. The grant is for
+    this one write and ends with it; ``reason`` is in log and audit.
     """
     _require_known(connected, key)
     drive = connected.drive
@@ -272,7 +272,7 @@ async def write_motion_setting(
 
 
 def _raw_of(drive: Drive, parameter: Parameter, request: ParameterWrite) -> Raw:
-    """The raw value that is asked for, in whichever of the two ways."""
+    """Raw value of a request, which contains either a raw or a converted value."""
     if (request.raw is None) == (request.value is None):
         raise OutOfRange(
             "api-drive.give-either-raw-value", drive=drive.name, parameter=parameter.key
@@ -289,7 +289,7 @@ def _raw_of(drive: Drive, parameter: Parameter, request: ParameterWrite) -> Raw:
 
 
 async def _require_disabled(connected: ConnectedDrive, key: str) -> None:
-    """A setpoint, mode or control word of an enabled axis would move it with no envelope.
+    """Check that the axis is not enabled: a write would move it without an envelope.
 
     Raises:
         NotAllowed: the axis is enabled.
@@ -305,7 +305,7 @@ async def _require_disabled(connected: ConnectedDrive, key: str) -> None:
 
 @router.get("/procedures")
 async def list_procedures(connected: TheDrive) -> list[ProcedureInfo]:
-    """Named sequences of this family."""
+    """List the procedures of this family."""
     return [convert.procedure(known) for known in connected.drive.profile.procedures]
 
 
@@ -313,7 +313,7 @@ async def list_procedures(connected: TheDrive) -> list[ProcedureInfo]:
 async def run_procedure(
     bench: TheBench, connected: Controlled, name: str, request: ProcedureRequest
 ) -> JobInfo:
-    """Carry out a procedure."""
+    """Run a procedure."""
     known = connected.drive.profile.procedure(name)
     if known is None:
         raise NotFound(
@@ -338,7 +338,7 @@ async def run_procedure(
 
 @router.post("/jobs/read_all", status_code=202)
 async def read_all(bench: TheBench, connected: TheDrive, request: ReadAllRequest) -> JobInfo:
-    """Read parameters; values go out over the websocket as they arrive."""
+    """Read parameters; the values are sent over the websocket as they arrive."""
     for key in request.keys or []:
         _require_known(connected, key)
     job = bench.jobs.start(
@@ -367,7 +367,7 @@ async def load_set(bench: TheBench, connected: Controlled, request: LoadSetReque
             accept_motor_individual=request.accept_motor_individual,
         ),
         drive=connected.drive.id,
-        # Nothing may move while its settings change; and a set is not left half written.
+        # Nothing may move while its settings change, and a set must not be left half written.
         motion=True,
         stoppable=False,
     )
@@ -385,7 +385,7 @@ async def load_set(bench: TheBench, connected: Controlled, request: LoadSetReque
 
 @router.post("/jobs/move", status_code=202)
 async def start_move(bench: TheBench, connected: Controlled, request: MoveRequest) -> JobInfo:
-    """One move in a profile mode."""
+    """Start one move in a profile mode."""
     unit = await convert_motion.unit_of(bench, connected, request.unit)
     settings = convert_motion.move_settings(request, unit)
     job = bench.jobs.start(
@@ -402,7 +402,7 @@ async def start_move(bench: TheBench, connected: Controlled, request: MoveReques
 async def start_sequence(
     bench: TheBench, connected: Controlled, request: SequenceRequest
 ) -> JobInfo:
-    """Back and forth between two positions."""
+    """Start a reciprocating move between two positions."""
     unit = await convert_motion.unit_of(bench, connected, request.unit)
     settings = convert_motion.sequence_settings(request, unit)
     job = bench.jobs.start(
@@ -419,7 +419,7 @@ async def start_sequence(
 async def start_generator(
     bench: TheBench, connected: Controlled, request: GenerateRequest
 ) -> JobInfo:
-    """Play a test signal in a cyclic mode, one value per cycle."""
+    """Output a test signal in a cyclic mode, one value per cycle."""
     session = connected.axis.session
     if session is None or not session.running:
         raise NotAllowed("api-drive.cyclic-exchange-not-run", drive=connected.drive.name)
@@ -442,7 +442,7 @@ async def start_generator(
 
 @router.get("/homing-methods")
 async def homing_methods(connected: TheDrive) -> list[HomingMethodInfo]:
-    """Homing methods of this family."""
+    """List the homing methods of this family."""
     return [
         HomingMethodInfo(**known.model_dump(exclude={"parameters"}))
         for known in connected.drive.profile.homing_methods

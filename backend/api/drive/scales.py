@@ -1,4 +1,4 @@
-"""Routes of the scales of one axis: what they are, where from, and how a person teaches them."""
+"""Routes of the scales of one axis: values, origin, and scales stated by a person."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ _UNITS = {"position": "rev", "velocity": "rpm", "acceleration": "rpm/s"}
 
 @router.get("/scales")
 async def read_scales(connected: TheDrive) -> ScalesInfo:
-    """The scales, read from the drive now."""
+    """Read the scales from the drive now."""
     connected.axis.forget_scales()
     return _info(connected, await connected.axis.units())
 
 
 @router.put("/scales")
 async def state_scales(bench: TheBench, connected: Controlled, request: ScalesUpdate) -> ScalesInfo:
-    """Scales from a data sheet, stated by a person. Nothing is written to the drive."""
+    """Store scales from a data sheet, as stated by a person. Nothing is written to the drive."""
     taught = await teaching.stated(
         connected.axis, request.counts_per_rev, request.raw_per_rpm, request.raw_per_rpm_s
     )
@@ -67,7 +67,10 @@ async def state_scales(bench: TheBench, connected: Controlled, request: ScalesUp
 async def confirm_scales(
     bench: TheBench, connected: Controlled, request: TurnedUpdate
 ) -> ScalesInfo:
-    """How far the shaft turned in the last small move: the resolution, and the unit of 606Ch."""
+    """State how far the shaft turned in the last small move.
+
+    The resolution and the unit of 606Ch follow from it.
+    """
     return await _keep(
         bench, connected, await teaching.confirmed(connected.axis, request.turned_rev)
     )
@@ -75,7 +78,7 @@ async def confirm_scales(
 
 @router.delete("/scales")
 async def forget_taught(bench: TheBench, connected: Controlled) -> ScalesInfo:
-    """Forget what a person has said; the drive, its file and its manual count again."""
+    """Delete scales stated by a person; those of the drive, its file and its manual apply again."""
     return await _keep(bench, connected, None)
 
 
@@ -83,7 +86,7 @@ async def forget_taught(bench: TheBench, connected: Controlled) -> ScalesInfo:
 async def start_small_move(
     bench: TheBench, connected: Controlled, request: SmallMoveRequest
 ) -> JobInfo:
-    """Move by some increments, slowly and with little torque, to see how far the shaft turns."""
+    """Move by some increments, slowly and with low torque, to observe how far the shaft turns."""
     exchange = await exchange_for(bench, connected, request.cycle_ms / 1e3)
     session = exchange.session
     settings = SmallMoveSettings(request.increments, request.torque_limit)

@@ -1,4 +1,4 @@
-"""Routes of the terminals: state, overruling, touch probes."""
+"""Routes of the terminals: state, forcing, touch probes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Kind = Literal["outputs", "simulation"]
 
 
 async def sessions_of(request: Request) -> ForcingSessions:
-    """The sessions that overrule terminals on this bench."""
+    """The sessions that force terminals on this bench."""
     sessions = request.app.state.forcing
     if not isinstance(sessions, ForcingSessions):
         raise TypeError("the application was made without forcing sessions")
@@ -45,7 +45,7 @@ TheSessions = Annotated[ForcingSessions, Depends(sessions_of)]
 
 @router.get("")
 async def terminals(connected: TheDrive, sessions: TheSessions) -> IoInfo:
-    """All terminals with state, function and polarity, read now."""
+    """Read all terminals with state, function and polarity."""
     states = await io_functions.read_terminals(connected.drive)
     facts = functions_of(connected.drive.profile).terminals
     return IoInfo(
@@ -107,7 +107,7 @@ async def start_forcing(
     request: ForcingStart,
     connection: Connection = None,
 ) -> ForcingInfo:
-    """Begin to overrule terminals; it ends when nobody renews it for five seconds."""
+    """Begin to force terminals; the session ends if it is not renewed for five seconds."""
     session = await sessions.start(
         connected.axis, name, confirmed=request.confirmed, connection=connection
     )
@@ -127,7 +127,7 @@ async def overrule(
     name: Kind,
     request: ForcingValues,
 ) -> ForcingInfo:
-    """Overrule or release terminals; also the sign of life of the page."""
+    """Force or release terminals; also renews the session of the page."""
     session = _running(connected, sessions, name)
     session.renew()
     if request.values:
@@ -151,7 +151,7 @@ async def overrule(
 async def end_forcing(
     bench: TheBench, connected: TheDrive, sessions: TheSessions, name: Kind
 ) -> ForcingInfo:
-    """Release everything; everybody may."""
+    """Release all forced terminals; everybody may do this, without control of the axis."""
     session = _running(connected, sessions, name)
     await sessions.end(connected.drive.id, name)
     bench.journal.add(

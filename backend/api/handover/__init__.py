@@ -1,1 +1,1 @@
-"""Start-up lists for a machine's controller: export, comparison, what changed since."""
+"""Start-up lists for a machine's controller: export, comparison, changes since the export."""

@@ -17,13 +17,13 @@ DefectName = Literal[
 _MEGABYTES = 1 << 20
 
 
-#: One ESI file in base64, and of how many drives there may be one.
+#: One ESI file in base64, and the highest number of drives in a request.
 _Esi = Annotated[str, Field(max_length=60 * _MEGABYTES)]
 _MOST_AXES = 64
 
 
 class HandoverChoice(Message):
-    """Which values go into which controller's format."""
+    """Values to export, and the controller's format."""
 
     format: FormatName
     file: str = Field(pattern=r"^[\w][\w .\-]{0,100}$", description="name of the list to make")
@@ -38,7 +38,7 @@ class HandoverChoice(Message):
 
 
 class HandoverRequest(HandoverChoice):
-    """The values of one drive's parameter set."""
+    """Export of the values of one drive's parameter set."""
 
     set_file: str = Field(max_length=200, description="parameter set of the library")
     version: int | None = Field(default=None, ge=1, description="of the set; the latest if null")
@@ -53,7 +53,7 @@ class SegmentAxis(Message):
 
 
 class SegmentHandoverRequest(HandoverChoice):
-    """The values of several drives on one bus, as one list."""
+    """Export of the values of several drives on one bus, as one list."""
 
     axes: list[SegmentAxis] = Field(
         min_length=1, max_length=_MOST_AXES, description="in the order of the cable"
@@ -69,7 +69,7 @@ class HandoverFile(Message):
 
 
 class LeftOutRow(Message):
-    """A row of the set that is not handed over, and why."""
+    """A row of the set that is not exported, and why."""
 
     drive: str = Field(description="name of its axis")
     key: str
@@ -86,7 +86,7 @@ class HandoverResult(Message):
 
 
 class HandoverConflict(Message):
-    """A value that the controller writes, or that the drive has, other than ours; raw values."""
+    """A value that differs between controller, set and drive; raw values."""
 
     key: str
     name: str
@@ -111,7 +111,7 @@ class HandoverDefect(Message):
 
 
 class HandoverComparison(Message):
-    """Drive now, our set and the controller's list."""
+    """Comparison of the drive now, our set and the controller's list."""
 
     format: str
     conflicts: list[HandoverConflict]
@@ -137,7 +137,7 @@ class HandedOverInfo(Message):
 
 
 class HandoverChanges(Message):
-    """What the drive holds other than it was handed over; it was read now."""
+    """Values of the drive, read now, that differ from those handed over."""
 
     changed: list[HandoverConflict]
     not_read: list[str]

@@ -1,4 +1,4 @@
-"""Routes of the hand-over: export, comparison with a controller's list, what changed since."""
+"""Routes of the hand-over: export, comparison with a controller's list, changes since then."""
 
 from __future__ import annotations
 
@@ -56,12 +56,18 @@ router = APIRouter()
 
 
 def handover_log(bench: Bench) -> HandoverLog:
-    """What was handed over, drive by drive."""
+    """The log of hand-overs, by drive."""
     return HandoverLog(bench.state_folder / "handovers")
 
 
 async def _set(bench: Bench, drive: Drive, file: str, version: int | None) -> ParameterSet:
-    """A set of the library that is of the drive's family."""
+    """Read a set of the library and check that it is of the drive's family.
+
+    Raises:
+        NotFound: there is no such set.
+        NotAllowed: it is of another family.
+        BadSet: it is not usable.
+    """
     try:
         data = await bench.records.store.call(bench.sets.read, file, version)
     except BadSet:
@@ -86,7 +92,7 @@ async def _set(bench: Bench, drive: Drive, file: str, version: int | None) -> Pa
 async def export_handover(
     bench: TheBench, connected: TheDrive, request: HandoverRequest
 ) -> HandoverResult:
-    """Make the files for the machine's controller and note it for the report.
+    """Make the files for the machine's controller and record the hand-over for the report.
 
     Nothing is written to the drive.
     """
@@ -98,7 +104,7 @@ async def export_handover(
 
 @router.post("/handover", status_code=201)
 async def export_segment(bench: TheBench, request: SegmentHandoverRequest) -> HandoverResult:
-    """The same for several drives of one bus, in the order of the cable."""
+    """Make one list for several drives of one bus, in the order of the cable."""
     return await _export(bench, request.axes, request)
 
 
@@ -214,7 +220,7 @@ async def compare_handover(
     version: Annotated[int | None, Query(ge=1, description="of the set")] = None,
     slave: Annotated[int | None, Query(ge=1, le=65535, description="of several")] = None,
 ) -> HandoverComparison:
-    """What the controller will write: drive now, our set and its list. Nothing is changed."""
+    """Compare the drive now, our set and the controller's list. Nothing is changed."""
     drive = connected.drive
     data = bytearray()
     async for chunk in request.stream():
@@ -248,7 +254,7 @@ async def compare_handover(
 
 @router.get("/drives/{drive_id}/handovers")
 async def list_handovers(bench: TheBench, connected: TheDrive) -> list[HandedOverInfo]:
-    """Earlier hand-overs of a drive, newest first."""
+    """List earlier hand-overs of a drive, newest first."""
     made = await asyncio.to_thread(handover_log(bench).read, connected.drive.id)
     found = [
         HandedOverInfo(
@@ -262,7 +268,7 @@ async def list_handovers(bench: TheBench, connected: TheDrive) -> list[HandedOve
 
 @router.get("/drives/{drive_id}/handovers/{number}/changes")
 async def changes_since(bench: TheBench, connected: TheDrive, number: int) -> HandoverChanges:
-    """What the drive holds other than it was handed over; it is read now."""
+    """Read the drive and list the values that differ from those handed over."""
     drive = connected.drive
     made = await asyncio.to_thread(handover_log(bench).read, drive.id)
     if not 1 <= number <= len(made):
@@ -282,7 +288,7 @@ def _raws(content: ParameterSet) -> dict[str, Raw]:
 
 
 async def _now(drive: Drive, keys: Collection[str]) -> Mapping[str, Raw | None]:
-    """What the drive holds of these; what it does not have is left out."""
+    """Read these values from the drive; those that it does not have are left out."""
     known = [
         key
         for key in sorted(keys)

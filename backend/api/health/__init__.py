@@ -1,1 +1,1 @@
-"""Routes of the axes' condition: baselines, comparison, trend."""
+"""Routes of axis condition: baselines, comparison, trend."""

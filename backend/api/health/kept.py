@@ -1,4 +1,4 @@
-"""What a health check measured, from its job into the database."""
+"""Storing the result of a health check in the database."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from backend.tools.health.settings import HealthSettings
 
 
 def records_of(bench: Bench) -> HealthRecords:
-    """The condition of axes in the database of this station."""
+    """The health records in the database of this station."""
     return HealthRecords(bench.records.store, bench.records.station)
 
 
@@ -24,7 +24,7 @@ async def keep_health(
     """Store the rounds of a health check with the SHA-256 of its raw data.
 
     Raises:
-        DatabaseFailed: they are not stored; the raw data are.
+        DatabaseFailed: they were not stored; the raw data were.
     """
     axis = axis_of(drive, bench.records.station)
 

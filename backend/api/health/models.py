@@ -1,4 +1,4 @@
-"""Messages of the axes' condition."""
+"""Messages of axis condition."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from backend.tools.wire_message import MessageInfo
 
 
 class HealthFinding(BaseModel):
-    """One quantity against the baseline; changes are shares (0.1 is 10 % more).
+    """Comparison of one quantity with the baseline; changes are fractions (0.1 is 10 % more).
 
-    ``low`` to ``high`` hold the true change but for the level of the whole comparison (99 %).
+    ``low`` to ``high`` is the confidence interval of the true change, at 99 %
+    for the whole comparison.
     """
 
     quantity: Quantity
@@ -48,7 +49,7 @@ class HealthRunInfo(BaseModel):
 
 
 class HealthBaselineInfo(BaseModel):
-    """A signed baseline. ``intact``: its contents still have the checksum of the signing."""
+    """A signed baseline. ``intact``: its contents still match the checksum of the signature."""
 
     id: int
     signed: datetime
@@ -62,9 +63,10 @@ class HealthBaselineInfo(BaseModel):
 
 
 class AxisHealth(BaseModel):
-    """One axis. ``changed`` counts findings that are changes, ``suspected`` those to be repeated.
+    """Condition of one axis.
 
-    ``other_settings`` counts rounds after the baseline that were measured otherwise.
+    ``changed`` is the number of changed quantities, ``suspected`` the number of those to be
+    measured again, ``other_settings`` the number of rounds after the baseline with other settings.
     """
 
     key: str
@@ -80,7 +82,7 @@ class AxisHealth(BaseModel):
 
 
 class BaselineRequest(Message):
-    """Which rounds are the baseline, and who signs where nobody is logged in by name."""
+    """Rounds that form the baseline, and who signs it where nobody is logged in by name."""
 
     runs: list[int] = Field(min_length=1, max_length=100)
     person: str = Field(default="", max_length=200)
@@ -88,7 +90,7 @@ class BaselineRequest(Message):
 
 
 class HealthAttempt(BaseModel):
-    """One run that was due or asked for, newest first in its list."""
+    """One attempted run, scheduled or triggered; lists are newest first."""
 
     at: datetime
     cause: Cause
@@ -101,7 +103,7 @@ class HealthAttempt(BaseModel):
 
 
 class HealthPermissionInfo(BaseModel):
-    """The standing permission of an axis' health check. ``ended`` states why it permits nothing."""
+    """Standing permission of an axis' health check. ``ended`` is why it is no longer valid."""
 
     person: str
     given: datetime
@@ -117,7 +119,7 @@ class HealthPermissionInfo(BaseModel):
 
 
 class HealthPermissionRequest(Message):
-    """What is permitted. ``person`` counts where the page is used without accounts."""
+    """A permission to give. ``person`` is used on stations without accounts."""
 
     until: datetime = Field(description="its end, within 366 days")
     days: list[Weekday] = Field(default_factory=list, max_length=7)

@@ -1,4 +1,4 @@
-"""Routes of the axes' condition. Nothing moves; measuring is the job of the tool ``health``."""
+"""Routes of axis condition. Nothing moves here; the tool ``health`` measures."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ router = APIRouter()
 
 
 async def unattended_of(request: Request) -> Unattended:
-    """What begins health checks without a person on this server."""
+    """The scheduler of unattended health checks on this server."""
     found = request.app.state.unattended
     if not isinstance(found, Unattended):
         raise TypeError("the application was made without a schedule")
@@ -54,12 +54,13 @@ async def health_trend(
     since: Annotated[datetime | None, Query(description="earliest round that is shown")] = None,
     axis: Annotated[str, Query(max_length=200, description="name; all without it")] = "",
 ) -> Response:
-    """Every axis of the database with its rounds and its comparison, of all stations of it."""
+    """Read every axis of the database, of all its stations, with rounds and comparison."""
     if since is not None and since.tzinfo is None:
         since = since.replace(tzinfo=UTC)
 
     def made() -> bytes:
-        # On the store's thread to the last byte: the loop of the buses does not wait for it.
+        # On the store's thread up to the last byte, so that the event loop of
+        # the buses does not wait.
         found = [info_of(each) for each in records_of(bench).trend(since, axis)]
         return _TREND.dump_json(found)
 
@@ -68,7 +69,7 @@ async def health_trend(
 
 @router.get("/drives/{drive_id}/health")
 async def read_health(bench: TheBench, connected: TheDrive) -> AxisHealth:
-    """Baseline, comparison and rounds of one axis."""
+    """Read baseline, comparison and rounds of one axis."""
     axis = axis_of(connected.drive, bench.records.station)
     return info_of(await bench.records.store.call(records_of(bench).condition, axis))
 
@@ -77,9 +78,9 @@ async def read_health(bench: TheBench, connected: TheDrive) -> AxisHealth:
 async def sign_baseline(
     bench: TheBench, connected: TheDrive, me: Me, request: BaselineRequest
 ) -> AxisHealth:
-    """Sign rounds as the baseline of the axis. The one before is kept, and counts no longer.
+    """Sign rounds as the baseline of the axis. The previous one is kept, but no longer used.
 
-    Who is logged in signs by that name; ``person`` counts where the page is used without accounts.
+    A person who is logged in signs by that name; ``person`` is used on stations without accounts.
     """
     axis = axis_of(connected.drive, bench.records.station)
     person = request.person if me.kind == "local" else me.person
@@ -104,7 +105,7 @@ async def sign_baseline(
 async def read_health_permission(
     connected: TheDrive, schedule: TheSchedule
 ) -> HealthPermissionInfo | None:
-    """Who permits runs without a person, when, and what became of them; null without any."""
+    """Read the permission for unattended runs, with schedule and attempts; null without one."""
     return _permission(schedule, connected.drive.id)
 
 
@@ -117,7 +118,7 @@ async def permit_health(
     schedule: TheSchedule,
     request: HealthPermissionRequest,
 ) -> HealthPermissionInfo:
-    """Permit runs of the baseline's measurements without a person. It replaces an older one."""
+    """Permit unattended runs of the baseline's measurements. It replaces an earlier permission."""
     if not request.secured:
         raise NotAllowed("health.permission-secured", drive=connected.drive.name)
     baseline = await schedule.baseline(connected)
@@ -149,7 +150,7 @@ async def permit_health(
 async def withdraw_health_permission(
     bench: TheBench, connected: TheDrive, schedule: TheSchedule
 ) -> None:
-    """End the permission, and a run that goes on by it."""
+    """End the permission, and a run that it started."""
     gone = await schedule.withdraw(connected.drive.id)
     if gone is not None:
         line = text("journal.health-withdrawn", drive=connected.drive.name, person=gone.person)
@@ -158,9 +159,9 @@ async def withdraw_health_permission(
 
 @router.post("/drives/{drive_id}/health/trigger", status_code=202)
 async def trigger_health(connected: Controlled, schedule: TheSchedule) -> JobInfo:
-    """A controller asks for a run. Without a standing permission for it nothing moves.
+    """Start a run for a controller. Without a standing permission for it nothing moves.
 
-    ``GET /jobs/{id}`` shows how far it is, ``GET /drives/{id}/health`` what has changed.
+    ``GET /jobs/{id}`` returns its progress, ``GET /drives/{id}/health`` what has changed.
     """
     return convert.job(await schedule.triggered(connected))
 
@@ -192,7 +193,7 @@ def _attempt(each: Attempt) -> HealthAttempt:
 
 
 def info_of(found: Condition) -> AxisHealth:
-    """One axis as it is sent."""
+    """The condition of one axis as a message."""
     baseline = found.baseline
     sha256 = None if baseline is None else baseline.settings_sha256
     return AxisHealth(

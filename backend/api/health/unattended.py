@@ -1,7 +1,7 @@
-"""Health checks that begin without a person: on a schedule, or when a controller asks for one.
+"""Unattended health checks: on a schedule, or triggered by a controller.
 
-Each needs the standing permission of somebody who may move the axis (`backend.health.permission`),
-and the axis free and at standstill. Otherwise nothing moves, and what was in the way is noted.
+Each needs the standing permission of a person who may move the axis (`backend.health.permission`),
+and the axis free and at standstill. Otherwise nothing moves, and the obstacle is recorded.
 """
 
 from __future__ import annotations
@@ -44,18 +44,18 @@ from drivers.texts.message import Text, text
 
 log = logging.getLogger(__name__)
 
-#: Between the announcement of a scheduled run and its motion.
+#: Time between the announcement of a scheduled run and its motion [s].
 NOTICE_S = 30.0
 _LOOK_S = 1.0
-#: The axis must be seen to stand within this time.
+#: Time within which standstill must be measured, and time between samples [s].
 _STANDS_S, _BETWEEN_S = 1.0, 0.05
-#: A controller that asks again and again is noted so often.
+#: A refusal is not recorded again within this time while a controller repeats its trigger.
 _NOTED_AGAIN = timedelta(minutes=1)
 _POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 
 
 class Unattended:
-    """For one server. ``now`` is the clock of the schedule, in UTC."""
+    """Scheduler of one server. ``now`` is the clock of the schedule, in UTC."""
 
     def __init__(
         self,
@@ -74,12 +74,12 @@ class Unattended:
         self._task: asyncio.Task[None] | None = None
 
     async def open(self) -> None:
-        """Take up what was permitted before the server was restarted, and look after it."""
+        """Load the permissions given before a restart of the server, and start the schedule."""
         await asyncio.to_thread(self.permissions.load)
         self._task = asyncio.create_task(self._run(), name="health-schedule", context=by_itself())
 
     async def close(self) -> None:
-        """Begin nothing any more."""
+        """Stop the schedule; no further run begins."""
         tasks = [task for task in (self._task, *self._ends) if task is not None]
         for task in tasks:
             task.cancel()
@@ -88,10 +88,11 @@ class Unattended:
     # --- permission -------------------------------------------------------------------
 
     async def permit(self, connected: ConnectedDrive, me: Identity, asked: Permission) -> None:
-        """Keep a permission that somebody gives now.
+        """Store a permission that a person gives now.
 
         Raises:
-            NotAllowed: by a guest, without a baseline, for too long, or for nothing.
+            NotAllowed: it is from a guest, for too long, for nothing, without a
+            name or without a baseline.
         """
         if me.is_guest:
             raise NotAllowed("health.permission-guest", drive=connected.drive.name)
@@ -106,7 +107,7 @@ class Unattended:
             await asyncio.to_thread(self.permissions.put, asked)
 
     async def withdraw(self, drive: str) -> Permission | None:
-        """End the permission of a drive, and a run that goes on by it."""
+        """End the permission of a drive, and a run that it started."""
         async with self._writing:
             gone = await asyncio.to_thread(self.permissions.take_back, drive)
         if gone is not None:
@@ -119,10 +120,10 @@ class Unattended:
             job.cancel(text("health.permission-withdrawn"))
 
     async def baseline(self, connected: ConnectedDrive) -> Baseline:
-        """The baseline of an axis, whose settings are what is permitted.
+        """The baseline of an axis; a permission covers its settings.
 
         Raises:
-            NotAllowed: there is none, or it is not what was signed.
+            NotAllowed: there is none, or it differs from what was signed.
         """
         axis = axis_of(connected.drive, self._bench.records.station)
         found = await self._bench.records.store.call(records_of(self._bench).condition, axis)
@@ -140,7 +141,7 @@ class Unattended:
                 try:
                     await self._look_after(permission)
                 except Exception:
-                    # One that fails must not end the others.
+                    # A failing permission must not end the others.
                     log.exception("the schedule of %s", permission.drive)
             await asyncio.sleep(_LOOK_S)
 
@@ -153,7 +154,7 @@ class Unattended:
         at = due(permission, now)
         if at is None or at > permission.until or (self._running and now - at <= WINDOW):
             return  # one run after another: they may share a bus
-        # Before it begins: a server that this run would bring down does not begin it again.
+        # Stored before the run begins: a server that this run brings down must not begin it again.
         if not await self._change(permission, lambda known: _handled(known, at)):
             self.permissions.skip(_handled(permission, at))
             return
@@ -171,7 +172,7 @@ class Unattended:
             await asyncio.sleep(self._notice_s)
             known = self.permissions.of(permission.drive)
             if known is None or known.id != permission.id:
-                return  # it was withdrawn meanwhile
+                return  # it was withdrawn in the meantime
             role = self._role(known) or Role.VIEWER
             rights = RIGHTS[role] & MOVING
             who = Identity(f"{known.person} (schedule)", role, "token", known.session, rights)
@@ -185,10 +186,10 @@ class Unattended:
     # --- one run ----------------------------------------------------------------------
 
     async def triggered(self, connected: ConnectedDrive) -> Job:
-        """Begin a run that whoever acts now asks for.
+        """Begin a run for the person or controller of this request.
 
         Raises:
-            DriveError: it is not permitted, or something is in the way; nothing has moved.
+            DriveError: it is not permitted, or something prevents it; nothing has moved.
         """
         permission = self.permissions.of(connected.drive.id)
         if permission is None or not permission.trigger:
@@ -203,9 +204,9 @@ class Unattended:
         """Begin the measurements of the baseline.
 
         Raises:
-            DriveError: what is in the way; nothing has moved.
+            DriveError: something prevents it; nothing has moved.
         """
-        arrived = arrived_s.set(time.monotonic())  # STOP that is pressed from now on ends it
+        arrived = arrived_s.set(time.monotonic())  # a STOP pressed from now on ends it
         try:
             connected, baseline = await self._require(permission)
             settings = HealthSettings.model_validate(
@@ -219,14 +220,14 @@ class Unattended:
         self._running[permission.id] = job
         at = self._now()
         if self._gone(permission):
-            self._end(permission)  # it was undone while the exchange was started
+            self._end(permission)  # it was withdrawn while the exchange was started
         task = asyncio.create_task(self._watch(permission, job, at, cause), context=by_itself())
         self._ends.add(task)
         task.add_done_callback(self._ends.discard)
         return job
 
     async def _watch(self, permission: Permission, job: Job, at: datetime, cause: Cause) -> None:
-        """Note that it runs, and how it ended."""
+        """Record that the run has begun, and how it ended."""
         try:
             await self._note(permission, Attempt(at=at, cause=cause, outcome="running"))
             await job.wait()
@@ -242,7 +243,7 @@ class Unattended:
             await self._log_changes(permission)
 
     async def _log_changes(self, permission: Permission) -> None:
-        """What has changed is in the log, as nobody waits for the result."""
+        """Log the changes that were found, as nobody waits for the result."""
         connected = self._bench.connected_drives.get(permission.drive)
         if connected is None:
             return
@@ -260,10 +261,10 @@ class Unattended:
     # --- what must be true ------------------------------------------------------------
 
     async def _require(self, permission: Permission) -> tuple[ConnectedDrive, Baseline]:
-        """The axis and its baseline, where a run may begin now.
+        """The axis and its baseline, after checking that a run may begin now.
 
         Raises:
-            DriveError: what is in the way.
+            DriveError: something prevents it.
         """
         now = self._now()
         if (over := self.ended(permission)) is not None:
@@ -294,7 +295,7 @@ class Unattended:
         if (grant := bench.authority.grant_of(drive.id)) is not None:
             raise Busy("motion.moved-already", drive=drive.name, purpose=grant.purpose)
         if axis.stopped or axis.stop_pending or bench.motion.stopping(drive.id):
-            # Only a person takes a STOP back.
+            # Only a person may cancel a STOP.
             raise NotAllowed("health.run-after-stop", drive=drive.name)
         snapshot = connected.monitor.snapshot
         if not snapshot.fresh:
@@ -307,7 +308,7 @@ class Unattended:
             raise NotAllowed("health.run-fault", drive=drive.name)
 
     def ended(self, permission: Permission) -> Text | None:
-        """Why it permits nothing any more; None while it does."""
+        """Why the permission is no longer valid; None while it is."""
         if self._gone(permission) or self._now() >= permission.until:
             return text("health.permission-ended")
         role = self._role(permission)
@@ -320,7 +321,7 @@ class Unattended:
         return known is None or known.id != permission.id
 
     def _role(self, permission: Permission) -> Role | None:
-        """What the person who permits it is now; None where there is nobody of that account."""
+        """Current role of the person who gave the permission; None if the account is gone."""
         if not self._people.accounts_needed:
             return Role.ADMINISTRATOR
         accounts = self._people.accounts.directory.all()
@@ -347,7 +348,7 @@ class Unattended:
     async def _change(
         self, permission: Permission, how: Callable[[Permission], Permission]
     ) -> bool:
-        """Change what is kept; False where it could not be stored, which the log says."""
+        """Change a stored permission; False, with a line in the log, if it could not be stored."""
         async with self._writing:
             try:
                 await asyncio.to_thread(self.permissions.change, permission, how)
@@ -362,10 +363,11 @@ def _handled(permission: Permission, at: datetime) -> Permission:
 
 
 async def _require_rest(connected: ConnectedDrive) -> None:
-    """The axis has no power and stands, by position and speed.
+    """Check that the axis has no power and is at standstill, by position and speed.
 
     Raises:
-        Busy: somebody else has enabled or turns it. DriveError: it does not report.
+        Busy: the axis is enabled or turns.
+        DriveError: the drive does not answer.
     """
     axis, name = connected.axis, connected.drive.name
     watch = SpeedWatch(axis, await units_of(axis))

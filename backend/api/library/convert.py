@@ -1,4 +1,4 @@
-"""Library values as messages."""
+"""Conversion of library values to messages."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from drivers.texts.answers import message_in
 from drivers.texts.message import Text
 from profiles.schema import Parameter, Raw
 
-#: Kept for searching and for the index; nothing for people.
+#: Facts used for searching and the index only, not shown to people.
 _INNER = frozenset({"words", "stamp"})
 
 
@@ -63,7 +63,7 @@ def version(known: Version) -> VersionInfo:
 
 
 def entry(known: Entry, station: str) -> LibraryEntry:
-    """An entry as this station sees it."""
+    """An entry as seen from this station."""
     return LibraryEntry(
         id=known.id,
         kind=known.kind,
@@ -80,7 +80,7 @@ def entry(known: Entry, station: str) -> LibraryEntry:
 
 
 def stored_set(known: Entry) -> StoredSet:
-    """A parameter set."""
+    """A stored parameter set."""
     latest = known.latest
     count = latest.facts.get("parameters")
     return StoredSet(
@@ -100,7 +100,7 @@ def stored_set(known: Entry) -> StoredSet:
 
 
 def unusable_set(file: str, problem: Text) -> StoredSet:
-    """A file in the folder that is no parameter set."""
+    """A file in the folder that is not a parameter set."""
     return StoredSet(
         file=file, profile="", drive_name="", serial=None, firmware="", author="", saved=None,
         notes="", count=0, problem=words_of(problem), problem_message=message_of(problem),

@@ -16,7 +16,7 @@ TagText = Annotated[str, Field(min_length=1, max_length=60)]
 
 
 class AxisInfo(Message):
-    """The drive that something was made with."""
+    """Identity of the drive that an item was made with."""
 
     profile: str
     name: str
@@ -28,7 +28,7 @@ class AxisInfo(Message):
 
 
 class VersionInfo(Message):
-    """One state of an entry; never changed."""
+    """One version of an entry; never changed."""
 
     number: int
     saved: datetime
@@ -46,7 +46,7 @@ class VersionInfo(Message):
 
 
 class LibraryEntry(Message):
-    """Something of the library."""
+    """One entry of the library."""
 
     id: int
     kind: LibraryKind
@@ -79,7 +79,7 @@ class TagCount(Message):
 
 
 class LibraryChange(Message):
-    """Change notes or tags; what is left out stays."""
+    """Change notes or tags; values that are left out stay unchanged."""
 
     notes: str | None = Field(default=None, max_length=4000)
     tags: list[TagText] | None = Field(default=None, max_length=20)
@@ -126,7 +126,7 @@ class ThreeWayRow(Message):
 
 
 class ThreeWay(Message):
-    """Two sets against a drive, read now."""
+    """Two sets compared with a drive that was read now."""
 
     base: str
     base_version: int | None

@@ -33,12 +33,12 @@ from drivers.errors import NotAllowed
 router = APIRouter(prefix="/library")
 
 
-#: What a database holds as a number.
+#: Highest id or version number that the database stores.
 _MOST = 2**31 - 1
 
 
 def _entry(bench: Bench, entry_id: int) -> Entry:
-    """Blocks.
+    """The entry of this id. Blocks.
 
     Raises:
         NotFound: there is none of this id.
@@ -52,7 +52,7 @@ def _entry(bench: Bench, entry_id: int) -> Entry:
 
 
 def _page(bench: Bench, recordings: Recordings, query: LibraryQuery) -> LibraryPage:
-    """Blocks. Everything is brought up to date first: files come and go by other ways too."""
+    """Search the library. Blocks. Updated first: files are also added and removed by other ways."""
     records = bench.records
     problems = records.sets.take_in().values()
     records.index.refresh(recordings.running)
@@ -62,7 +62,7 @@ def _page(bench: Bench, recordings: Recordings, query: LibraryQuery) -> LibraryP
         total=total,
         problems=[words_of(why) for why in problems],
         problem_messages=[message_of(why) for why in problems],
-        # A file has one station; a database server may have many.
+        # A database file belongs to one station; a database server may serve many.
         shared=records.store.sqlite_file is None,
     )
 
@@ -84,7 +84,7 @@ async def search_library(
     limit: Annotated[int, Query(ge=1, le=500)] = 100,
     offset: Annotated[int, Query(ge=0, le=1_000_000)] = 0,
 ) -> LibraryPage:
-    """Entries, newest first."""
+    """List entries, newest first."""
     query = LibraryQuery(
         words=words,
         kinds=tuple(kind or ()),
@@ -104,21 +104,21 @@ async def search_library(
 
 @router.get("/tags")
 async def library_tags(bench: TheBench) -> list[TagCount]:
-    """Tags in use."""
+    """List tags in use, with counts."""
     found = await bench.records.store.call(bench.records.library.tags)
     return [TagCount(tag=tag, count=count) for tag, count in found.items()]
 
 
 @router.get("/{entry_id}")
 async def library_entry(bench: TheBench, entry_id: int) -> LibraryEntry:
-    """One entry, also one that was archived."""
+    """Read one entry, also one that was archived."""
     entry = await bench.records.store.call(_entry, bench, entry_id)
     return convert_library.entry(entry, bench.records.station)
 
 
 @router.get("/{entry_id}/versions")
 async def library_versions(bench: TheBench, entry_id: int) -> list[VersionInfo]:
-    """All versions of an entry, newest first."""
+    """List all versions of an entry, newest first."""
     await bench.records.store.call(_entry, bench, entry_id)
     found = await bench.records.store.call(bench.records.library.versions, entry_id)
     return [convert_library.version(version) for version in found]
@@ -128,11 +128,11 @@ async def library_versions(bench: TheBench, entry_id: int) -> list[VersionInfo]:
 async def library_content(
     bench: TheBench, entry_id: int, version: Annotated[int | None, Query(ge=1, le=_MOST)] = None
 ) -> Response:
-    """Contents of a version as a download, the latest by default."""
+    """Download the contents of a version, by default the latest."""
     records = bench.records
     entry = await records.store.call(_entry, bench, entry_id)
     kind = mimetypes.guess_type(entry.name)[0] or "application/octet-stream"
-    # Never shown in the page's own origin: a report from elsewhere may carry scripts.
+    # Never shown in the page's own origin: a report from elsewhere may contain scripts.
     headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(entry.name)}"}
     if entry.station == records.station:
         path = await records.store.call(records.index.path, entry.kind, entry.name)
@@ -165,7 +165,7 @@ async def share_library_entry(
 async def fetch_library_entry(
     bench: TheBench, recordings: TheRecordings, entry_id: int
 ) -> LibraryEntry:
-    """Copy shared contents into this station's folder, where they are opened like its own."""
+    """Copy shared contents into this station's folder, where they can be opened like its own."""
 
     def work() -> Entry:
         records, entry = bench.records, _entry(bench, entry_id)
@@ -186,14 +186,14 @@ async def fetch_library_entry(
 async def change_library_entry(
     bench: TheBench, recordings: TheRecordings, entry_id: int, change: LibraryChange
 ) -> LibraryEntry:
-    """Change notes or tags, or take back what was archived."""
+    """Change notes or tags, or restore an archived entry."""
 
     def work() -> Entry:
         records = bench.records
         entry = _entry(bench, entry_id)
         tags = tuple(change.tags) if change.tags is not None else None
         if entry.kind == "recording" and entry.station == records.station:
-            # A recording's remarks lie next to its file, and go with it.
+            # The remarks of a recording are stored next to its file, and belong to it.
             recordings.library.annotate(entry.name, notes=change.notes, tags=tags, kept=None)
         if change.deleted is False:
             entry = records.library.undelete(entry_id)
@@ -209,7 +209,7 @@ async def change_library_entry(
 async def delete_library_entry(
     bench: TheBench, recordings: TheRecordings, entry_id: int
 ) -> Response:
-    """Put a parameter set or a shared entry aside; delete a file of this station for good."""
+    """Archive a parameter set or a shared entry; delete a file of this station permanently."""
 
     def work() -> None:
         records = bench.records

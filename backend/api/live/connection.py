@@ -1,7 +1,7 @@
-"""One page's live connection: states, values, jobs and samples out; watch, jog and STOP in.
+"""Live connection of one page: states, values, jobs, samples out; watch, jog, STOP in.
 
 Each connection has one sender task. States coalesce (only the newest of each drive is kept);
-samples never do: they wait in their subscription's bounded queue, which counts what it drops.
+samples never do: they wait in their subscription's bounded queue, which counts dropped ones.
 """
 
 from __future__ import annotations
@@ -54,14 +54,15 @@ from backend.tools.jog.release import end_of_jog
 from drivers.errors import DriveError
 from drivers.texts.message import Text, text
 
-#: Messages that wait for a slow page; states, values and drive lists coalesce and do not count.
+#: Limit of messages that wait for a slow page; states, values and drive lists
+#: coalesce and are not counted.
 QUEUE = 500
-#: A connection that has not accepted a message for this long is closed.
+#: A connection that has not accepted a message for this long [s] is closed.
 SEND_TIMEOUT_S = 10.0
 
 
 class Connection:
-    """One page."""
+    """The live connection of one page."""
 
     def __init__(
         self,
@@ -92,7 +93,7 @@ class Connection:
         self._overflow = False
 
     async def run(self) -> None:
-        """Until the page is gone."""
+        """Serve the connection until the page is gone."""
         self.send(Hello(connection=self.id, version=backend.__version__))
         self.later("drives", "", self.drive_list())
         self._people.changed()
@@ -101,16 +102,16 @@ class Connection:
         scoper = asyncio.create_task(self.scopes.run(), name=f"scopes-{self.id}")
         tasks = (sender, receiver, scoper)
         done, pending = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        # Before anything is waited for: nobody holds a button here any more.
+        # Before any waiting: from now on nobody holds a button on this page.
         self.release(None, text("work.page-gone"))
         for task in pending:
             task.cancel()
         await asyncio.wait(tasks)
         for task in done:
             error = None if task.cancelled() else task.exception()
-            # A page may go in the middle of a message, or sleep for so long that its messages
-            # wait for ever; both are ordinary ends. Samples and words are sent next to each other:
-            # the one finds the line closed, the other that it is known to be.
+            # A page may go in the middle of a message, or sleep so long that its messages time out;
+            # both are ordinary ends. Samples and texts are sent concurrently: one of them finds the
+            # line closed, the other finds it marked as closed.
             known_closed = self._socket.application_state is WebSocketState.DISCONNECTED
             if isinstance(error, RuntimeError) and known_closed:
                 continue
@@ -118,7 +119,7 @@ class Connection:
                 raise error
 
     async def close(self) -> None:
-        """Release everything that lived by this connection; a jog ends at once."""
+        """Release everything that depends on this connection; a jog ends at once."""
         self.release(None, text("work.page-gone"))
         for drive in self.watched:
             if (connected := self._bench.connected_drives.get(drive)) is not None:
@@ -129,13 +130,13 @@ class Connection:
         await self.scopes.close()
 
     def release(self, drive: str | None, reason: Text) -> None:
-        """End jogs of this page: of one axis, or all."""
+        """End jogs of this page: of one axis, or of all."""
         self.jogs.release(drive, reason)
 
     # --- out --------------------------------------------------------------------------
 
     def send(self, message: BaseModel | Shared) -> None:
-        """Queue a message that must not be lost; a page that never reads is cut off."""
+        """Queue a message that must not be lost; a page that never reads is disconnected."""
         try:
             self._queue.put_nowait(message if isinstance(message, Shared) else only(message))
         except asyncio.QueueFull:
@@ -148,7 +149,7 @@ class Connection:
         self._wake.set()
 
     def fresh_values(self, drive: str, keys: frozenset[str], values: Shared) -> None:
-        """New readings of a drive; only the newest of each parameter is sent."""
+        """Send new readings of a drive; only the newest of each parameter is sent."""
         waiting = self._values.get(drive)
         if waiting is not None and not waiting[0] <= keys:
             keys |= waiting[0]
@@ -157,7 +158,7 @@ class Connection:
         self._wake.set()
 
     def drive_list(self) -> Shared:
-        """The bench as this connection sees it."""
+        """The list of drives as seen from this connection."""
         return Shared(partial(live_news.drive_list, self._bench, self.id))
 
     async def _sender(self) -> None:
@@ -172,7 +173,7 @@ class Connection:
             values, self._values = self._values, {}
             for _, message in values.values():
                 await self._text(message)
-            # States need not come faster than a screen shows them.
+            # States need not arrive faster than a screen can show them.
             await asyncio.sleep(0.03)
         await self._socket.close(code=1013, reason="the page does not read")
 
@@ -190,7 +191,7 @@ class Connection:
                 if message["type"] == "websocket.disconnect":
                     return
                 text = message.get("text")
-                # Not silent while a request takes its time.
+                # A page counts as not silent while its request is being carried out.
                 self.heard = math.inf
                 arrived_s.set(time.monotonic())
                 await self._handle(text if isinstance(text, str) else "")
@@ -243,7 +244,7 @@ class Connection:
         problems = await self._bench.motion.stop(known)
         self._bench.journal.add(text("station.stop-pressed"), level="warning", drive=request.drive)
         failed = {drive: why for drive, why in problems.items() if why is not None}
-        # Of a machine with two axes, the other one is stopped as well.
+        # On a machine with two axes, the other one is stopped as well.
         stopped = list(problems)
         taken = StopTaken(
             drives=stopped,
@@ -254,7 +255,7 @@ class Connection:
         for drive, why in failed.items():
             failure = DriveError("api-live.stop-not-reach", drive=drive, text=why)
             self.send(Refused(request="stop", problem=problem_of(failure)))
-        # The connection goes on meanwhile: STOP may be pressed again.
+        # The connection keeps receiving in the meantime: STOP may be pressed again.
         task = asyncio.create_task(self._stopped(drives, stopped), name=f"stop-answer-{self.id}")
         self._stops.add(task)
         task.add_done_callback(self._stops.discard)
@@ -275,8 +276,7 @@ class Connection:
         for drive in drives | self.watched:
             if (connected := self._bench.connected_drives.get(drive)) is None:
                 continue
-            # A drive that was removed from the axis list and added again is another one of the same
-            # name.
+            # A drive that was removed and added again is a new object with the same name.
             watchers = connected.monitor.watchers
             if (self.id in watchers) is not (drive in drives):
                 watchers ^= {self.id}
@@ -296,7 +296,7 @@ class Connection:
 
     async def _poll(self, request: WatchValues) -> None:
         while (connected := self._bench.connected_drives.get(request.drive)) is not None:
-            # A lost link is shown by the monitor; polling goes on until the drive is back.
+            # The monitor shows a lost link; polling continues until the drive is back.
             with contextlib.suppress(DriveError):
                 await connected.drive.read_many(request.keys)
             await asyncio.sleep(request.period_s)

@@ -1,4 +1,4 @@
-"""Control of an axis, passed between the people whose pages are open."""
+"""Control of axes: requests, hand-overs and overrides between people with open pages."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from drivers.texts.message import Text, text
 
 
 class PeopleControl:
-    """Of all live connections of a server."""
+    """Control of axes for all live connections of a server."""
 
     def __init__(self, bench: Bench, people: People, pages: Mapping[str, Page]) -> None:
         self._bench, self._people, self._pages = bench, people, pages
@@ -41,7 +41,7 @@ class PeopleControl:
         """Carry out a request for control.
 
         Raises:
-            NotAllowed, Forbidden, Busy: it is not to be had now.
+            NotAllowed, Forbidden, Busy: it is not possible now.
         """
         leases, drive = self._bench.leases, request.drive
         self._bench.connected(drive)
@@ -84,7 +84,7 @@ class PeopleControl:
             why = text("work.control-taken", person=identity.person)
             held_by.release(drive, why)
             if self._bench.jobs.moving(drive) is not None:
-                # Who watched this motion does not control it any more.
+                # The person who watched this motion no longer controls it.
                 await self._bench.motion.stop([drive], why)
         self._bench.leases.override(drive, page.id, identity.person)
         line = text("journal.overrides-control", person=identity.person)
@@ -100,7 +100,7 @@ class PeopleControl:
 
 
 def require_control(people: People, identity: Identity, drive: str) -> None:
-    """This person may hold the control of an axis now.
+    """Check that this person may control an axis now.
 
     Raises:
         Forbidden: they may only look, or have a grant for another axis.

@@ -1,4 +1,4 @@
-"""The jogs of one page: each runs for as long as the page renews it."""
+"""Jogs of one page: each runs for as long as the page renews it."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from drivers.texts.message import Text, text
 
 
 class Jogs:
-    """Of one live connection. ``send`` queues a message for its page."""
+    """Jogs of one live connection. ``send`` queues a message for its page."""
 
     def __init__(self, bench: Bench, connection: str, send: Callable[[BaseModel], None]) -> None:
         self._bench, self._connection, self._send = bench, connection, send
         self._holds: dict[str, Hold] = {}
 
     def renew(self, sign: JogRenew) -> None:
-        """A sign of life of a press, or of its release."""
+        """Pass a renewal of a press, or its release, to the jog."""
         if (hold := self._holds.get(sign.drive)) is not None:
             hold.renew(
                 sign.press,
@@ -39,13 +39,13 @@ class Jogs:
             )
 
     def release(self, drive: str | None, reason: Text, press: int = 0) -> None:
-        """End the jog of one axis, or all; of one press, or whatever is held."""
+        """End the jog of one axis, or of all; of one ``press``, or of any if 0."""
         for each, hold in self._holds.items():
             if drive in (None, each):
                 hold.release(reason, press)
 
     def start(self, request: JogStart, person: str) -> None:
-        """Begin a jog, and take control for its length where nobody has it.
+        """Begin a jog; takes control for its duration if nobody has it.
 
         Raises:
             DriveError: the axis may not move, or somebody else controls it.
@@ -85,7 +85,7 @@ class Jogs:
 
 
 def _end_of(drive: str, job: Job) -> JogEnded:
-    """Why a jog ended: its button, what cancelled it, or the problem of one that failed."""
+    """Why a jog ended: its button, the cause of cancellation, or the problem of a failed one."""
     reason = (
         job.cancel_cause if job.state == "cancelled" else message_in(job.result or {}, "reason")
     )
@@ -103,7 +103,7 @@ def _end_of(drive: str, job: Job) -> JogEnded:
 async def _jog_work(
     bench: Bench, connected: ConnectedDrive, request: JogStart, hold: Hold, progress: Progress
 ) -> JobResult:
-    """Through the cyclic exchange where it runs, else as a moving target."""
+    """Jog through the cyclic exchange if it runs, otherwise with a moving profile target."""
     axis = connected.axis
     settings = jog_settings(request, await unit_of(bench, connected, request.unit))
     if axis.session is not None and axis.session.running:

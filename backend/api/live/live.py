@@ -1,4 +1,4 @@
-"""The live websocket of all pages: what the bench reports goes to those that look at it."""
+"""The live websocket of all pages: events of the bench are sent to the pages that watch them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class LiveHub:
         bench.journal.listen(self._logged)
 
     async def serve(self, socket: WebSocket) -> None:
-        """Carry one connection from accept to its end."""
+        """Serve one connection from accept to its end."""
         actor = acting.get()
         if actor is None:
             raise RuntimeError("a live connection without the gate before it")
@@ -63,7 +63,7 @@ class LiveHub:
                 await connection.close()
 
     def _ended(self, session: str) -> None:
-        """A session is over: its pages hold nothing any more, and hear nothing."""
+        """Release what the pages of an ended session hold, and close their sockets."""
         why = text("motion.session-is-over")
         for connection in self._each():
             if connection.identity.session == session:
@@ -72,7 +72,7 @@ class LiveHub:
         self.bench.authority.end_of(session, why)
 
     def _lowered(self, session: str) -> None:
-        """An account may move nothing any more: what it still moves is stopped."""
+        """Stop what an account moves after it has lost a right to move axes."""
         why = text("motion.account-has-another-role")
         for connection in self._each():
             if connection.identity.session == session:
@@ -100,7 +100,7 @@ class LiveHub:
             connection.later("job", job.id, changed)
 
     def _drives(self) -> None:
-        # Who holds nothing sees the same list.
+        # All connections that hold no axis see the same list.
         others = Shared(partial(live_news.drive_list, self.bench, None))
         for connection in self._each():
             holds = self.bench.leases.held_by(connection.id)

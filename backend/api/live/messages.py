@@ -1,6 +1,6 @@
-"""Messages of the websocket ``/api/v1/live``. Text frames are JSON of these types.
+"""Messages of the websocket ``/api/v1/live``. Text frames contain one of these types as JSON.
 
-Binary frames carry one scope block or several, one behind the other, little endian::
+Binary frames contain one or more scope blocks in sequence, little endian::
 
     u32 magic 0x424B4353 ("SCKB")   u32 subscription   u32 sequence   u32 dropped samples
     u16 n rows   u16 k channels   u32 flags (bit 0: true times follow, bit 1: bases follow,
@@ -10,9 +10,9 @@ Binary frames carry one scope block or several, one behind the other, little end
     [k] f64 bases, to be added to the samples of each channel (only with flag bit 1)
     [n*k] f32 samples in engineering units, row after row; NaN where a value is not valid
 
-Sequence and dropped samples are of one stream of a subscription: channels that the cyclic exchange
-carries and channels that are polled are streams of their own; the others' columns are NaN. After
-another ScopeInfo the sequence begins again.
+Sequence and dropped samples are counted per stream of a subscription: channels of the cyclic
+exchange and polled channels are separate streams; in a block, the columns of other streams are NaN.
+After another ScopeInfo the sequence begins again.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ class WatchValues(Message):
 
 
 class JogStart(Message):
-    """Begin to jog; the axis must be enabled or may be enabled (``enable``).
+    """Begin to jog; an axis that is not enabled is enabled for the jog.
 
-    The job ends when the renewals stop, the socket closes or the lease is lost.
+    The job ends when the renewals stop, the socket closes or control is lost.
     """
 
     type: Literal["jog_start"] = "jog_start"
@@ -70,10 +70,10 @@ class JogStart(Message):
 
 
 class JogRenew(Message):
-    """A sign of life: the button is still held. Send at 20 Hz or faster.
+    """Renewal of a jog: the button is still held. Send at 20 Hz or faster.
 
-    The axis brakes where none comes for 200 ms, and goes on where the hold is alive again within
-    500 ms and was never released.
+    The axis brakes if none arrives for 200 ms, and continues if renewals resume within 500 ms and
+    the button was not released.
     """
 
     type: Literal["jog_renew"] = "jog_renew"
@@ -109,7 +109,7 @@ class StopAll(Message):
 
 
 class LeaseTake(Message):
-    """Take, or give back, control of an axis."""
+    """Take or give up control of an axis."""
 
     type: Literal["lease"] = "lease"
     drive: str
@@ -117,7 +117,7 @@ class LeaseTake(Message):
 
 
 class ScopeChannel(Message):
-    """One trace."""
+    """One channel of a scope subscription."""
 
     drive: str
     key: str
@@ -173,21 +173,21 @@ class Hello(Message):
 
 
 class StateChanged(Message):
-    """Axis state, at 10 Hz at most."""
+    """State of an axis, at 10 Hz at most."""
 
     type: Literal["state"] = "state"
     state: AxisState
 
 
 class DrivesChanged(Message):
-    """The list of drives, or quality, lease or counts of one, changed."""
+    """Change in the list of drives, or in quality, control or counts of a drive."""
 
     type: Literal["drives"] = "drives"
     drives: list[DriveSummary]
 
 
 class ValuesChanged(Message):
-    """New readings; also sent to everybody when anybody writes."""
+    """New readings; also sent to all pages when a parameter is written."""
 
     type: Literal["values"] = "values"
     drive: str
@@ -202,8 +202,7 @@ class JobChanged(Message):
 
 
 class JogEnded(Message):
-    """The jog of this connection ended: why, or with which problem; the words are for whoever
-    jogs."""
+    """End of a jog of this connection; reason and remedy in the language of the connection."""
 
     type: Literal["jog_ended"] = "jog_ended"
     drive: str
@@ -221,7 +220,7 @@ class JogEnded(Message):
 
 
 class JogGap(Message):
-    """The signs of life of a jog had a gap: the axis brakes, or goes on after it."""
+    """Gap in the renewals of a jog: the axis brakes, or continues after the gap."""
 
     type: Literal["jog_gap"] = "jog_gap"
     drive: str
@@ -230,7 +229,7 @@ class JogGap(Message):
 
 
 class ScopeInfo(Message):
-    """How a subscription's channels are sampled; again whenever that changes."""
+    """How a subscription's channels are sampled; sent again whenever that changes."""
 
     type: Literal["scope_info"] = "scope_info"
     subscription: int
@@ -239,7 +238,7 @@ class ScopeInfo(Message):
 
 
 class ScopeChannelInfo(Message):
-    """Name, unit and timing of one trace."""
+    """Name, unit and timing of one channel."""
 
     drive: str
     key: str
@@ -254,7 +253,7 @@ class ScopeChannelInfo(Message):
 
 
 class Logged(Message):
-    """A new entry of the tool's log."""
+    """A new entry of the station's log."""
 
     type: Literal["log"] = "log"
     entry: LogEntry
@@ -269,7 +268,7 @@ class Refused(Message):
 
 
 class StopTaken(Message):
-    """STOP has sent its quick stop; what it reached follows as ``stop_result``."""
+    """STOP has sent its quick stop; its verdict follows as ``stop_result``."""
 
     type: Literal["stop_taken"] = "stop_taken"
     drives: list[str]

@@ -1,4 +1,4 @@
-"""What a bench reports its pages: made once for all that look."""
+"""Messages about the bench, made once for all pages that watch."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from backend.work.jobs import Job
 
 
 def state(bench: Bench, drive: str, snapshot: Snapshot) -> BaseModel | None:
-    """An axis, unless its drive has left the bench."""
+    """State of an axis; None if its drive has left the bench."""
     connected = bench.connected_drives.get(drive)
     if connected is None:
         return None
@@ -20,7 +20,7 @@ def state(bench: Bench, drive: str, snapshot: Snapshot) -> BaseModel | None:
 
 
 def values(bench: Bench, drive: str, keys: frozenset[str]) -> BaseModel | None:
-    """What was read of these parameters, unless the drive has left the bench."""
+    """Last readings of these parameters; None if the drive has left the bench."""
     connected = bench.connected_drives.get(drive)
     if connected is None or not keys:
         return None
@@ -29,7 +29,7 @@ def values(bench: Bench, drive: str, keys: frozenset[str]) -> BaseModel | None:
 
 
 def drive_list(bench: Bench, connection: str | None) -> BaseModel:
-    """The drives as the holder of this connection sees them; as a stranger without one."""
+    """The drives as seen from this connection; without one, as seen without control."""
     connected_drives = bench.connected_drives.values()
     return DrivesChanged(
         drives=[convert.drive_summary(bench, m, connection) for m in connected_drives]
@@ -37,5 +37,5 @@ def drive_list(bench: Bench, connection: str | None) -> BaseModel:
 
 
 def job_state(job: Job) -> BaseModel:
-    """A job as it is now."""
+    """Current state of a job."""
     return JobChanged(job=convert.job(job))

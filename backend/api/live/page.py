@@ -1,4 +1,4 @@
-"""What those who look after people need of a live connection."""
+"""Interface of a live connection, as used by the code about people."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from drivers.texts.message import Text
 
 
 class Page(Protocol):
-    """What is needed of a live connection."""
+    """A live connection, without its transport."""
 
     id: str
     identity: Identity
     page: str
     since: datetime
-    #: Monotonic time of the last message; infinite while one is being carried out.
+    #: Monotonic time of the last message; infinite while a message is being carried out.
     heard: float
 
     def send(self, message: BaseModel | Shared) -> None:
@@ -29,4 +29,4 @@ class Page(Protocol):
         """Send the newest state of something."""
 
     def release(self, drive: str | None, reason: Text) -> None:
-        """End jogs of this page: of one axis, or all."""
+        """End jogs of this page: of one axis, or of all."""

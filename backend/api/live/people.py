@@ -39,12 +39,12 @@ from backend.station.bench import Bench
 from backend.tools.jog.release import END_OF_ENABLING, end_of_enabling
 from drivers.texts.message import prose, text
 
-#: Lines of a page's chat at once, and a second: nobody talks the log full.
+#: Chat lines of a page: burst, and lines per second; limited so that nobody floods the log.
 _TALK = (10.0, 1.0)
 
 
 class PeopleLive:
-    """What all live connections share about people."""
+    """Requests about people, for all live connections."""
 
     def __init__(self, bench: Bench, people: People, pages: Mapping[str, Page]) -> None:
         self._bench, self._people, self._pages = bench, people, pages
@@ -61,14 +61,14 @@ class PeopleLive:
     # --- who is here ------------------------------------------------------------------
 
     def changed(self) -> None:
-        """Who is here, or what a guest may do, has changed."""
+        """Send all pages the people who are here and what guests may do."""
         for page in list(self._pages.values()):
             page.later("people", "", Shared(partial(self.views.view, page)))
 
     def left(self, page: Page) -> None:
-        """A page is gone: what it moved stops, what it held is free.
+        """Stop what a page moved and free what it held, after it has gone.
 
-        Each step whatever becomes of the others: a defect in a report must not leave a motion.
+        The steps are independent: an error in a report must not leave a motion running.
         """
         with contextlib.ExitStack() as then:
             then.callback(self.changed)
@@ -79,7 +79,7 @@ class PeopleLive:
             self._support.release_all(page.id, END_OF_ENABLING["connection-lost"])
 
     def _fell_silent(self, page: Page) -> None:
-        """A page says nothing any more, though its line may look open for some seconds yet."""
+        """Stop what a silent page moves and free its axes; its line may look open for seconds."""
         self._motions.let_go(page, text("api-live.fell-silent"))
         why = text("work.page-not-reachable", silent_s=SILENT_END_S)
         if self._bench.leases.held_by(page.id):
@@ -130,7 +130,7 @@ class PeopleLive:
                 self._to_others(page, f"cursor {request.plot}", cursor)
 
     def _to_others(self, page: Page, kind: str, message: BaseModel) -> None:
-        """Pointers coalesce: only where it is now is of interest."""
+        """Send to all other pages; pointers coalesce, as only the newest position matters."""
         shared = only(message)
         for other in list(self._pages.values()):
             if other.id != page.id:
@@ -162,5 +162,5 @@ class PeopleLive:
         )
 
     async def run(self) -> None:
-        """Let end what ends by itself, for as long as the server lives."""
+        """Watch for timeouts and silent pages, for as long as the server runs."""
         await self._watch.run()

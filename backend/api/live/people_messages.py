@@ -13,9 +13,9 @@ from backend.tools.jog.release import ReleaseOfPage
 from backend.tools.wire_message import MessageInfo
 
 Name = Annotated[str, Field(max_length=100)]
-#: A place on a page, 0 at the left and top, 1 at the right and bottom of its content.
+#: Position on a page: 0 at the left and top, 1 at the right and bottom of its content.
 Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
-#: Plots on which cursors are shared. A closed list: others keep one place for each of them.
+#: Plots on which cursors are shared. A closed list: other pages keep one position for each of them.
 PlotName = Literal[
     "scope", "spectrum", "response", "prediction", "step", "predicted_step", "excitation"
 ]
@@ -31,7 +31,7 @@ class LeaseAsk(Message):
 
 
 class LeaseAnswer(Message):
-    """The holder's answer to whoever asks."""
+    """The holder's answer to a request for control."""
 
     type: Literal["lease_answer"] = "lease_answer"
     drive: Name
@@ -39,7 +39,7 @@ class LeaseAnswer(Message):
 
 
 class LeaseHand(Message):
-    """Hand control to another connection, for good or for a time, after which it comes back."""
+    """Hand control to another connection, permanently or for a time, after which it returns."""
 
     type: Literal["lease_hand"] = "lease_hand"
     drive: Name
@@ -48,9 +48,9 @@ class LeaseHand(Message):
 
 
 class LeaseOverride(Message):
-    """Take control from whoever has it; what moves is stopped first. For administrators.
+    """Take control from its holder; running motion is stopped first. For administrators.
 
-    From a guest, everybody who may invite can take it.
+    Control held by a guest can be taken by everybody who may invite.
     """
 
     type: Literal["lease_override"] = "lease_override"
@@ -58,14 +58,14 @@ class LeaseOverride(Message):
 
 
 class Where(Message):
-    """The page that this person looks at, as in the address after the #."""
+    """The page that this person views, as in the address after the #."""
 
     type: Literal["where"] = "where"
     page: str = Field(max_length=200)
 
 
 class Pointer(Message):
-    """Where this person points on their page; null when they do not."""
+    """Position at which this person points on their page; null if they do not point."""
 
     type: Literal["pointer"] = "pointer"
     x: Share | None
@@ -73,12 +73,11 @@ class Pointer(Message):
 
 
 class PlotCursor(Message):
-    """Where on a plot this person points, in what its axis shows; null when they do not.
+    """Position at which this person points on a plot; null if they do not point.
 
-    On the scope, its spectrogram and its X-Y plot that is the time of the samples (``t0_s``),
-    which is the same on every page whatever each of them shows and counts as zero; elsewhere the
-    frequency in Hz or the time in s. ``y`` is the frequency in Hz where the spectrogram is pointed
-    at, else null.
+    On the scope, its spectrogram and its X-Y plot ``x`` is the time of the samples (``t0_s``),
+    which is the same on every page regardless of its zero and range; elsewhere it is the frequency
+    [Hz] or the time [s]. ``y`` is the frequency [Hz] on the spectrogram, otherwise null.
     """
 
     type: Literal["plot_cursor"] = "plot_cursor"
@@ -88,7 +87,7 @@ class PlotCursor(Message):
 
 
 class Chat(Message):
-    """A line for everybody on the station."""
+    """A chat line for everybody on the station."""
 
     type: Literal["chat"] = "chat"
     text: str = Field(min_length=1, max_length=500)
@@ -109,7 +108,7 @@ class EnableRenew(Message):
 
 
 class EnableRelease(Message):
-    """The enabling button was let go."""
+    """The enabling button was released."""
 
     type: Literal["enable_release"] = "enable_release"
     invitation: Name
@@ -134,7 +133,7 @@ PeopleRequest = (
 
 
 class PersonHere(Message):
-    """Somebody whose page is open. ``holds`` are the axes that they control."""
+    """A person whose page is open. ``holds`` are the axes that they control."""
 
     connection: str
     person: str
@@ -146,7 +145,7 @@ class PersonHere(Message):
 
 
 class GrantView(Message):
-    """What a guest may do, until when, on which axis (null: on all)."""
+    """Rights of a guest, until when, and on which axis (null: on all)."""
 
     rights: list[Right]
     until: datetime
@@ -155,7 +154,7 @@ class GrantView(Message):
 
 
 class InvitationView(Message):
-    """An invitation. ``code`` is shown to those who may invite; ``enabled``: the button is held."""
+    """An invitation. ``code`` is for people who may invite; ``enabled``: the button is held."""
 
     id: str
     guest: str
@@ -175,7 +174,7 @@ class InvitationView(Message):
 
 
 class PeopleHere(Message):
-    """Who is connected, and what guests may do. ``rights`` are those of this connection now."""
+    """People who are connected, and invitations. ``rights`` are those of this connection now."""
 
     type: Literal["people"] = "people"
     people: list[PersonHere]
@@ -184,7 +183,7 @@ class PeopleHere(Message):
 
 
 class LeaseNotice(Message):
-    """Something about control that this person must notice."""
+    """Notice about control for the person of this connection."""
 
     type: Literal["lease_notice"] = "lease_notice"
     drive: str
@@ -193,7 +192,7 @@ class LeaseNotice(Message):
 
 
 class PointerMoved(Message):
-    """Somebody else's pointer."""
+    """Pointer of another person."""
 
     type: Literal["pointer_moved"] = "pointer_moved"
     connection: str
@@ -204,7 +203,7 @@ class PointerMoved(Message):
 
 
 class CursorMoved(Message):
-    """Somebody else's cursor on a plot."""
+    """Cursor of another person on a plot."""
 
     type: Literal["cursor_moved"] = "cursor_moved"
     connection: str

@@ -1,4 +1,4 @@
-"""No motion outlives the page or the right that it was begun with."""
+"""Ends motion whose page is gone or whose person has lost the right to it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from drivers.texts.message import Text, text
 
 
 class PeopleMotions:
-    """Of all live connections of a server."""
+    """Motions of people, for all live connections of a server."""
 
     def __init__(self, bench: Bench, people: People, pages: Mapping[str, Page]) -> None:
         self._bench, self._pages = bench, pages
@@ -28,11 +28,11 @@ class PeopleMotions:
         self._support.on_disabled.append(self._disabled)
 
     def end(self, page: Page, what: Text, why: Text) -> None:
-        """What this page moves comes to its end because of ``why``; ``what`` became of it."""
+        """End the motion jobs of a page because of ``why``; ``what`` has happened to the page."""
         for job in self._bench.jobs.all():
             own = job.actor is not None and job.actor.connection == page.id
-            # A jog ends by its own dead-man, with its ramp; and a second cancelling would disturb
-            # the cleanup of the first.
+            # A jog ends by its own dead-man timeout, with its ramp; and a second cancellation would
+            # disturb the cleanup of the first.
             if not own or not _moves(job) or job.kind == "jog" or job.id in self._ending:
                 continue
             line = text("api-live.job-ended-with-page", job_title=job.title_text, what=what)
@@ -41,9 +41,9 @@ class PeopleMotions:
             self._spawn(self._cancel(job, why))
 
     def let_go(self, page: Page, what: Text) -> None:
-        """Nothing stays enabled that nobody looks after: not what this page enabled and left so.
+        """Disable the axes that a page enabled and left unattended.
 
-        Whoever controls or moves the axis by now looks after it from here on.
+        If somebody else controls or moves the axis, they become responsible for it instead.
         """
         for connected in self._bench.connected_drives.values():
             if connected.axis.enabled_by != page.id:
@@ -66,7 +66,7 @@ class PeopleMotions:
             self._ending.discard(job.id)
 
     def _disabled(self, invitation: Invitation, why: Text) -> None:
-        """A guest may not move anything from now on: what moves stops."""
+        """Stop what a guest moves or enabled, after the grant or the button's hold has ended."""
         session = invitation.session
         self._record.note(
             "invitation",
@@ -83,7 +83,7 @@ class PeopleMotions:
             for job in self._bench.jobs.all()
             if _moves(job) and job.drive and _session_of(job) == session
         }
-        # What the guest left enabled or overrules, whether or not they took control of the axis.
+        # Axes that the guest left enabled or forced, whether or not they had control.
         drives |= self._bench.authority.drives_of(session)
         for page in guests:
             drives |= {d for d in self._bench.leases.held_by(page.id) if self._is_enabled(d)}
@@ -92,7 +92,7 @@ class PeopleMotions:
         self._stop(drives, invitation.guest, why)
 
     def _job(self, job: Job) -> None:
-        """A guest's motion that began just as the button was let go."""
+        """Stop a guest's motion that began just as the enabling button was released."""
         actor = job.actor
         if actor is None or not actor.identity.is_guest or not _moves(job) or not job.drive:
             return

@@ -1,4 +1,4 @@
-"""Who is here, and which invitations there are, as each page may see it."""
+"""Views of the people and invitations, as each page may see them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from backend.station.bench import Bench
 
 
 class PeopleViews:
-    """Over all live connections of a server."""
+    """What each page is shown of people and invitations, for all live connections of a server."""
 
     def __init__(self, bench: Bench, people: People, pages: Mapping[str, Page]) -> None:
         self._bench, self._people, self._pages = bench, people, pages
@@ -39,7 +39,7 @@ class PeopleViews:
         )
 
     def here(self, session: str, connection: str | None = None) -> list[PersonHere]:
-        """Everybody whose page is open, seen from a connection or else from a session."""
+        """All people with open pages; ``me`` is set by connection, or by session without one."""
         return [
             PersonHere(
                 connection=other.id,
@@ -56,7 +56,7 @@ class PeopleViews:
         ]
 
     def invitations(self, identity: Identity) -> list[InvitationView]:
-        """Invitations that this person may see: a guest only the own one."""
+        """Invitations that this person may see: a guest sees only their own."""
         host = Right.INVITE in identity.rights
         return [
             self.invitation(each, host=host, identity=identity)
@@ -65,7 +65,7 @@ class PeopleViews:
         ]
 
     def invitation(self, each: Invitation, *, host: bool, identity: Identity) -> InvitationView:
-        """One invitation; the code only for those who invite."""
+        """One invitation; with the code only for people who may invite."""
         grant = self._support.running(each)
         return InvitationView(
             id=each.id,
@@ -92,7 +92,7 @@ class PeopleViews:
 
 
 def chat_line(said: Said) -> ChatLine:
-    """A line as it is sent."""
+    """A chat line as a message."""
     return ChatLine(
         number=said.number,
         time=_moment(said.time),

@@ -1,8 +1,8 @@
-"""Scope subscriptions of one live connection: bounded, counted, and kept alive as buses change.
+"""Scope subscriptions of one live connection: bounded, counted, and renewed when buses change.
 
-A subscription may be carried by several streams: what the cyclic exchange brings with every cycle,
-and what is polled. When an exchange starts or ends, or a drive comes back, the streams are made
-again by themselves and the page is informed with another ScopeInfo.
+A subscription may consist of several streams: channels that the cyclic exchange carries in every
+cycle, and channels that are polled. When an exchange starts or ends, or a drive comes back, the
+streams are made again and the page gets another ScopeInfo.
 """
 
 from __future__ import annotations
@@ -24,14 +24,15 @@ from backend.scope.units import axis_scale
 from backend.station.bench import Bench
 from drivers.errors import Busy, DriveError
 
-#: Subscriptions of one connection, and requests that may wait.
+#: Limits of one connection: subscriptions, and waiting requests.
 MOST_SUBSCRIPTIONS = 32
 MOST_REQUESTS = 200
-#: A page that takes no block for this long is cut off; what it missed is counted until then.
+#: A page that accepts no block for this long [s] is disconnected; lost
+#: samples are counted until then.
 SEND_TIMEOUT_S = 10.0
-#: Bytes of blocks that one frame carries at most, but for its last block.
+#: Size limit of a frame [bytes]; the last block may exceed it.
 FRAME_BYTES = 256 * 1024
-#: The gearing of a mute drive must not keep the samples of the others waiting.
+#: Timeout [s]: reading the gearing of a mute drive must not delay the samples of the others.
 UNITS_TIMEOUT_S = 2.0
 
 _Streams = list[tuple[Subscription, tuple[int, ...]]]
@@ -40,7 +41,7 @@ SendBytes = Callable[[bytes], Awaitable[None]]
 
 @dataclass(slots=True)
 class _Running:
-    """A subscription. ``signature`` changes when its streams must be made again."""
+    """A running subscription. Its streams must be made again when ``signature`` changes."""
 
     request: ScopeStart
     signature: object
@@ -58,18 +59,19 @@ class ScopeStreams:
         self._notify = notify
         self._send = send
         self._running: dict[int, _Running] = {}
-        #: Ending a poll may take as long as a mute drive; STOP and jog never wait for that.
+        #: Requests run on a task of their own: ending a poll may wait for a mute drive,
+        #: and STOP and jog must not.
         self._requests: asyncio.Queue[ScopeStart | ScopeStop | None] = asyncio.Queue(MOST_REQUESTS)
-        #: A block of any stream waits to be sent.
+        #: Set when a block of any stream is waiting.
         self._ready = asyncio.Event()
         self._stuck = False
         self._changed = False
 
     def request(self, request: ScopeStart | ScopeStop) -> None:
-        """Begin or end a subscription, in the order asked for.
+        """Begin or end a subscription, in the order of the requests.
 
         Raises:
-            Busy: the page asks faster than it can be served.
+            Busy: too many requests are waiting.
         """
         try:
             self._requests.put_nowait(request)
@@ -81,14 +83,14 @@ class ScopeStreams:
             ) from error
 
     def bench_changed(self) -> None:
-        """Drives or exchanges changed; streams that this concerns are made again."""
+        """Make the streams again that depend on a changed drive or exchange."""
         if not self._changed:
             self._changed = True
-            with contextlib.suppress(asyncio.QueueFull):  # whatever waits there sees it as well
+            with contextlib.suppress(asyncio.QueueFull):  # a waiting request handles it as well
                 self._requests.put_nowait(None)
 
     async def run(self) -> None:
-        """Serve requests until cancelled; returns when the page takes no more samples."""
+        """Serve requests until cancelled; returns when the page accepts no more samples."""
         pump = asyncio.create_task(self._pump(), name=f"scope-{self._name}")
         try:
             while not self._stuck:
@@ -104,7 +106,7 @@ class ScopeStreams:
             pump.cancel()
 
     async def close(self) -> None:
-        """End all; nothing more is sent, however long the ends take."""
+        """End all subscriptions; nothing more is sent, however long the ends take."""
         for subscription in list(self._running):
             await self._stop(subscription)
 
@@ -127,13 +129,13 @@ class ScopeStreams:
             streams = await self._subscribe(request)
         except DriveError as error:
             self._refuse(request, error)
-            # It is tried again when the bench changes: a drive may come back.
+            # It is tried again when the bench changes: the drive may come back.
             self._running[request.subscription] = _Running(request, signature, [])
             return
         try:
             described = await self._described(request, streams)
         except BaseException as error:
-            # The page, or a drive, went meanwhile: nothing must be polled for it any more.
+            # The page or a drive has gone in the meantime: nothing must be polled for it any more.
             for stream, _ in streams:
                 await self._bench.scope.unsubscribe(stream)
             if not isinstance(error, DriveError):
@@ -169,7 +171,7 @@ class ScopeStreams:
         return streams
 
     def _signature(self, request: ScopeStart) -> object:
-        """What the streams depend on: which axis object answers, and what its bus carries."""
+        """What the streams depend on: identity of the axis objects, and of their exchanges."""
         found: list[object] = []
         for channel in request.channels:
             connected = self._bench.connected_drives.get(channel.drive)
@@ -218,7 +220,7 @@ class ScopeStreams:
         return result
 
     async def _units(self, drive: str) -> AxisUnits | None:
-        """None where the gearing cannot be read: then the drive's own unit is shown."""
+        """Units of an axis; None if the gearing is unreadable: the drive's own unit is shown."""
         with contextlib.suppress(DriveError, TimeoutError):
             async with asyncio.timeout(UNITS_TIMEOUT_S):
                 return await self._bench.connected(drive).axis.units()
@@ -227,7 +229,7 @@ class ScopeStreams:
     # --- samples ----------------------------------------------------------------------
 
     async def _pump(self) -> None:
-        """Send what has come of all streams, together: a frame costs more than what is in it."""
+        """Send the waiting blocks of all streams together: a frame costs more than its content."""
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
             while True:
                 await self._ready.wait()
@@ -240,12 +242,12 @@ class ScopeStreams:
                         self._stuck = True
                         self.bench_changed()  # wakes `run`, which ends the connection
                         return
-                    # A send that need not wait gives nobody else a turn: without this one all
-                    # that is queued would go to a line that broke, before anyone is reported.
+                    # A send that need not wait yields to no other task: without this line, all
+                    # queued blocks would go to a broken line before any task is notified of it.
                     await asyncio.sleep(0)
 
     def _waiting(self) -> bytes:
-        """Blocks that wait, oldest of each stream first; empty without any."""
+        """Waiting blocks, oldest first within each stream; empty if there are none."""
         blocks: list[bytes] = []
         size = 0
         for subscription, running in self._running.items():

@@ -1,4 +1,4 @@
-"""A block of samples as a binary frame of the live connection; `live_messages` has the form."""
+"""Encoding of a block of samples as a binary frame (format: `backend.api.live.messages`)."""
 
 from __future__ import annotations
 
@@ -14,14 +14,18 @@ HEADER = struct.Struct("<IIIIHHIdd")
 """Magic, subscription, sequence, dropped, rows, columns, flags, t0 [s], dt [s]."""
 
 TRUE_TIMES, BASES = 1, 2
-#: Integers beyond this have no exact float32.
+#: Above this magnitude not every integer has an exact float32.
 _EXACT = 2.0**24
 
 
 def encode_block(
     subscription: int, block: ScopeBlock, numbers: tuple[int, ...], count: int, place: int = 0
 ) -> bytes:
-    """A block as a binary frame (see live_messages); columns of other streams are NaN."""
+    """Encode a block as a binary frame; columns of channels in other streams are NaN.
+
+    ``numbers`` are the columns of the block's channels among ``count``; ``place`` is
+    the number of the stream.
+    """
     rows = len(block.samples)
     values: npt.NDArray[np.float64] = np.full((rows, count), np.nan)
     values[:, list(numbers)] = block.samples
@@ -33,7 +37,8 @@ def encode_block(
         extra = block.times_s.astype("<f8").tobytes()
     largest = np.abs(values, where=~np.isnan(values), out=np.zeros_like(values))
     if rows and largest.max() > _EXACT:
-        # A multi-turn position: its change within a block has an exact float32, itself has not.
+        # A multi-turn position: float32 represents its change within a block exactly,
+        # but not the value itself.
         flags |= BASES
         bases = np.nan_to_num(values[0]).astype("<f8")
         values = values - bases

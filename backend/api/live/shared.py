@@ -1,4 +1,4 @@
-"""Messages for many pages, made and encoded once however many look."""
+"""Messages for many pages, made and encoded once."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pydantic import BaseModel
 
 
 class Shared:
-    """A message that the first page to send it makes; the others take the same text.
+    """Message that is made when the first page sends it; the others send the same text.
 
-    ``make`` may return None where there is nothing to report any more.
+    ``make`` may return None if there is nothing to report any more.
     """
 
     def __init__(self, make: Callable[[], BaseModel | None]) -> None:
@@ -19,7 +19,7 @@ class Shared:
 
     @property
     def text(self) -> str | None:
-        """As it goes over the line."""
+        """The message as JSON text; None if there is nothing to send."""
         if self._make is not None:
             message, self._make = self._make(), None
             self._text = None if message is None else message.model_dump_json()
@@ -27,5 +27,5 @@ class Shared:
 
 
 def only(message: BaseModel) -> Shared:
-    """A message that is there already."""
+    """Wrap a message that is made already."""
     return Shared(lambda: message)

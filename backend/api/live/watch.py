@@ -1,4 +1,4 @@
-"""What ends by itself: silent pages, hand-overs, grants, the enabling button, sessions."""
+"""Timeouts: silent pages, hand-overs, grants, the enabling button, sessions."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-#: With the quarter second between looks, a silent connection loses control within `SILENT_END_S`,
-#: and what moves by its command ends.
+#: With the quarter second between checks, a silent connection loses control within `SILENT_END_S`,
+#: and motion that it commanded ends. [s]
 SILENCE_S = 1.7
 _LOOK_S, _HOLD_LOOK_S, _TEND_S = 0.25, 0.02, 5.0
-#: A page that was not heard for this long, in s, has lost control: what people are shown.
+#: Silence after which a page has lost control [s], as shown to people.
 SILENT_END_S = 2.0
 
 
 class PeopleWatch:
-    """Looks after all live connections; ``fell_silent`` is called with each that says nothing."""
+    """Watches all live connections; ``fell_silent`` is called with each that has gone silent."""
 
     def __init__(
         self,
@@ -38,11 +38,11 @@ class PeopleWatch:
     ) -> None:
         self._bench, self._people, self._pages = bench, people, pages
         self._fell_silent = fell_silent
-        #: An enabling button was pressed: from then on it is looked after 50 times a second.
+        #: Set when an enabling button is pressed; while it is held it is checked 50 times a second.
         self.hold_pressed = asyncio.Event()
 
     async def run(self) -> None:
-        """For as long as the server lives."""
+        """Run the checks for as long as the server runs."""
         async with asyncio.TaskGroup() as group:
             group.create_task(self._look(), name="people")
             group.create_task(self._watch_holds(), name="enabling")
@@ -74,7 +74,7 @@ class PeopleWatch:
 
     async def _tend(self) -> None:
         while self._people.accounts_needed:
-            # The database may be away for a while; who is known stays known.
+            # The database may be unreachable for a while; the accounts in memory stay valid.
             with _going_on(), contextlib.suppress(DriveError):
                 await self._people.accounts.tend()
             await asyncio.sleep(_TEND_S)
@@ -82,7 +82,7 @@ class PeopleWatch:
 
 @contextlib.contextmanager
 def _going_on() -> Iterator[None]:
-    """One defect must not end the watch over everything that moves: it is logged."""
+    """Log an error instead of raising it: one error must not end the watch over all motion."""
     try:
         yield
     except Exception:

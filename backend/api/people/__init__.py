@@ -1,1 +1,1 @@
-"""Accounts, sessions, and people who are here."""
+"""Routes of accounts, sessions, tokens, and of people who are connected."""

@@ -1,4 +1,4 @@
-"""Routes of accounts and of the tokens that scripts log in with."""
+"""Routes of accounts, and of tokens for scripts."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ router = APIRouter()
 
 @router.get("/tokens")
 async def tokens(people: ThePeople, me: Me) -> list[TokenInfo]:
-    """Tokens for scripts: the own ones; for an administrator all."""
+    """List tokens for scripts: one's own; for an administrator all."""
     accounts = people.accounts
     return [
         _token(accounts, each) for each in accounts.directory.tokens(whose_sessions(accounts, me))
@@ -51,7 +51,7 @@ def _token(accounts: Accounts, token: Token) -> TokenInfo:
 
 @router.post("/tokens", status_code=201)
 async def make_token(people: ThePeople, record: TheRecord, me: Me, body: NewToken) -> MadeToken:
-    """Make a token for a script. It can do no more than its owner."""
+    """Make a token for a script. Its rights are limited to those of its owner."""
     account = own_account(people.accounts, me)
     secret, token = await people.accounts.make_token(
         account.id, body.name, frozenset(body.scopes), timedelta(days=body.days)
@@ -98,7 +98,7 @@ async def revoke_token(people: ThePeople, record: TheRecord, me: Me, token_id: s
 
 @router.get("/accounts")
 async def accounts(people: ThePeople, me: Me) -> list[AccountInfo]:
-    """Who may log in."""
+    """List the accounts."""
     return [_account(people.accounts, each, me) for each in people.accounts.directory.all()]
 
 
@@ -119,7 +119,7 @@ def _account(accounts: Accounts, account: Account, me: Identity) -> AccountInfo:
 async def add_account(
     people: ThePeople, record: TheRecord, me: Me, body: NewAccount
 ) -> AccountInfo:
-    """Make an account."""
+    """Add an account."""
     people.require_accounts()
     made = await people.accounts.add(body.name, body.password, body.role)
     record.note(
@@ -137,7 +137,7 @@ async def add_account(
 async def change_account(
     people: ThePeople, record: TheRecord, me: Me, account_id: int, body: AccountChange
 ) -> AccountInfo:
-    """Change role or password; with the password all sessions of the account end."""
+    """Change role or password; a new password ends all sessions of the account."""
     known = people.accounts.directory.account(account_id)
     before = known.role
     if body.role is not None:

@@ -1,4 +1,4 @@
-"""Models of the routes about people."""
+"""Messages of the routes about people."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from backend.people.passwords import MAX_LENGTH
 from backend.people.rights import Right, Role
 
 PersonName = Annotated[str, Field(min_length=1, max_length=60)]
-#: Checked by `backend.people.passwords`; here only kept from being endless.
+#: Checked by `backend.people.passwords`; only its length is limited here.
 Password = Annotated[str, Field(min_length=1, max_length=MAX_LENGTH)]
 Code = Annotated[str, Field(min_length=1, max_length=40)]
 
 
 class Session(Message):
-    """Who is asking, and what they may do. ``csrf`` goes into a header of every change."""
+    """The person of this session and their rights. ``csrf`` is sent in a header of every change."""
 
     person: str | None
     role: Role | None
@@ -39,7 +39,7 @@ class LogIn(Message):
 
 
 class SetUp(Message):
-    """The first administrator; ``code`` is in the terminal of the machine."""
+    """The first administrator; ``code`` is the set-up code in the terminal of the machine."""
 
     code: Code
     name: PersonName
@@ -47,14 +47,14 @@ class SetUp(Message):
 
 
 class JoinAsGuest(Message):
-    """The secret of an invitation's link, and the code that was reported."""
+    """The secret of an invitation's link, and the code given to the guest."""
 
     link: Annotated[str, Field(min_length=1, max_length=100)]
     code: Code
 
 
 class AccountInfo(Message):
-    """Somebody who may log in."""
+    """An account, with its numbers of sessions and tokens."""
 
     id: int
     name: str
@@ -74,21 +74,21 @@ class NewAccount(Message):
 
 
 class AccountChange(Message):
-    """Another role, or another password; null leaves it."""
+    """New role or new password; null leaves the value unchanged."""
 
     role: Role | None = None
     password: Password | None = None
 
 
 class PasswordChange(Message):
-    """The own password."""
+    """Present and new password of one's own account."""
 
     present: Password
     password: Password
 
 
 class SessionInfo(Message):
-    """A log-in that is still valid."""
+    """A log-in session that is still valid."""
 
     id: str
     person: str
@@ -111,7 +111,7 @@ class TokenInfo(Message):
 
 
 class NewToken(Message):
-    """A token for scripts."""
+    """A token to make: name, scopes and lifetime."""
 
     name: PersonName
     scopes: list[Right] = Field(min_length=1, max_length=len(Right))
@@ -119,14 +119,14 @@ class NewToken(Message):
 
 
 class MadeToken(Message):
-    """A new token. ``secret`` is shown this once."""
+    """A new token. ``secret`` is shown only here."""
 
     token: TokenInfo
     secret: str
 
 
 class NewInvitation(Message):
-    """An invitation for one guest."""
+    """An invitation for one guest: rights that may be granted, and lifetime."""
 
     guest: PersonName
     allowed: list[Right] = Field(default=[], max_length=len(Right))
@@ -134,14 +134,14 @@ class NewInvitation(Message):
 
 
 class MadeInvitation(Message):
-    """A new invitation. ``link`` is the part of the address after the #, shown this once."""
+    """A new invitation. ``link`` is the part of the address after the #, shown only here."""
 
     invitation: InvitationView
     link: str
 
 
 class NewGrant(Message):
-    """Let a guest do more for some minutes, on one axis or (null) on all."""
+    """Rights for a guest for some minutes, on one axis or (null) on all."""
 
     rights: list[Right] = Field(min_length=1, max_length=len(Right))
     minutes: float = Field(ge=0.2, le=480, allow_inf_nan=False)
@@ -149,7 +149,7 @@ class NewGrant(Message):
 
 
 class PeopleList(Message):
-    """Who is connected."""
+    """People who are connected."""
 
     people: list[PersonHere]
 

@@ -1,4 +1,4 @@
-"""What people do to one another is reported twice: in the log of the session, and in the audit."""
+"""Recording of actions of people, in the log of the session and in the audit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drivers.texts.message import Text
 
 
 class PeopleRecord:
-    """Writes both."""
+    """Writes to log and audit."""
 
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
@@ -33,7 +33,7 @@ class PeopleRecord:
         old: str | None = None,
         new: str | None = None,
     ) -> None:
-        """``line`` is for the log; the audit keeps the rest."""
+        """Record an action: ``line`` is for the log, the other arguments are for the audit."""
         self._bench.journal.add(line, level=level, drive=drive, person=person or "")
         connected = self._bench.connected_drives.get(drive) if drive else None
         axis = connected.drive.name if connected else ""

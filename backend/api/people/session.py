@@ -1,4 +1,4 @@
-"""Routes of the log-in: who asks, first set-up, password, sessions."""
+"""Routes of the log-in: current session, first set-up, password, sessions."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ router = APIRouter()
 
 @router.get("/session")
 async def session(request: Request, people: ThePeople) -> Session:
-    """Who is asking. On a station without accounts the one user is administrator."""
+    """Read the current session. On a station without accounts its person is administrator."""
     brought = credentials(request.scope)
     identity = people.identify(brought.cookie, brought.bearer)
     return session_of(people, identity, brought.cookie)
@@ -42,7 +42,7 @@ async def session(request: Request, people: ThePeople) -> Session:
     responses={200: {"content": {"application/x-x509-ca-cert": {}}}},
 )
 async def certificate(request: Request, bench: TheBench) -> Response:
-    """The certificate of the station's authority, for a phone or computer that is to trust it."""
+    """Download the certificate of the station's authority, for a device that is to trust it."""
     file = authority_file(bench.state_folder)
     if request.url.scheme != "https" or not await asyncio.to_thread(file.is_file):
         raise NotFound("api-people.no-authority")
@@ -57,7 +57,7 @@ async def certificate(request: Request, bench: TheBench) -> Response:
 async def log_in(
     request: Request, response: Response, people: ThePeople, record: TheRecord, body: LogIn
 ) -> Session:
-    """Log in. Wrong tries are answered later and later."""
+    """Log in. Each wrong try lengthens the wait."""
     people.require_accounts()
     try:
         secret, begun = await people.accounts.log_in(
@@ -107,7 +107,7 @@ async def log_out(people: ThePeople, record: TheRecord, me: Me) -> Response:
 async def set_up(
     request: Request, response: Response, people: ThePeople, record: TheRecord, body: SetUp
 ) -> Session:
-    """Make the first administrator, with the code that is in the terminal."""
+    """Make the first administrator, with the code that is shown in the terminal."""
     people.require_accounts()
     secret, begun = await people.accounts.set_up(
         body.code, body.name, body.password, address_of(request), client_of(request)
@@ -129,7 +129,7 @@ async def set_up(
 async def change_password(
     request: Request, people: ThePeople, record: TheRecord, me: Me, body: PasswordChange
 ) -> Response:
-    """Change the own password; other sessions of the account end."""
+    """Change one's own password; other sessions of the account end."""
     account = own_account(people.accounts, me)
     await people.accounts.require_password(account.id, body.present, address_of(request))
     await people.accounts.set_password(account.id, body.password, keep=me.session)
@@ -145,7 +145,7 @@ async def change_password(
 
 @router.get("/sessions")
 async def sessions(people: ThePeople, me: Me) -> list[SessionInfo]:
-    """Log-ins that are valid: the own ones; for an administrator all."""
+    """List valid log-in sessions: one's own; for an administrator all."""
     accounts = people.accounts
     return [
         SessionInfo(
@@ -163,7 +163,7 @@ async def sessions(people: ThePeople, me: Me) -> list[SessionInfo]:
 
 @router.delete("/sessions/{session_id}", status_code=204)
 async def end_session(people: ThePeople, record: TheRecord, me: Me, session_id: str) -> Response:
-    """End a log-in at once: an own one, or as an administrator anybody's."""
+    """End a log-in session at once: one's own, or as an administrator anybody's."""
     accounts = people.accounts
     found = next(
         (

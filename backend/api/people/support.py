@@ -1,4 +1,4 @@
-"""Routes of those who are here, and of guests who help from elsewhere."""
+"""Routes of connected people, and of guests for remote support."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ TheLive = Annotated[LiveHub, Depends(_live_of)]
 
 @router.get("/people")
 async def people_here(live: TheLive, me: Me) -> PeopleList:
-    """Who is connected."""
+    """List the people who are connected."""
     return PeopleList(people=live.people.views.here(me.session))
 
 
 @router.get("/chat")
 async def chat(people: ThePeople) -> ChatLog:
-    """The last lines of the chat."""
+    """Read the last lines of the chat."""
     return ChatLog(lines=[chat_line(said) for said in people.support.chat()])
 
 
@@ -60,7 +60,7 @@ async def chat(people: ThePeople) -> ChatLog:
 async def join(
     request: Request, response: Response, people: ThePeople, record: TheRecord, body: JoinAsGuest
 ) -> Session:
-    """Come in as a guest, by the link and the code of an invitation."""
+    """Join as a guest, by the link and the code of an invitation."""
     people.require_accounts()
     try:
         secret, invitation = people.support.join(body.link, body.code, address_of(request))
@@ -88,7 +88,7 @@ async def join(
 
 @router.get("/invitations")
 async def invitations(live: TheLive, me: Me) -> list[InvitationView]:
-    """Invitations since the server was started, newest first."""
+    """List invitations since the server was started, newest first."""
     return live.people.views.invitations(me)
 
 
@@ -96,7 +96,7 @@ async def invitations(live: TheLive, me: Me) -> list[InvitationView]:
 async def invite(
     people: ThePeople, live: TheLive, record: TheRecord, me: Me, body: NewInvitation
 ) -> MadeInvitation:
-    """Invite a guest. The link and the code go to them by different ways."""
+    """Invite a guest. Link and code are to be sent by different ways."""
     people.require_accounts()
     if me.kind == "token":
         raise Forbidden("api-people.script-invites-nobody")
@@ -127,7 +127,7 @@ async def invite(
 async def revoke_invitation(
     people: ThePeople, live: TheLive, record: TheRecord, me: Me, invitation_id: str
 ) -> InvitationView:
-    """End an invitation; its guest is out at once and what they move stops."""
+    """End an invitation: the guest's session ends at once and what they move stops."""
     ended = people.support.revoke(invitation_id, text("people.end-by-person", person=me.person))
     record.note(
         "invitation",
@@ -149,7 +149,7 @@ async def grant(
     invitation_id: str,
     body: NewGrant,
 ) -> InvitationView:
-    """Let a guest do more for some minutes. One cannot give what one does not have."""
+    """Grant a guest rights for some minutes. Nobody can grant a right that they do not have."""
     for right in body.rights:
         require_right(people, me, right, body.drive)
     if body.drive is not None:

@@ -1,1 +1,1 @@
-"""The commissioning report."""
+"""Routes of the commissioning report."""

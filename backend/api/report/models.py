@@ -11,7 +11,7 @@ from backend.api.models import Message
 
 
 class ReportRequest(Message):
-    """What goes into the report of an axis."""
+    """Contents of the report of an axis."""
 
     format: Literal["html", "pdf"] = "pdf"
     language: Literal["en", "zh"] = "en"

@@ -59,7 +59,7 @@ async def make_report(bench: TheBench, connected: TheDrive, request: ReportReque
         condition = await bench.records.store.call(records_of(bench).condition, axis)
         whole = replace(whole, condition=condition)
     except DatabaseFailed as error:
-        # All else of the report is in files: it is made without the database, and names that.
+        # All else in the report comes from files: it is made without the database, and states that.
         whole = replace(whole, trouble=(*whole.trouble, error.text))
     data = await asyncio.to_thread(render, whole, request.language, request.format)
     file = await asyncio.to_thread(_store(bench).save, connected.drive.name, request.format, data)
@@ -71,10 +71,11 @@ async def make_report(bench: TheBench, connected: TheDrive, request: ReportReque
 def _chosen(
     bench: Bench, connected: ConnectedDrive, asked: list[str] | None, first: datetime | None
 ) -> list[tuple[str, str]]:
-    """Files of the report, each with the one it is compared with.
+    """Files of the report, each with the one that it is compared with.
 
     Raises:
-        NotFound: there is no such file. NotAllowed: it is of another drive.
+        NotFound: there is no such file.
+        NotAllowed: it is of another drive.
     """
     heads: dict[str, Head] = {}
     for name in bench.measurements.names() if asked is None else asked:
@@ -90,7 +91,7 @@ def _chosen(
             raise NotAllowed("api-report.not-measured", drive=connected.drive.name, value=name)
     if asked is None or len({kind_of(head) for head in heads.values()}) == len(heads):
         return choose(heads, first)
-    # Chosen by hand: of two of a kind the older one is what the newer is compared with.
+    # Chosen by a person: of two of a kind, the newer is compared with the older.
     return choose(heads, max(head.saved for head in heads.values()))
 
 
@@ -103,13 +104,13 @@ def _info(bench: Bench, file: str) -> ReportInfo:
 
 @router.get("/reports")
 async def list_reports(bench: TheBench) -> list[ReportInfo]:
-    """Stored reports, newest first."""
+    """List stored reports, newest first."""
     return [_info(bench, name) for name in _store(bench).names()]
 
 
 @router.get("/reports/{name}", response_class=Response)
 async def read_report(bench: TheBench, name: str) -> Response:
-    """The file, to be shown in the browser."""
+    """Read a report, for display in the browser."""
     try:
         data = await asyncio.to_thread(_store(bench).read, name)
     except NotAllowed as error:
@@ -117,7 +118,7 @@ async def read_report(bench: TheBench, name: str) -> Response:
     form: Format = "html" if name.endswith(".html") else "pdf"
     headers = disposition("inline", name)
     if form == "html":
-        # Whatever a file in this folder contains, it runs nothing and belongs to no origin.
+        # A file of this folder, whatever it contains, must run nothing and belong to no origin.
         headers["Content-Security-Policy"] = (
             "default-src 'none'; style-src 'unsafe-inline'; sandbox allow-modals"
         )
@@ -126,7 +127,7 @@ async def read_report(bench: TheBench, name: str) -> Response:
 
 @router.delete("/reports/{name}", status_code=204)
 async def delete_report(bench: TheBench, name: str) -> None:
-    """Delete a file."""
+    """Delete a report."""
     try:
         _store(bench).delete(name)
     except NotAllowed as error:

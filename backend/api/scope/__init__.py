@@ -1,1 +1,1 @@
-"""Scope set-ups, recordings, rerun and the 3D scene."""
+"""Routes of scope set-ups, recordings, the rerun viewer and the 3D scene."""

@@ -1,4 +1,4 @@
-"""Messages of the scope's set-ups and snapshots."""
+"""Messages of scope set-ups and snapshots."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ TraceId = Annotated[str, Field(pattern=r"^[cm][0-9]{1,3}$")]
 
 
 class ScopeTrace(Message):
-    """A channel that is shown. ``show``: the drive's own unit, the axis' unit, or one's own,
-    which is (drive's value × ``factor`` + ``offset``) in ``unit``.
+    """A channel that is displayed.
+
+    ``show`` selects the drive's unit, the axis' unit, or ``own``: drive's value × ``factor`` +
+    ``offset``, in ``unit``.
     """
 
     id: TraceId
@@ -27,7 +29,7 @@ class ScopeTrace(Message):
 
 
 class ScopeMath(Message):
-    """A computed channel over the shown values of others (docs/scope.md has the language)."""
+    """A channel computed from the displayed values of others (language: docs/scope.md)."""
 
     id: TraceId
     name: str = Field(max_length=60)
@@ -36,8 +38,10 @@ class ScopeMath(Message):
 
 
 class ScopeTrigger(Message):
-    """When the picture is taken. ``drive`` is for ``fault`` and ``motion``, ``trace`` for all
-    other kinds; ``before`` is the part of the window before the trigger.
+    """Trigger of the scope.
+
+    ``drive`` is for the kinds ``fault`` and ``motion``, ``trace`` for all others; ``before`` is the
+    fraction of the window before the trigger.
     """
 
     mode: Literal["off", "auto", "normal", "single"] = "off"
@@ -54,7 +58,7 @@ class ScopeTrigger(Message):
 
 
 class ScopeRange(Message):
-    """A fixed y scale for the traces of one unit; without one they fill the plot."""
+    """A fixed y scale for the traces of one unit; without one, they are scaled to the plot."""
 
     unit: str = Field(max_length=40)
     low: Finite
@@ -68,7 +72,7 @@ class ScopeRange(Message):
 
 
 class ScopeSetup(Message):
-    """Everything that is set on the Scope page."""
+    """All settings of the Scope page."""
 
     traces: list[ScopeTrace] = Field(default=[], max_length=32)
     maths: list[ScopeMath] = Field(default=[], max_length=16)
@@ -96,7 +100,7 @@ class SnapshotTrace(Message):
 
 
 class SnapshotHeader(Message):
-    """Head of a snapshot file. ``origin_s`` is the time that was shown as zero."""
+    """Header of a snapshot file. ``origin_s`` is the time that was displayed as zero."""
 
     created: datetime
     notes: str = Field(default="", max_length=4000)
@@ -106,7 +110,7 @@ class SnapshotHeader(Message):
 
 
 class SnapshotInfo(Message):
-    """A snapshot of the list; ``header`` is null where the file is not usable."""
+    """A stored snapshot; ``header`` is null if the file is not usable."""
 
     name: str
     bytes: int

@@ -21,7 +21,10 @@ class RecordChannel(Message):
 
 
 class RecordTrigger(Message):
-    """When a recording begins. ``rising``, ``falling`` and ``change`` look at a recorded signal."""
+    """Condition for a recording to begin.
+
+    ``rising``, ``falling`` and ``change`` refer to a recorded signal.
+    """
 
     kind: Literal["rising", "falling", "change", "fault"]
     drive: str = Field(default="", description="fault: empty for any drive")
@@ -31,7 +34,7 @@ class RecordTrigger(Message):
 
 
 class StartRecording(Message):
-    """What to record."""
+    """Settings of a recording."""
 
     name: str = Field(default="", max_length=100, description="empty: the date and time")
     channels: list[RecordChannel] = Field(min_length=1, max_length=64)
@@ -57,7 +60,7 @@ class RecordedChannel(Message):
 
 
 class RecordedAxis(Message):
-    """An axis as it was when the recording began."""
+    """An axis at the start of the recording."""
 
     drive: str
     name: str
@@ -69,7 +72,7 @@ class RecordedAxis(Message):
 
 
 class RecordingInfo(Message):
-    """A recording of the list, running or stored."""
+    """A running or stored recording."""
 
     name: str
     state: Literal["waiting", "recording", "complete", "interrupted", "failed", "unusable"]
@@ -91,7 +94,7 @@ class RecordingInfo(Message):
 
 
 class RecordingList(Message):
-    """Recordings, newest first, and the room that is left."""
+    """Recordings, newest first, and the free space."""
 
     recordings: list[RecordingInfo]
     free_bytes: int
@@ -100,14 +103,14 @@ class RecordingList(Message):
 
 
 class RetentionBounds(Message):
-    """When the oldest recordings are deleted; null: never."""
+    """Limits above which the oldest recordings are deleted; null: no limit."""
 
     max_total_bytes: int | None = Field(ge=1_000_000)
     keep_days: float | None = Field(gt=0)
 
 
 class ChangeRecording(Message):
-    """What people write about a recording; absent things stay."""
+    """Remarks on a recording; values that are left out stay unchanged."""
 
     notes: str | None = Field(default=None, max_length=4000)
     tags: list[str] | None = Field(default=None, max_length=20)
@@ -115,7 +118,7 @@ class ChangeRecording(Message):
 
 
 class RecordingEvent(Message):
-    """Something that happened during a recording; seconds since its first sample."""
+    """An event during a recording; ``t_s`` counts from its first sample."""
 
     t_s: float
     kind: str
@@ -125,7 +128,7 @@ class RecordingEvent(Message):
 
 
 class RecordedParameter(Message):
-    """A setting at the start of a recording."""
+    """A parameter value at the start of a recording."""
 
     key: str
     name: str
@@ -137,7 +140,7 @@ class RecordedParameter(Message):
 
 
 class RecordingDetail(Message):
-    """A recording with its events and the settings of its axes."""
+    """A recording with its events and the parameter values of its axes."""
 
     info: RecordingInfo
     events: list[RecordingEvent]
@@ -156,7 +159,7 @@ class RecordedTrace(Message):
 
 
 class RecordedSamples(Message):
-    """Samples of a stretch of a recording, every one as it was recorded."""
+    """All samples of one section of a recording, without decimation."""
 
     start: datetime = Field(description="time of the first sample of the recording")
     from_s: float
@@ -183,12 +186,12 @@ class BundleList(Message):
 
 
 class ArmRequest(Message):
-    """Whether a fault freezes the last seconds."""
+    """Whether a fault makes a support bundle of the last seconds."""
 
     armed: bool
 
 
 class BundleRequest(Message):
-    """Why a support bundle is made."""
+    """Reason for making a support bundle."""
 
     reason: str = Field(default="asked for", min_length=1, max_length=200)

@@ -189,7 +189,7 @@ def _existing(recordings: Recordings, name: str) -> Path:
 async def list_recordings(
     recordings: TheRecordings, search: Annotated[str, Query(max_length=200)] = ""
 ) -> RecordingList:
-    """Running and stored recordings that contain every word of ``search``."""
+    """List running and stored recordings that contain every word of ``search``."""
     running = list(recordings.running.values())
     stored = await asyncio.to_thread(
         recordings.library.entries, search, [recorder.name for recorder in running]
@@ -207,7 +207,7 @@ async def list_recordings(
 
 @router.post("/recordings", status_code=201)
 async def start_recording(recordings: TheRecordings, request: StartRecording) -> RecordingInfo:
-    """Begin a recording, or begin to wait for its trigger."""
+    """Start a recording, or start to wait for its trigger."""
     trigger = request.trigger
     recorder = await recordings.start(
         Settings(
@@ -229,7 +229,7 @@ async def start_recording(recordings: TheRecordings, request: StartRecording) ->
 
 @router.put("/recordings/retention")
 async def set_retention(recordings: TheRecordings, request: RetentionBounds) -> RetentionBounds:
-    """Set when the oldest recordings are deleted."""
+    """Set the limits above which the oldest recordings are deleted."""
     before = recordings.library.retention
     note_before(max_total_bytes=before.max_total_bytes, keep_days=before.keep_days)
     recordings.library.set_retention(
@@ -240,7 +240,7 @@ async def set_retention(recordings: TheRecordings, request: RetentionBounds) -> 
 
 @router.get("/recordings/{name}")
 async def get_recording(recordings: TheRecordings, name: str) -> RecordingDetail:
-    """A recording with its events and the settings of its axes when it began."""
+    """Read a recording with its events and the parameter values of its axes at the start."""
     info = await _info(recordings, name)
     if info.state in ("waiting", "recording", "unusable"):
         return RecordingDetail(info=info, events=[], parameters={})
@@ -274,7 +274,7 @@ async def get_samples(
     from_s: Annotated[float, Query(ge=0.0, description="since the first sample")] = 0.0,
     duration_s: Annotated[float, Query(gt=0.0, le=60.0)] = 10.0,
 ) -> RecordedSamples:
-    """A stretch of a stored recording as numbers, for programs; whole ones are exported."""
+    """Read a section of a stored recording as numbers; to get all of it, export it."""
     path = _existing(recordings, name)
     recordings.require_ended(name)
     return await asyncio.to_thread(_samples, path, from_s, from_s + duration_s)
@@ -299,7 +299,7 @@ def _samples(path: Path, from_s: float, until_s: float) -> RecordedSamples:
 def _trace(
     channel: Channel, blocks: list[Samples], first_s: float, from_s: float, until_s: float
 ) -> RecordedTrace:
-    """One signal in the unit that the scope shows, samples outside of the stretch left out."""
+    """Samples of one signal within the section, in the unit that the scope shows."""
     times: list[float] = []
     values: list[float | None] = []
     for block in (each for each in blocks if each.stream == channel.stream):
@@ -322,7 +322,7 @@ def _trace(
 async def change_recording(
     recordings: TheRecordings, name: str, request: ChangeRecording
 ) -> RecordingInfo:
-    """Write notes or tags on a stored recording, or protect it from retention."""
+    """Change notes or tags of a stored recording, or protect it from retention."""
     _existing(recordings, name)
     recordings.require_ended(name)
     tags = None if request.tags is None else tuple(request.tags)
@@ -342,7 +342,7 @@ async def delete_recording(recordings: TheRecordings, name: str) -> Response:
 
 @router.post("/recordings/{name}/stop")
 async def stop_recording(recordings: TheRecordings, name: str) -> RecordingInfo | None:
-    """End a recording; null where its trigger had not come, so that nothing was kept."""
+    """End a recording; null if its trigger had not occurred, so that nothing was stored."""
     recorder = await recordings.stop(name)
     if not recorder.path.exists():
         return None
@@ -351,7 +351,7 @@ async def stop_recording(recordings: TheRecordings, name: str) -> RecordingInfo 
 
 @router.post("/recordings/{name}/trigger")
 async def trigger_recording(recordings: TheRecordings, name: str) -> RecordingInfo:
-    """Begin a waiting recording although its trigger did not come."""
+    """Start a waiting recording although its trigger has not occurred."""
     recorder = recordings.active(name)
     recorder.trigger_now()
     return _running(recordings, recorder)
@@ -359,7 +359,7 @@ async def trigger_recording(recordings: TheRecordings, name: str) -> RecordingIn
 
 @router.get("/recordings/{name}/file", response_class=FileResponse)
 async def download_recording(recordings: TheRecordings, name: str) -> FileResponse:
-    """The recording's own file."""
+    """Download the recording file."""
     path = _existing(recordings, name)
     recordings.require_ended(name)
     return FileResponse(path, media_type="application/octet-stream", filename=path.name)
@@ -367,14 +367,14 @@ async def download_recording(recordings: TheRecordings, name: str) -> FileRespon
 
 @router.post("/recordings/{name}/exports/{kind}")
 async def export_recording(recordings: TheRecordings, name: str, kind: ExportKind) -> JobInfo:
-    """Write a recording in another format, in a process of its own."""
+    """Export a recording to another format, in a separate process."""
     _existing(recordings, name)
     return convert.job(recordings.export(name, kind))
 
 
 @router.get("/recordings/{name}/exports/{kind}", response_class=FileResponse)
 async def download_export(recordings: TheRecordings, name: str, kind: ExportKind) -> FileResponse:
-    """A finished export."""
+    """Download a finished export."""
     path = recordings.library.export_path(name, kind)
     if not path.is_file():
         raise NotFound("api-scope.not-exported-yet", value=path.name)
@@ -386,7 +386,7 @@ async def download_export(recordings: TheRecordings, name: str, kind: ExportKind
 
 @router.get("/bundles")
 async def list_bundles(capture: TheCapture) -> BundleList:
-    """Support bundles that faults or people made."""
+    """List support bundles made by faults or people."""
     rows = [
         BundleInfo(
             name=name,
@@ -400,7 +400,7 @@ async def list_bundles(capture: TheCapture) -> BundleList:
 
 @router.put("/bundles/armed")
 async def arm_capture(capture: TheCapture, request: ArmRequest) -> ArmRequest:
-    """Say whether a fault freezes the last seconds."""
+    """Set whether a fault makes a support bundle of the last seconds."""
     note_before(armed=capture.armed)
     capture.armed = request.armed
     return request
@@ -423,13 +423,13 @@ def _bundle(capture: FaultCapture, name: str) -> Path:
 
 @router.get("/bundles/{name}", response_class=FileResponse)
 async def download_bundle(capture: TheCapture, name: str) -> FileResponse:
-    """The zip."""
+    """Download a support bundle (zip)."""
     path = _bundle(capture, name)
     return FileResponse(path, media_type="application/zip", filename=path.name)
 
 
 @router.delete("/bundles/{name}", status_code=204)
 async def delete_bundle(capture: TheCapture, name: str) -> Response:
-    """Delete a bundle."""
+    """Delete a support bundle."""
     _bundle(capture, name).unlink()
     return Response(status_code=204)

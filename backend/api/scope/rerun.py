@@ -1,4 +1,4 @@
-"""rerun's viewer from our own origin: its files, the page around it, and the live feed."""
+"""The rerun viewer served from our own origin: its files, the page around it, and the live feed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from backend.station.recording.rerun_feed import RerunFeed
 from drivers.errors import NotAllowed
 
 _FOLDER = Path(__file__).resolve().parents[2] / "recording" / "viewer"
-#: The viewer is WebAssembly; only here may the browser compile it.
+#: The viewer is WebAssembly; the browser may compile it on this page only.
 _POLICY = (
     "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'; "
     "img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; worker-src 'self' blob:; "
@@ -23,13 +23,13 @@ _POLICY = (
 )
 _HEADERS = {"Content-Security-Policy": _POLICY, "Cache-Control": "no-cache"}
 _FOREVER = "public, max-age=31536000, immutable"
-#: A page that has not pulled for this long has gone without saying so.
+#: Time [s] without a request for a frame after which a page counts as gone.
 SILENT_S = 60.0
 SEND_TIMEOUT_S = 10.0
 
 
 def install(app: FastAPI, feed: RerunFeed, assets: ViewerAssets) -> None:
-    """Add the routes."""
+    """Add the routes of the viewer."""
 
     @app.get("/rerun/", include_in_schema=False)
     async def viewer() -> Response:

@@ -1,4 +1,4 @@
-"""Routes of the scope's named set-ups and snapshots."""
+"""Routes of named scope set-ups and snapshots."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ TheStore = Annotated[ScopeStore, Depends(_store)]
 
 @router.get("/scope/setups")
 async def list_scope_setups(store: TheStore) -> list[NamedSetup]:
-    """Named set-ups; those that an older or newer version wrote differently are left out."""
+    """List named set-ups; those in the format of another version are left out."""
     found = []
     for each in await asyncio.to_thread(store.setups):
         try:
@@ -46,14 +46,14 @@ async def list_scope_setups(store: TheStore) -> list[NamedSetup]:
 
 @router.put("/scope/setups/{name}", status_code=204)
 async def save_scope_setup(store: TheStore, name: str, setup: ScopeSetup) -> Response:
-    """Keep a set-up under a name, in place of an earlier one of that name."""
+    """Store a set-up under a name, replacing an earlier one of that name."""
     await asyncio.to_thread(store.save_setup, name, setup.model_dump())
     return Response(status_code=204)
 
 
 @router.delete("/scope/setups/{name}", status_code=204)
 async def delete_scope_setup(store: TheStore, name: str) -> Response:
-    """Forget a set-up."""
+    """Delete a set-up."""
     try:
         await asyncio.to_thread(store.delete_setup, name)
     except NotAllowed as error:
@@ -71,7 +71,7 @@ def _info(stored: StoredSnapshot) -> SnapshotInfo:
 
 @router.get("/scope/snapshots")
 async def list_scope_snapshots(store: TheStore) -> list[SnapshotInfo]:
-    """Snapshots, newest first."""
+    """List snapshots, newest first."""
     return [_info(each) for each in await asyncio.to_thread(store.snapshots)]
 
 
@@ -105,7 +105,7 @@ async def save_scope_snapshot(store: TheStore, name: str, request: Request) -> S
 
 @router.get("/scope/snapshots/{name}", response_class=Response)
 async def read_scope_snapshot(store: TheStore, name: str) -> Response:
-    """A snapshot's file."""
+    """Download a snapshot file."""
     try:
         data = await asyncio.to_thread(store.snapshot, name)
     except NotAllowed as error:

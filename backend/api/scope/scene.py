@@ -1,8 +1,8 @@
-"""The 3D scene from our own origin: viser's page, and its websocket passed through.
+"""The 3D scene served from our own origin: viser's page, and its websocket relayed.
 
-viser listens on loopback only and has no log-in, so nobody reaches it but through here. Nothing
-that a page sends is passed on: the scene is for looking, and viser would open a tunnel to a server
-on the internet for who asks for one.
+viser listens on loopback only and has no log-in, so that it can be reached only through here.
+Nothing that a page sends is relayed: the scene is for viewing, and viser would open a tunnel to a
+server on the internet for any client that requests one.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from websockets.typing import Subprotocol
 from backend.scene.feed import SceneFeed
 
 SEND_TIMEOUT_S = 10.0
-#: viser's own panel shows its internals (scene tree, server address) and covers a phone's screen.
+#: viser's own panel shows internals (scene tree, server address) and covers a phone's screen.
 _NO_PANEL = (
     "<style>.mantine-Paper-root:not(.mantine-Notification-root){display:none!important}</style>"
 )
-#: viser makes ready to sort Gaussian splats, which no scene of ours has, and its sorter makes code
-#: from text. The policy refuses that, as it would refuse whatever else came as text; what is left
-#: is an error in the console that is none.
+#: viser prepares to sort Gaussian splats, which our scenes do not contain, and its sorter generates
+#: code from text. The policy refuses that, as it refuses all other code from text; this script
+#: hides the resulting error in the console, which has no effect.
 _NO_SPLATS = (
     "<script>addEventListener('unhandledrejection',(e)=>{"
     "if(e.reason instanceof EvalError)e.preventDefault()})</script>"
@@ -40,7 +40,7 @@ _SCRIPT = re.compile(r"<script[^>]*>(.*?)</script>", re.DOTALL)
 
 
 def install(app: FastAPI, feed: SceneFeed) -> None:
-    """Add the routes."""
+    """Add the routes of the scene."""
 
     @app.get("/viser/", include_in_schema=False)
     async def scene_page() -> Response:
@@ -63,7 +63,7 @@ def install(app: FastAPI, feed: SceneFeed) -> None:
 
 
 async def _pass_on(socket: WebSocket, port: int, protocol: str) -> None:
-    """viser's messages to the page, until either ends or the page does not take them."""
+    """Relay viser's messages to the page, until either ends or the page stops receiving."""
     with contextlib.suppress(OSError, WebSocketException, WebSocketDisconnect, TimeoutError):
         async with connect(
             f"ws://127.0.0.1:{port}",
@@ -89,21 +89,22 @@ async def _pass_on(socket: WebSocket, port: int, protocol: str) -> None:
 
 
 async def _until_gone(socket: WebSocket) -> None:
-    """Throw away what the page sends, until it leaves."""
+    """Discard what the page sends, until it leaves."""
     while (await socket.receive())["type"] != "websocket.disconnect":
         pass
 
 
 def _protocol() -> str:
-    """viser's client and server must be of one version; the subprotocol shows."""
+    """Subprotocol with viser's version: client and server must be of the same one."""
     return f"viser-v{version('viser')}"
 
 
 @cache
 def _page() -> tuple[str, str]:
-    """viser's own page, and a policy that lets run what is in it and nothing else.
+    """viser's own page, and a policy that allows the scripts in it and nothing else.
 
-    It unpacks itself: a packed script inserts the real one, which may not be named by its hash.
+    ``strict-dynamic`` is needed because the page unpacks itself: a packed script inserts the real
+    one, which cannot be allowed by its hash.
     """
     spec = find_spec("viser")
     if spec is None or spec.origin is None:

@@ -1,1 +1,1 @@
-"""The checks before every route: rights, sessions, origin, sizes, rates."""
+"""Checks before every route: rights, sessions, origin, sizes, rates."""

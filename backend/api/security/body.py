@@ -1,4 +1,4 @@
-"""Bodies that are too large or too slow are refused, whatever a route would do with them."""
+"""Limits on the size and duration of request bodies, independent of the route."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from collections.abc import Iterable
 
 from starlette.types import Message, Receive
 
-#: A body of up to 1 MiB arrives within this time, a file within the longer one.
+#: Time limits [s]: for bodies of up to 1 MiB, and for files.
 BODY_S = 15.0
 FILE_S = 120.0
 _SMALL = 1 << 20
 
 
 class BodyRefused(Exception):
-    """Raised into the application while it reads; the gate answers in its place."""
+    """Raised in the application while it reads the body; the gate then makes the answer."""
 
     def __init__(self, status: int) -> None:
         super().__init__(f"body refused ({status})")
@@ -24,11 +24,12 @@ class BodyRefused(Exception):
 
 
 def framing(headers: Iterable[tuple[bytes, bytes]]) -> tuple[str | None, bool]:
-    """Content-Length as it was sent, and whether the body comes in chunks.
+    """Return Content-Length as sent, and whether the body is chunked.
 
     Raises:
-        BodyRefused: both, or one of them twice. Who stands in front may end the body elsewhere
-            than we do, and take its rest for another request (RFC 9112 clause 6.3, 11.2).
+        BodyRefused: both headers, or one of them twice. A proxy in front could end the
+        body at another place than we do, and treat the rest as another request (RFC
+        9112 clauses 6.3 and 11.2).
     """
     lengths = [value for key, value in headers if key == b"content-length"]
     codings = [value for key, value in headers if key == b"transfer-encoding"]
@@ -37,15 +38,15 @@ def framing(headers: Iterable[tuple[bytes, bytes]]) -> tuple[str | None, bool]:
     return (lengths[0].decode("latin-1") if lengths else None), bool(codings)
 
 
-#: A character beyond U+FFFF is written as two of these in JSON; one alone is none.
+#: In JSON, a character beyond U+FFFF is written as two of these; a single one is not a character.
 _HALF = re.compile(rb"\\u[dD][89a-fA-F]")
 
 
 def has_half_characters(body: bytes) -> bool:
-    """Whether a JSON has half of a surrogate pair in one of its strings.
+    """Whether one of the strings in a JSON text contains half of a surrogate pair.
 
-    Python reads it, but no file, database or answer can hold it: it is refused before anything
-    keeps it. What is no JSON is none here; its route says so.
+    Python reads it, but no file, database or answer can contain it, so it is refused before it is
+    stored. For text that is not JSON the answer is False; its route refuses it.
     """
     if not _HALF.search(body):
         return False
@@ -67,7 +68,7 @@ def has_half_characters(body: bytes) -> bool:
 
 
 class MeasuredBody:
-    """The receiving side of a request, with a limit and a deadline. ``refused`` is the status."""
+    """Receiving side of a request, with size limit and deadline. ``refused``: status, or 0."""
 
     def __init__(
         self, receive: Receive, limit_bytes: int, declared: str | None, chunked: bool
@@ -84,19 +85,19 @@ class MeasuredBody:
             self.refused = 413 if declared.isdigit() else 400
 
     def require_accepted(self) -> None:
-        """Nothing has been refused so far.
+        """Check that the body has not been refused so far.
 
         Raises:
-            BodyRefused: something has.
+            BodyRefused: it has.
         """
         if self.refused:
             raise BodyRefused(self.refused)
 
     async def receive(self) -> Message:
-        """The next message for the application.
+        """Return the next message for the application.
 
         Raises:
-            BodyRefused: too large (413), too slow (408), or with half of a character (422).
+            BodyRefused: too large (413), too slow (408), or with half a character (422).
         """
         if self._ended:
             return await self._receive()

@@ -1,8 +1,9 @@
-"""The gate: every request and websocket passes here before any code of a route runs.
+"""The gate: checks every request and websocket before any code of a route runs.
 
-In this order: meant for us (Host, Origin), declared (`backend.api.security.rights`), known (cookie
-or token), has the right, comes from our page (CSRF token), has control of the axis, body in bounds.
-What passes runs with `acting` set, so that whatever it starts knows whose it is.
+The order of the checks: address (Host, Origin), identity (cookie or token), declared route
+(`backend.api.security.rights`), right, control of the axis, CSRF token of a change, size of
+the body. An admitted request runs with `acting` set, so that everything it starts is
+attributed to its person.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ from drivers.texts.message import text
 log = logging.getLogger(__name__)
 
 COOKIE, SECURE_COOKIE = "servodeck", "__Host-servodeck"
-#: By which a browser is known that has logged in before; see `backend.people.login.devices`.
+#: Cookie of a browser that has logged in before; see `backend.people.login.devices`.
 DEVICE_COOKIE, SECURE_DEVICE_COOKIE = "servodeck-device", "__Host-servodeck-device"
 CSRF_HEADER = "x-servodeck-csrf"
 CONNECTION_HEADER = "x-servodeck-connection"
@@ -72,7 +73,7 @@ HEADERS = {
 
 @dataclass(frozen=True, slots=True)
 class Credentials:
-    """What a request brought to be known by."""
+    """Cookies and token that a request was sent with."""
 
     cookie: str | None
     bearer: str | None
@@ -83,7 +84,7 @@ def credentials(scope: Scope) -> Credentials:
     """Cookie and bearer token of a request.
 
     Raises:
-        Forbidden: a header is there twice.
+        Forbidden: the Authorization header occurs twice.
     """
     headers = scope["headers"]
     bearer = header(headers, b"authorization")
@@ -109,7 +110,7 @@ def credentials(scope: Scope) -> Credentials:
 
 @dataclass(frozen=True, slots=True)
 class _Admitted:
-    """A request that may go on: whose it is, and what it may take."""
+    """An admitted request: its person, and limits on its body."""
 
     actor: Actor | None
     body_bytes: int
@@ -118,7 +119,7 @@ class _Admitted:
 
 
 class Gate:
-    """Wraps the application."""
+    """Middleware that makes the checks."""
 
     def __init__(
         self,
@@ -140,7 +141,7 @@ class Gate:
             self._headers["Strict-Transport-Security"] = "max-age=31536000"
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """One request, websocket or the lifespan."""
+        """Handle one request, one websocket or the lifespan."""
         if scope["type"] == "http":
             await self._http(scope, receive, send)
         elif scope["type"] == "websocket":
@@ -152,7 +153,7 @@ class Gate:
 
     async def _http(self, scope: Scope, receive: Receive, send: Send) -> None:
         begun = False
-        # Before it waits for its turn or its body: STOP goes past both.
+        # Set before it waits for its turn or its body: a STOP in the meantime takes precedence.
         arrived_s.set(time.monotonic())
 
         async def dressed(message: Message) -> None:
@@ -178,7 +179,7 @@ class Gate:
         except DriveError as error:
             refused = answer_error(error)
             if isinstance(error, TooOften):
-                # Its body is not waited for: the connection's place is for somebody else.
+                # The body is not awaited: the connection is closed to make room for others.
                 refused.headers["Connection"] = "close"
             await refused(scope, receive, dressed)
         except Exception as error:
@@ -189,7 +190,7 @@ class Gate:
 
     async def _run(self, scope: Scope, body: MeasuredBody, send: Send, actor: Actor | None) -> None:
         async def unless_refused(message: Message) -> None:
-            # The application may have turned the refusal into an answer of its own.
+            # The application may have replaced the refusal by an answer of its own.
             body.require_accepted()
             await send(message)
 
@@ -200,7 +201,7 @@ class Gate:
             acting.reset(token)
 
     def _is_somebodys_stop(self, scope: Scope) -> bool:
-        """STOP of whoever may: it goes past everything else that waits."""
+        """Whether this is a STOP that is permitted; it bypasses all queues."""
         if not self._policy.is_stop(scope["method"], scope["path"]):
             return False
         brought = credentials(scope)
@@ -208,10 +209,10 @@ class Gate:
         return (known or self._people.may_stop(brought.cookie)) is not None
 
     def _admit(self, scope: Scope) -> _Admitted:
-        """Who may go on.
+        """Check whether the request may continue.
 
         Raises:
-            DriveError: nobody may, and why.
+            DriveError: it may not, and why.
         """
         method, path = scope["method"], scope["path"]
         self._check_place(scope, changes=method not in _SAFE)
@@ -229,7 +230,7 @@ class Gate:
         connection = self._own_connection(scope, identity)
         named = header(scope["headers"], CONNECTION_HEADER.encode())
         if connection is None:
-            # Routes trust the header, so one that is not true does not reach them.
+            # Routes trust this header, so a wrong one is removed.
             scope["headers"] = [
                 (key, value) for key, value in scope["headers"] if key != CONNECTION_HEADER.encode()
             ]
@@ -273,7 +274,9 @@ class Gate:
         return NotFound("api-security.nothing", path=path)
 
     def _require_csrf(self, scope: Scope, identity: Identity | None, brought: Credentials) -> None:
-        """A cookie comes by itself; this token only our own page can read and send.
+        """Check the CSRF token of a change.
+
+        Browsers send cookies by themselves, but only our own page can read and send this token.
 
         Raises:
             Forbidden: it is missing or of another session.
@@ -287,17 +290,17 @@ class Gate:
             )
 
     def _own_connection(self, scope: Scope, identity: Identity | None) -> str | None:
-        """The live connection that a request names, if it is one of the same session."""
+        """The live connection that a request names, if it belongs to the same session."""
         named = header(scope["headers"], CONNECTION_HEADER.encode())
         if named is None or identity is None:
             return None
         return named if self._sockets.owner(named) == identity.session else None
 
     def _require_present(self, named: str | None) -> None:
-        """What a page asked is not done when it arrives after the page has gone.
+        """Refuse a change that arrives after its page has gone.
 
-        A network that hangs delivers a request half a minute late, when the person who pressed
-        may already stand at the machine. Programs name no connection.
+        A network that hangs may deliver a request half a minute late, when the person who pressed
+        may already be at the machine. Programs name no connection.
 
         Raises:
             NotAllowed: the live connection that the request names has ended.
@@ -328,7 +331,7 @@ class Gate:
                 self._require(matched, identity, None)
             self._sockets.require_room("" if identity is None else identity.session)
         except DriveError as refusal:
-            # Before it is accepted, this becomes an HTTP answer with status 403.
+            # Before the websocket is accepted, this becomes an HTTP answer with status 403.
             await send({"type": "websocket.close", "code": 1008, "reason": refusal.message[:100]})
             return
         if identity is None:
@@ -344,7 +347,7 @@ class Gate:
 
 
 def require_right(people: People, identity: Identity, right: Right, drive: str | None) -> None:
-    """This person may do this now.
+    """Check that this person may do this now.
 
     Raises:
         Forbidden: they may not, and why.

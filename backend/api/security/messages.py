@@ -1,4 +1,4 @@
-"""What every message of the live websocket needs. What is not here is refused to everybody."""
+"""Rights that the messages of the live websocket need. A message that is not listed is refused."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from backend.people.identity import Identity
 from backend.people.rights import Right
 from backend.people.station import People
 
-#: ``always``: whoever is connected, also a viewer and also when the session has just ended.
-#: ``control``: whoever may hold the control of this axis now.
+#: ``always``: everybody with a connection, including viewers and just after the session has ended.
+#: ``control``: everybody who may control this axis now.
 MessageNeed = Right | Literal["always", "control"]
 
 MESSAGES: dict[type[Message], MessageNeed] = {
@@ -26,13 +26,13 @@ MESSAGES: dict[type[Message], MessageNeed] = {
     live.WatchValues: Right.LOOK,
     live.ScopeStart: Right.LOOK,
     live.ScopeStop: Right.LOOK,
-    # Only keeps what `JogStart` of the same connection was allowed to begin.
+    # Only continues what `JogStart` of the same connection was allowed to begin.
     live.JogRenew: Right.LOOK,
     live.JogStart: Right.MOTION,
     live.LeaseTake: "control",
     people_live.LeaseAsk: "control",
     people_live.LeaseOverride: "control",
-    # The leases themselves ask for the holder.
+    # The leases themselves check that the sender is the holder.
     people_live.LeaseAnswer: Right.LOOK,
     people_live.LeaseHand: Right.LOOK,
     people_live.Where: Right.LOOK,
@@ -46,7 +46,7 @@ MESSAGES: dict[type[Message], MessageNeed] = {
 
 
 def require_message(people: People, identity: Identity, message: Message) -> None:
-    """This person may send this now.
+    """Check that this person may send this message now.
 
     Raises:
         Forbidden: they may not, and why.

@@ -1,4 +1,4 @@
-"""Whether a request was meant for us: Host (DNS rebinding), Origin and fetch metadata."""
+"""Check that a request is addressed to us: Host (DNS rebinding), Origin and fetch metadata."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _HOST = re.compile(r"(?P<name>\[[^\[\]@]*\]|[^:\[\]@]*)(:\d{1,5})?")
 
 
 def header(headers: Iterable[tuple[bytes, bytes]], name: bytes) -> str | None:
-    """The value of a header, or None.
+    """Return the value of a header, or None.
 
     Raises:
-        Forbidden: it is there twice; who reads which could not be known.
+        Forbidden: it occurs twice, so that a proxy and we might read different values.
     """
     found = [value for key, value in headers if key == name]
     if len(found) > 1:
@@ -27,10 +27,10 @@ def header(headers: Iterable[tuple[bytes, bytes]], name: bytes) -> str | None:
 
 @dataclass(frozen=True, slots=True)
 class Addresses:
-    """The names that this server answers to, in lower case, IPv6 in brackets.
+    """Names that this server accepts in Host, in lower case, IPv6 in brackets.
 
-    ``behind`` are names of a proxy in front of it, which may speak HTTPS where we do not.
-    ``own_addresses``: also the address that the request came in at, when that is no name.
+    ``behind`` are names of a proxy in front of it, which may use HTTPS where we do not.
+    ``own_addresses``: the IP address at which the request arrived is also accepted.
     """
 
     names: frozenset[str]
@@ -40,7 +40,7 @@ class Addresses:
     def check(
         self, headers: Headers, *, secure: bool, local_address: str | None, changes: bool
     ) -> None:
-        """Host is ours, and a browser's Origin is the same place.
+        """Check that Host is one of our names, and that a browser's Origin is the same place.
 
         Raises:
             Forbidden: it is not.
@@ -69,7 +69,7 @@ class Addresses:
             return True
         if not self.own_addresses or local_address is None:
             return False
-        # An address is no name, so nobody can make it resolve to something else.
+        # An IP address is not resolved, so DNS rebinding is impossible.
         try:
             return ipaddress.ip_address(name.strip("[]")) == ipaddress.ip_address(local_address)
         except ValueError:
@@ -77,6 +77,6 @@ class Addresses:
 
 
 def _name(host: str) -> str:
-    """The name of a Host header without its port; the whole where it is no name and port."""
+    """Host name without port; the whole text if it is not a name with an optional port."""
     found = _HOST.fullmatch(host)
     return found["name"] if found else host

@@ -1,4 +1,4 @@
-"""Who asks by which log-in: the session that the page is informed, its cookie, its account."""
+"""The session of a request: its message to the page, its cookies, its account."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from backend.people.station import People
 
 
 def session_of(people: People, identity: Identity | None, cookie: str | None) -> Session:
-    """What a page is informed of who asks; ``identity`` is None where nobody is logged in."""
+    """The session as shown to the page; ``identity`` is None if nobody is logged in."""
     by_cookie = identity is not None and identity.kind in ("session", "guest") and cookie
     return Session(
         person=None if identity is None else identity.person,
@@ -38,7 +38,7 @@ def session_of(people: People, identity: Identity | None, cookie: str | None) ->
 
 
 def with_cookie(request: Request, response: Response, people: People, secret: str) -> Session:
-    """Set the cookie of a fresh session, which HTTPS alone carries where the page came by it."""
+    """Set the cookie of a new session; it is limited to HTTPS if the page was loaded by HTTPS."""
     secure = _is_secure(request)
     response.set_cookie(
         SECURE_COOKIE if secure else COOKIE,
@@ -52,7 +52,7 @@ def with_cookie(request: Request, response: Response, people: People, secret: st
 
 
 def remember_device(request: Request, response: Response, people: People, account: int) -> None:
-    """Know this browser again: strangers who guess do not use up its tries."""
+    """Set the device cookie, so that tries of strangers do not use up this browser's budget."""
     devices = people.accounts.devices
     known = devices.known(device_of(request))
     if known is not None and known.account == account:
@@ -70,7 +70,7 @@ def remember_device(request: Request, response: Response, people: People, accoun
 
 
 def device_of(request: Request) -> str | None:
-    """The cookie by which a browser may be known, whoever is logged in."""
+    """The device cookie of a browser, independent of the session."""
     return credentials(request.scope).device
 
 
@@ -79,17 +79,17 @@ def _is_secure(request: Request) -> bool:
 
 
 def address_of(request: Request) -> str:
-    """The address that a request comes from, empty where it is not known."""
+    """The client address of a request; empty if unknown."""
     return request.client.host if request.client else ""
 
 
 def client_of(request: Request) -> str:
-    """The browser or program that asks, as it calls itself."""
+    """The browser or program of a request, as in its User-Agent header."""
     return request.headers.get("user-agent", "")
 
 
 def own_account(accounts: Accounts, me: Identity) -> Account:
-    """The account behind a log-in; a token or a guest has none that it may change.
+    """The account of a session; tokens and guests have no account that they may change.
 
     Raises:
         Forbidden: there is none.
@@ -100,10 +100,10 @@ def own_account(accounts: Accounts, me: Identity) -> Account:
 
 
 def whose_sessions(accounts: Accounts, me: Identity) -> int | None:
-    """Account whose sessions and tokens may be seen; None for all, as administrators may.
+    """Account whose sessions and tokens may be listed; None for all, as for administrators.
 
     Raises:
-        Forbidden: a guest or the one user of a station without accounts has none.
+        Forbidden: a guest, a token, or the single user of a station without accounts.
     """
     if Right.ADMINISTER in me.rights:
         return None

@@ -1,4 +1,4 @@
-"""Connections that send or read too slowly, or are too many from one address, are closed."""
+"""Limits on connections: too slow in sending or reading, or too many from one address."""
 
 from __future__ import annotations
 
@@ -23,30 +23,31 @@ from backend.api.admission.requests import Beginnings
 from backend.api.security.rights import API
 from backend.people.throttle import Bucket
 
-#: Time for the head of a request, from the connection or the first byte on.
+#: Time limit [s] for the head of a request, from the connection or its first byte on.
 HEAD_S = 10.0
-#: An answer that has filled all buffers must get on within this time: 48 KiB, whoever reads.
+#: Time limit [s] for a client to read, once an answer has filled all buffers (48 KiB).
 DRAIN_S = 60.0
-#: Connections from one address that is not this machine. A page needs about eight.
+#: Limit of connections from one address that is not this machine. A page needs about eight.
 MOST_PER_ADDRESS = 100
 
-#: Connections at once, over all: beyond this the longest idle one is closed for a new one. What
-#: is under way and every websocket have limits of their own, below it together
-#: (`backend.api.admission.requests`, `backend.api.security.socket`), so that there always is one.
+#: Limit of all connections: above it the longest idle one is closed for a new one.
+#: Requests in progress and websockets have limits of their own, which are lower in
+#: total (`backend.api.admission.requests`, `backend.api.security.socket`), so that
+#: there always is an idle one.
 MOST_CONNECTIONS = 800
 
-#: Frames next to messages at once, and a second. A page of ours answers a ping every 5 s.
+#: Control frames of a websocket: burst, and frames per second. Our page answers a ping every 5 s.
 _FRAMES = (100.0, 20.0)
 
 _open: Counter[str] = Counter()
 _numbers = itertools.count(1)
-#: How STOP begins.
+#: First bytes of a STOP request.
 _STOP = f"POST {API}/stop ".encode()
 _turns: WeakKeyDictionary[asyncio.AbstractEventLoop, Beginnings] = WeakKeyDictionary()
 
 
 def _beginnings() -> Beginnings:
-    """Those of the running loop."""
+    """The queue of the running event loop."""
     loop = asyncio.get_running_loop()
     found = _turns.get(loop)
     if found is None:
@@ -55,32 +56,32 @@ def _beginnings() -> Beginnings:
 
 
 class AcceptingConfig(uvicorn.Config):
-    """With the listening sockets, which need to know when a connection has begun."""
+    """Configuration with the listening sockets, which are notified when a connection begins."""
 
     accepting: Sequence[AcceptingSocket] = ()
 
 
 class PatientSocket(WebSocketsSansIOProtocol):
-    """A websocket that ends where the other side sends frames that no application sees.
+    """Websocket that is closed when the client sends too many frames that no application sees.
 
-    Messages are counted where they are understood (`backend.api.security.socket`); pings, pongs
-    and empty parts of messages never come there.
+    Messages are counted where they are decoded (`backend.api.security.socket`); pings, pongs and
+    empty parts of messages do not get there.
     """
 
     _frames: Bucket | None = None
 
     def handle_ping(self) -> None:
-        """Answered, unless there are too many."""
+        """Answer the ping, unless there are too many frames."""
         if self._is_bearable():
             super().handle_ping()
 
     def handle_pong(self, event: Frame) -> None:
-        """Noted, unless there are too many."""
+        """Note the pong, unless there are too many frames."""
         if self._is_bearable():
             super().handle_pong(event)
 
     def handle_cont(self, event: Frame) -> None:
-        """Part of a message, unless there are too many."""
+        """Handle a part of a message, unless there are too many frames."""
         if self._is_bearable():
             super().handle_cont(event)
 
@@ -94,7 +95,7 @@ class PatientSocket(WebSocketsSansIOProtocol):
 
 
 class PatientProtocol(H11Protocol):
-    """HTTP/1.1 with a deadline for request heads and a bound on connections per address."""
+    """HTTP/1.1 with a deadline for request heads and a limit on connections per address."""
 
     _waits = False
     _head_timer: asyncio.TimerHandle | None = None
@@ -104,9 +105,10 @@ class PatientProtocol(H11Protocol):
     address: str | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Count the connection; for one too many the longest idle one is closed.
+        """Count the connection; if it is one too many, close the longest idle one.
 
-        So those who only hold connections keep nobody out: STOP comes in by a new one too.
+        Clients that only hold connections then cannot shut others out: STOP may also
+        come by a new connection.
         """
         super().connection_made(transport)
         _give_up_unread(transport)
@@ -131,9 +133,9 @@ class PatientProtocol(H11Protocol):
                 server.begun(line.fileno())
 
     def _close_idle(self, address: str | None) -> bool:
-        """Close the longest idle connection, of this address or any; whether there was one.
+        """Close the longest idle connection, of this address or of any; False if there was none.
 
-        Those that have never asked anything go before those whose next request is awaited.
+        Connections that have never sent a request are closed before those between two requests.
         """
         idle = [
             each
@@ -149,7 +151,7 @@ class PatientProtocol(H11Protocol):
         return True
 
     def drop(self) -> None:
-        """Close this connection at once: its place is needed."""
+        """Close this connection at once, as its place is needed."""
         self._uncount()
         self._disarm()
         self.connections.discard(self)
@@ -157,39 +159,40 @@ class PatientProtocol(H11Protocol):
 
     @property
     def is_idle(self) -> bool:
-        """Nothing of a request but perhaps the beginning of its head has come."""
+        """Whether no request is in progress; the head of one may be incomplete."""
         return self._head_timer is not None and not self.transport.is_closing()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Uncount it."""
+        """Stop counting the connection."""
         self._disarm()
         self.resume_writing()
         self._uncount()
         super().connection_lost(exc)
 
     def pause_writing(self) -> None:
-        """The other side does not read: nobody keeps a connection busy that way."""
+        """Start the time limit for a client that does not read."""
         super().pause_writing()
         if self._drain_timer is None:
             self._drain_timer = self.loop.call_later(DRAIN_S, self.transport.abort)
 
     def resume_writing(self) -> None:
-        """It reads again."""
+        """Stop the time limit, as the client reads again."""
         if self._drain_timer is not None:
             self._drain_timer.cancel()
             self._drain_timer = None
         super().resume_writing()
 
     def data_received(self, data: bytes) -> None:
-        """While the head of a request is incomplete, its time runs.
+        """Handle data; the time limit runs while the head of a request is incomplete.
 
-        What begins a request is looked at so many a turn, but for what may be STOP.
+        Only a limited number of new requests is parsed per turn; what may
+        be STOP is parsed at once.
         """
         if self.conn.their_state is not h11.IDLE or data.startswith(_STOP):
             self._received(data)
         else:
             self._waits = True
-            # Nothing more comes before this has been looked at.
+            # No more data must be read before this has been parsed.
             self.flow.pause_reading()
             _beginnings().begin(functools.partial(self._begin, data))
 
@@ -208,9 +211,10 @@ class PatientProtocol(H11Protocol):
             self._disarm()
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
-        """A websocket has limits of its own."""
+        """Leave the connection to the websocket, which has limits of its own."""
         self._disarm()
-        # Its end is not reported here any more; messages and silence are bounded elsewhere.
+        # The end of a websocket is not reported here; its messages and
+        # silence are limited elsewhere.
         self._uncount()
         super().handle_websocket_upgrade(event)
 
@@ -237,7 +241,7 @@ class PatientProtocol(H11Protocol):
 
 
 def _give_up_unread(transport: asyncio.Transport) -> None:
-    """Let the system drop a connection whose other side takes nothing, where it can."""
+    """Let the system drop a connection whose client acknowledges nothing, where supported."""
     line = transport.get_extra_info("socket")
     if line is not None and hasattr(socket, "TCP_USER_TIMEOUT"):
         with contextlib.suppress(OSError):

@@ -1,9 +1,9 @@
-"""What every route and message needs. What is not in these tables is refused to everybody.
+"""The right that every route needs. A route that is not in these tables is refused to everybody.
 
-The tables are kept in one place so that the whole policy can be read at once. `Gate` (HTTP and
-websockets) and `Connection` (messages) enforce them before any code of a route runs, the control
-lease included, so a new route can forget nothing: it is closed until it stands here.
-`tests/security` walks every route and message against these tables, with everybody.
+The tables are in one place so that the whole policy can be read at once. `Gate` (HTTP and
+websockets) and `Connection` (messages) enforce them, including control of the axis, before any code
+of a route runs, so that a new route cannot omit a check: it is refused until it is listed here.
+`tests/security` tests every route and message against these tables, with every role.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from backend.tools.registry import TOOLS
 
 API = "/api/v1"
 
-#: ``public``: nobody needs to be known. ``known``: anybody who is. ``stop``: anybody who is or
-#: was until lately.
+#: ``public``: no identity needed. ``known``: any valid identity. ``stop``: any identity that is
+#: valid or was until recently.
 Special = Literal["public", "known", "stop"]
-#: Whose control lease a change needs: of the drive in its path (the gate checks), of every drive
-#: of the bus that it names (the route checks), or none.
+#: Drives that a change needs control of: the one in its path (checked by the gate), every drive of
+#: the bus that it names (checked by the route), or none.
 LeaseOf = Literal["drive", "bus", "none"]
 
 _SMALL, _FILE = 1 << 20, 70 << 20
@@ -31,7 +31,7 @@ _SMALL, _FILE = 1 << 20, 70 << 20
 
 @dataclass(frozen=True, slots=True)
 class Need:
-    """What a request needs, and how large its body may be in bytes."""
+    """Right and control that a request needs, and the size limit of its body [bytes]."""
 
     right: Right | Special
     lease: LeaseOf = "none"
@@ -47,7 +47,7 @@ _STATION, _STATION_DRIVE = Need(Right.STATION), Need(Right.STATION, "drive")
 _STATION_BUS = Need(Right.STATION, "bus")
 _INVITE, _ADMINISTER = Need(Right.INVITE), Need(Right.ADMINISTER)
 
-#: By "METHOD path", paths below /api/v1 first.
+#: Keys are "METHOD path"; paths below /api/v1.
 _API: dict[str, Need] = {
     # who is there
     "GET /health": _PUBLIC,
@@ -94,7 +94,7 @@ _API: dict[str, Need] = {
     "DELETE /buses": _STATION,
     "GET /buses/flight": _LOOK,
     "GET /buses/doctor": _LOOK,
-    # A trial takes a drive to Operational, not enabled; what is kept is of our own bring-up.
+    # A trial takes a drive to Operational, not enabled; only servodeck's own bring-up is changed.
     "POST /buses/doctor/trials": _STATION_BUS,
     "PUT /buses/doctor/kept": _STATION_BUS,
     "DELETE /buses/doctor/kept": _STATION_BUS,
@@ -118,7 +118,7 @@ _API: dict[str, Need] = {
     "POST /ethercat/eeprom/restore": _STATION_BUS,
     "GET /jobs": _LOOK,
     "GET /jobs/{job_id}": _LOOK,
-    # Ends a motion for everybody, like STOP; the route asks for more where nothing moves.
+    # Ends a motion for everybody, like STOP; the route requires more for jobs without motion.
     "DELETE /jobs/{job_id}": _LOOK,
     "GET /log": _LOOK,
     # drives
@@ -133,14 +133,14 @@ _API: dict[str, Need] = {
     "GET /drives/{drive_id}/state": _LOOK,
     "GET /drives/{drive_id}/faults": _LOOK,
     "POST /drives/{drive_id}/fault-reset": _MOTION,
-    # Of the demo only; the route refuses it elsewhere.
+    # For the demo only; the route refuses it elsewhere.
     "POST /drives/{drive_id}/training-fault": _MOTION,
     "POST /drives/{drive_id}/transition": _MOTION,
     "GET /drives/{drive_id}/parameters": _LOOK,
     "PUT /drives/{drive_id}/parameters": _PARAMETERS,
     "GET /drives/{drive_id}/parameters/{key}": _LOOK,
     "PUT /drives/{drive_id}/parameters/{key}": _PARAMETERS,
-    # Settings that can start a motion at once: with the right to move, not with that to write.
+    # Settings that can start a motion at once need the right to move, not the right to write.
     "PUT /drives/{drive_id}/motion-settings/{key}": _MOTION,
     "POST /drives/{drive_id}/jobs/put-back": _PARAMETERS,
     "DELETE /drives/{drive_id}/pending-restores": _PARAMETERS,
@@ -165,7 +165,7 @@ _API: dict[str, Need] = {
     "GET /drives/{drive_id}/io": _LOOK,
     "POST /drives/{drive_id}/io/forcing/{name}": _MOTION,
     "PUT /drives/{drive_id}/io/forcing/{name}": _MOTION,
-    # Lets terminals be what they are again, for everybody, like STOP.
+    # Releases forced terminals, for everybody, like STOP.
     "DELETE /drives/{drive_id}/io/forcing/{name}": _LOOK,
     "PUT /drives/{drive_id}/io/probes/{number}": _PARAMETERS,
     "GET /drives/{drive_id}/functions": _LOOK,
@@ -174,7 +174,7 @@ _API: dict[str, Need] = {
     "GET /drives/{drive_id}/record": _LOOK,
     "PUT /drives/{drive_id}/mechanics": _PARAMETERS,
     "PUT /drives/{drive_id}/watch": _PARAMETERS,
-    # Whoever says what a revolution is decides how far the next motion goes.
+    # The scale determines how far the next motion goes, so it needs the right to move.
     "GET /drives/{drive_id}/scales": _LOOK,
     "PUT /drives/{drive_id}/scales": _MOTION,
     "DELETE /drives/{drive_id}/scales": _MOTION,
@@ -211,17 +211,19 @@ _API: dict[str, Need] = {
     "POST /drives/{drive_id}/sets": Need(Right.FILES, "drive"),
     "GET /drives/{drive_id}/diff": _LOOK,
     "GET /drives/{drive_id}/three-way": _LOOK,
-    # Lists for the machine's controller: made of stored sets, noted in the report; comparing reads.
+    # Lists for the machine's controller are made of stored sets, and noted in the
+    # report; comparing only reads.
     "POST /handover": _FILES_UPLOAD,
     "POST /drives/{drive_id}/handover": _FILES_UPLOAD,
     "POST /drives/{drive_id}/handover/compare": Need(Right.LOOK, body_bytes=9 << 20),
     "GET /drives/{drive_id}/handovers": _LOOK,
     "GET /drives/{drive_id}/handovers/{number}/changes": _LOOK,
-    # The condition of axes: measuring is a job of the tool; signing takes over what was measured.
+    # Condition of axes: measuring is a job of the tool; signing makes measured rounds the baseline.
     "GET /health/trend": _LOOK,
     "GET /drives/{drive_id}/health": _LOOK,
     "POST /drives/{drive_id}/health/baseline": _FILES,
-    # Who may move permits runs without them; a controller's token asks for one; ending is easier.
+    # Permitting unattended runs needs the right to move; a controller's token triggers a run;
+    # ending the permission needs less.
     "GET /drives/{drive_id}/health/permission": _LOOK,
     "PUT /drives/{drive_id}/health/permission": _MOTION,
     "DELETE /drives/{drive_id}/health/permission": _FILES,
@@ -263,7 +265,7 @@ _API: dict[str, Need] = {
     "PUT /bundles/armed": _STATION,
     "GET /bundles/{name}": _LOOK,
     "DELETE /bundles/{name}": _FILES,
-    # the audit: who did what is not for guests and onlookers
+    # the audit is not for guests and viewers
     "GET /audit": _STATION,
     "GET /audit/names": _STATION,
     "GET /audit/verify": _STATION,
@@ -273,7 +275,7 @@ _API: dict[str, Need] = {
     "WS /live": _LOOK,
 }
 
-#: Outside the interface: the page itself, which shows the log-in, and the viewers.
+#: Outside the API: the page itself, which shows the log-in, and the viewers.
 _PAGE: dict[str, Need] = {
     "GET /": _PUBLIC,
     "GET /index.html": _PUBLIC,
@@ -285,7 +287,7 @@ _PAGE: dict[str, Need] = {
     "WS /viser": _LOOK,
 }
 
-#: Needs by "METHOD path" as the application declares its paths.
+#: Needs by "METHOD path", with the paths as the application declares them.
 ROUTES: dict[str, Need] = {
     f"{method} {API}{path}": need
     for key, need in _API.items()
@@ -295,19 +297,19 @@ ROUTES: dict[str, Need] = {
 
 @dataclass(frozen=True, slots=True)
 class Matched:
-    """A need that a request's path has matched, with what the path names."""
+    """A need that applies to a request, with the drive in its path."""
 
     need: Need
     drive: str | None
     route: str
-    """As it stands in `ROUTES`."""
+    """Key of the need in `ROUTES`."""
 
 
 _STOP_ROUTE = ("POST", f"{API}/stop")
 
 
 class Policy:
-    """Finds what a request needs. Several patterns may fit a path: all of them must be met."""
+    """Finds what a request needs. If several patterns match a path, all their needs must be met."""
 
     def __init__(self, routes: dict[str, Need] | None = None) -> None:
         self._patterns: list[tuple[str, re.Pattern[str], Need, str]] = []
@@ -316,7 +318,7 @@ class Policy:
             self._patterns.append((method, compile_path(path)[0], need, key))
 
     def needs(self, method: str, path: str) -> list[Matched]:
-        """Everything that this request must meet; nothing where no route is declared."""
+        """All needs of this request; empty if no route is declared for it."""
         method = "GET" if method == "HEAD" else method
         if not _plain(path):
             return []
@@ -327,7 +329,7 @@ class Policy:
         ]
 
     def is_stop(self, method: str, path: str) -> bool:
-        """Whether this is STOP, which nothing else may keep waiting."""
+        """Whether this is STOP, which must not wait for anything else."""
         return (method, path) == _STOP_ROUTE
 
     def methods(self, path: str) -> list[str]:
@@ -338,5 +340,5 @@ class Policy:
 
 
 def _plain(path: str) -> bool:
-    """Whether the path names a thing below the root and nothing else."""
+    """Whether the path contains no "." or ".." segment and no NUL."""
     return not any(part in (".", "..") for part in path.split("/")) and "\0" not in path

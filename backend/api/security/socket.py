@@ -1,4 +1,4 @@
-"""Websockets that end with the session they were opened by, at once."""
+"""Websockets that are closed at once when their session ends."""
 
 from __future__ import annotations
 
@@ -11,22 +11,23 @@ from starlette.types import Message, Receive, Send
 from backend.people.errors import TooOften
 from backend.people.throttle import Bucket
 
-#: Close codes of ours: the session is over; the page sends more than a person can cause.
+#: Our close codes: the session has ended; the page sends more than a person can cause.
 OVER, FLOODED = 4401, 4429
-#: Messages at once and a second. A held button sends 25, pointer and cursor 20 each.
+#: Limit on messages: burst, and messages per second. A held button sends 25 per second,
+#: pointer and cursor 20 each.
 _FLOOD = (600.0, 200.0)
-#: Websockets of one log-in: ten pages with plots, recordings and the axis in 3D.
+#: Websockets of one session: enough for ten pages with plots, recordings and the axis in 3D.
 MOST_PER_SESSION = 40
-#: Of all log-ins together.
+#: Websockets of all sessions together.
 MOST_SOCKETS = 300
 
 
 class GuardedSocket:
-    """One websocket, seen by the application through `receive` and `send`."""
+    """One websocket, used by the application through `receive` and `send`."""
 
     def __init__(self, receive: Receive, send: Send, session: str) -> None:
         self.session = session
-        #: The name of the live connection, once it has one.
+        #: Id of the live connection, once it has one.
         self.connection: str | None = None
         self._receive, self._send = receive, send
         self._over = asyncio.Event()
@@ -35,12 +36,12 @@ class GuardedSocket:
         self._bucket = Bucket(*_FLOOD)
 
     def end(self, code: int = OVER) -> None:
-        """From now on nothing goes in or out."""
+        """Stop all traffic in both directions."""
         self._code = code
         self._over.set()
 
     async def receive(self) -> Message:
-        """The next message, or word that the session is over."""
+        """Return the next message, or a disconnect if the session has ended."""
         coming = asyncio.ensure_future(self._receive())
         over = asyncio.ensure_future(self._over.wait())
         try:
@@ -59,10 +60,10 @@ class GuardedSocket:
         return message
 
     async def send(self, message: Message) -> None:
-        """Send, unless the session is over.
+        """Send a message, unless the session has ended.
 
         Raises:
-            OSError: it is; Starlette makes a WebSocketDisconnect of it.
+            OSError: it has ended; Starlette converts it to a WebSocketDisconnect.
         """
         if self._over.is_set():
             raise OSError("the session is over")
@@ -71,24 +72,24 @@ class GuardedSocket:
         await self._send(message)
 
     async def finish(self) -> None:
-        """Close what the application has left open."""
+        """Close the websocket if the application has left it open."""
         if not self._closed and self._over.is_set():
             self._closed = True
             await self._send({"type": "websocket.close", "code": self._code, "reason": "over"})
 
 
 class OpenSockets:
-    """All open websockets."""
+    """All open websockets of the server."""
 
     def __init__(self) -> None:
         self._open: set[GuardedSocket] = set()
         self._owners: dict[str, str] = {}
 
     def require_room(self, session: str) -> None:
-        """One session does not take the places of all others, and all together not those of STOP.
+        """Check the limits of one session and of all together, which leave room for STOP.
 
         Raises:
-            TooOften: it has as many as it may.
+            TooOften: a limit is reached.
         """
         if session and sum(each.session == session for each in self._open) >= MOST_PER_SESSION:
             raise TooOften(
@@ -99,7 +100,7 @@ class OpenSockets:
 
     @contextmanager
     def open(self, socket: GuardedSocket) -> Iterator[None]:
-        """Hold a websocket while it is open."""
+        """Register a websocket while it is open."""
         self._open.add(socket)
         try:
             yield
@@ -113,13 +114,13 @@ class OpenSockets:
                 socket.end()
 
     def own(self, connection: str, session: str) -> None:
-        """Note whose a live connection is."""
+        """Record the session of a live connection."""
         self._owners[connection] = session
 
     def disown(self, connection: str) -> None:
-        """A live connection is gone."""
+        """Remove a live connection that is gone."""
         self._owners.pop(connection, None)
 
     def owner(self, connection: str) -> str | None:
-        """Session of a live connection, None where there is no such connection."""
+        """Session of a live connection; None if there is no such connection."""
         return self._owners.get(connection)

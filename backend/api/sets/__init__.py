@@ -1,1 +1,1 @@
-"""Parameter sets and parameter lists."""
+"""Routes of parameter sets and parameter lists."""

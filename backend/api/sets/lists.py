@@ -1,4 +1,4 @@
-"""Parameter sets as CSV and DCF: export, and import of lists as other tools write them."""
+"""Routes of parameter sets as CSV and DCF: export, and import of lists of other tools."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ async def export_set(
         Literal["csv", "dcf"], Query(alias="format", description="of the download")
     ] = "csv",
 ) -> Response:
-    """A stored parameter set as CSV for spreadsheets, or as DCF for CANopen tools.
+    """Export a stored parameter set as CSV for spreadsheets, or as DCF for CANopen tools.
 
-    Parameters without an object (only Modbus reaches them) are not in a DCF.
+    A DCF leaves out parameters without an object (those that only Modbus reaches).
     """
     try:
         content = await bench.records.store.call(bench.sets.load, file)
@@ -81,7 +81,7 @@ async def store_list(
 ) -> ImportedList:
     """Store a CSV list or a DCF as a parameter set of a drive family.
 
-    Nothing is written to a drive: compare it first, as any other set.
+    Nothing is written to a drive: compare it first, like any other set.
     """
     data = bytearray()
     async for chunk in request.stream():

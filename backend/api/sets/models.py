@@ -1,4 +1,4 @@
-"""Messages about parameter sets, and what differs between one and a drive."""
+"""Messages about parameter sets, and about their comparison with a drive."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class SetFileInfo(Message):
 
 
 class SaveSetRequest(Message):
-    """Store the present values of a drive."""
+    """Store the current values of a drive."""
 
     file: str = Field(pattern=r"^[\w][\w .\-]{0,100}$")
     author: str = Field(default="", max_length=100)
@@ -72,7 +72,7 @@ class DiffRow(Message):
 
 
 class Diff(Message):
-    """A parameter set against a drive."""
+    """Comparison of a parameter set with a drive."""
 
     file: str
     version: int | None = Field(default=None, description="of the file; null for the latest")

@@ -1,4 +1,4 @@
-"""Routes of parameter sets by name, and comparisons of a drive with them."""
+"""Routes of parameter sets by name, and of comparisons with a drive."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ router = APIRouter()
 
 
 def _listed(bench: Bench) -> list[StoredSet]:
-    """Blocks."""
+    """All sets and the unusable files of the folder. Blocks."""
     problems = bench.sets.take_in()
     known = [convert_library.stored_set(entry) for entry in bench.sets.entries()]
     return known + [convert_library.unusable_set(*problem) for problem in problems.items()]
@@ -44,7 +44,7 @@ async def _info(bench: Bench, name: str) -> StoredSet:
 
 @router.get("/sets")
 async def list_sets(bench: TheBench) -> list[StoredSet]:
-    """Stored parameter sets, newest first; at the end unusable files, which say why."""
+    """List stored parameter sets, newest first; unusable files come last, with their problem."""
     return await bench.records.store.call(_listed, bench)
 
 
@@ -88,7 +88,7 @@ async def _parsed(bench: Bench, file: str, version: int | None) -> ParameterSet:
 async def download_set(
     bench: TheBench, file: str, version: Annotated[int | None, Query(ge=1)] = None
 ) -> Response:
-    """The file itself, the latest version or another."""
+    """Download the file, by default the latest version."""
     return Response(await _existing(bench, file, version), media_type="application/toml")
 
 
@@ -96,14 +96,14 @@ async def download_set(
 async def upload_set(
     bench: TheBench, file: str, request: Request, overwrite: bool = False
 ) -> StoredSet:
-    """Store a file from elsewhere; what is no usable parameter set is refused."""
+    """Store an uploaded file; one that is not a usable parameter set is refused."""
     data = bytearray()
     async for chunk in request.stream():
         data += chunk
         if len(data) > MAX_BYTES:
             raise BadSet("api-sets.larger-bytes", file=file, max_bytes=MAX_BYTES)
     if len(data) > SMALL_BYTES:
-        # What is no set is refused before a thread of this process reads it.
+        # A large file that is not a set is refused before a thread of this process reads it.
         await read_apart(len(data), parameter_set.parse, bytes(data), file)
     store = bench.records.store
     name = await store.call(bench.sets.store, file, bytes(data), overwrite=overwrite)
@@ -169,7 +169,7 @@ async def three_way(
     base_version: Annotated[int | None, Query(ge=1)] = None,
     theirs_version: Annotated[int | None, Query(ge=1)] = None,
 ) -> ThreeWay:
-    """What changed since a common base, in another set and in the drive, which is read now."""
+    """List what has changed since a common base, in another set and in the drive (read now)."""
     drive = connected.drive
     before = await _parsed(bench, base, base_version)
     content = await _parsed(bench, theirs, theirs_version)
@@ -195,7 +195,7 @@ async def three_way(
 
 
 def _identity(content: ParameterSet, drive: Drive) -> tuple[bool, bool | None, list[Text]]:
-    """Same family; same drive, None where that cannot be known; and what to warn of."""
+    """Whether family and drive are the same (drive None: unknown), and the warnings."""
     same_profile = content.profile == drive.profile.drive
     differing = differences(content, drive)
     serial = drive.found.serial if drive.found else None
@@ -217,7 +217,7 @@ async def _of_drive(other: Drive) -> list[Row]:
 
 
 async def _read(drive: Drive, rows: Iterable[Row], *, full: bool) -> dict[str, Reading]:
-    """The drive's values of these rows; with ``full`` also of what belongs into a set."""
+    """Read the drive's values of these rows; with ``full`` all others of a set as well."""
     wanted: Collection[str] = set()
     if full:
         wanted = {p.key for p in parameter_set.storable(drive.profile, motor_individual=False)}

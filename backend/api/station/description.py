@@ -1,4 +1,4 @@
-"""Routes for drives that are not listed, for line settings and for further ports."""
+"""Routes of description files, profiles, line settings and additional ports."""
 
 from __future__ import annotations
 
@@ -55,10 +55,10 @@ FileName = Annotated[str, Query(min_length=1, max_length=200, description="name 
 
 
 async def _upload(request: Request, file: str) -> bytes:
-    """The body, up to the size that the readers take.
+    """Read the body, up to the size that the parsers accept.
 
     Raises:
-        BadDescription: larger, or empty.
+        BadDescription: it is larger, or empty.
     """
     data = bytearray()
     async for chunk in request.stream():
@@ -82,7 +82,7 @@ def _require_new(name: str) -> None:
 
 @router.post("/descriptions/devices", openapi_extra=_BODY)
 async def described_devices(request: Request, file: FileName) -> list[DescribedDevice]:
-    """The devices of an ESI file, to choose from; empty for an EDS or DCF file, which has one."""
+    """List the devices of an ESI file; empty for an EDS or DCF file, which has one device."""
     reported = await import_in_process(DevicesTask(await _upload(request, file), file))
     return [DescribedDevice.model_validate(device) for device in reported["devices"]]
 
@@ -156,14 +156,17 @@ async def profile_matches(
     vendor_id: Annotated[int | None, Query(ge=0, le=0xFFFFFFFF)] = None,
     product_code: Annotated[int | None, Query(ge=0, le=0xFFFFFFFF)] = None,
 ) -> list[ProfileMatch]:
-    """Profiles that fit an identity, best first; for what a scan found before an import."""
+    """List the profiles that match an identity, best first.
+
+    For drives that a scan found before their profile was imported.
+    """
     found = Found(0, vendor_id=vendor_id, product_code=product_code, name=name)
     return convert.matches(kind, found)
 
 
 @router.get("/profiles/{profile}/eds", response_class=Response)
 async def export_profile(profile: ProfileName) -> Response:
-    """A profile's objects as a CANopen EDS file."""
+    """Export a profile's objects as a CANopen EDS file."""
     known = _known(profile)
     text = export_eds(known, datetime.now())
     return Response(
@@ -175,7 +178,7 @@ async def export_profile(profile: ProfileName) -> Response:
 
 @router.get("/profiles/{profile}/esi", response_class=Response)
 async def export_slave_information(profile: ProfileName) -> Response:
-    """A profile's identity, objects, PDOs and bring-up as an EtherCAT ESI file (ETG.2000)."""
+    """Export a profile's identity, objects, PDOs and bring-up as an ESI file (ETG.2000)."""
     known = _known(profile)
     if known.link("ethercat") is None:
         raise NotAllowed("api-station.no-ethercat-profile", value=profile)
@@ -187,7 +190,7 @@ async def export_slave_information(profile: ProfileName) -> Response:
 
 
 def _imported(reported: dict[str, Any]) -> ImportedDescription:
-    """What the process of an import reports, with its messages."""
+    """The result of an import process, with its messages."""
     findings = [
         ImportFinding(
             place=found["place"],
@@ -224,7 +227,7 @@ async def profile_texts(
     profile: ProfileName,
     language: Annotated[Language, Query(description="language of the texts")],
 ) -> ProfileTexts:
-    """The texts of a profile in another language, by their English original."""
+    """Read the texts of a profile in another language, by their English original."""
     try:
         known = load_profile(profile)
         overlay = load_overlay(profile, language)
@@ -254,7 +257,7 @@ async def search_line_settings(bench: TheBench, request: LineSearchRequest) -> J
 
 @router.get("/drives/{drive_id}/missing-ports")
 async def drive_missing_ports(connected: TheDrive) -> list[MissingPort]:
-    """Ports over which a drive could be reached as well, and what only they reach."""
+    """List additional ports over which a drive could be reached, and what only they reach."""
     return [
         MissingPort(
             kind=port.kind,

@@ -1,4 +1,4 @@
-"""Routes to the doctor: why stations of a bus are not in Operational, and trials of settings."""
+"""Routes of the doctor: why stations of a bus are not in Operational, and trials of settings."""
 
 from __future__ import annotations
 
@@ -38,9 +38,10 @@ async def bus_doctor(
     url: Annotated[str, Query()],
     station: Annotated[int | None, Query(ge=1)] = None,
 ) -> list[StationDiagnosis]:
-    """What keeps the stations of an opened EtherCAT or CANopen bus from Operational.
+    """Find what keeps the stations of an opened EtherCAT or CANopen bus from Operational.
 
-    The likeliest cause first. Reads registers and objects as they are now; changes no state.
+    The most likely cause comes first. Reads registers and objects as they
+    are now; changes no state.
     """
     doctor = _doctor(bench, url)
     seen = [station] if station is not None else sorted(await doctor.stations_known())
@@ -53,8 +54,8 @@ async def try_setting(
 ) -> JobInfo:
     """Take a drive to Operational with one setting changed, then undo it.
 
-    Nothing is written to the drive's parameters and no axis is enabled. The job's result is
-    TrialResult.
+    Nothing is written to the drive's parameters and no axis is enabled. The
+    job's result is TrialResult.
     """
     require_bus(bench, request.url, connection)
     _doctor(bench, request.url)
@@ -83,7 +84,7 @@ async def keep_setting(
 ) -> DoctorTrial:
     """Use a setting that has just reached Operational, until the drive is connected again.
 
-    It is stored nowhere: to keep it longer, write it into the profile.
+    It is not stored: to use it permanently, write it into the profile.
     """
     require_bus(bench, request.url, connection)
     _doctor(bench, request.url)
@@ -99,7 +100,7 @@ async def undo_setting(
     station: Annotated[int, Query(ge=1)],
     connection: Connection = None,
 ) -> Response:
-    """Use the profile again as it was before a setting of this station was kept."""
+    """Undo a kept setting of this station: its profile applies again."""
     require_bus(bench, url, connection)
     _doctor(bench, url)
     kept = bench.doctor.kept(url, station)

@@ -1,4 +1,4 @@
-"""Routes for the EEPROM of an EtherCAT slave: save, compare, plan a change, carry it out.
+"""Routes of the EEPROM of an EtherCAT slave: save, compare, plan a change, write it.
 
 A change takes two confirmations: the digest of the plan that was shown, and ``confirmed``.
 """
@@ -52,7 +52,7 @@ UnknownAccepted = Annotated[
 async def read_eeprom(
     bench: TheBench, url: Url, station: StationNumber, size: Size = None
 ) -> Response:
-    """The contents of the EEPROM as a file. Not while the cyclic exchange runs."""
+    """Read the EEPROM and download it as a file. Refused while the cyclic exchange runs."""
     link = opened_segment(bench, url)
     image = await link.eeprom.read(station, _unheard, size)
     vendor, product, _revision = image.identity
@@ -74,7 +74,7 @@ async def compare_eeprom(
         str | None, Query(description="with a maker's file that was imported, in place of a body")
     ] = None,
 ) -> EepromComparison:
-    """The EEPROM against a saved file, or against what the maker's file says. Writes nothing."""
+    """Compare the EEPROM with a saved file, or with the maker's file. Writes nothing."""
     link = opened_segment(bench, url)
     if profile is not None:
         image = await link.eeprom.read(station, _unheard)
@@ -97,7 +97,7 @@ async def plan_eeprom(
     what: What = "restore",
     unknown_accepted: UnknownAccepted = False,
 ) -> EepromPlan:
-    """What a change would write, with the digest that confirms it. Writes nothing."""
+    """Plan a change: what it would write, with the digest that confirms it. Writes nothing."""
     link = opened_segment(bench, url)
     data = b"" if what == "identity" else await _body(request)
     plan = await _planned(link, station, what, data, unknown_accepted=unknown_accepted)
@@ -116,10 +116,10 @@ async def restore_eeprom(
     confirmed: Annotated[bool, Query()] = False,
     connection: Connection = None,
 ) -> EepromPlan:
-    """Write what was planned, read everything back, and say what was written.
+    """Write what was planned, read everything back, and return what was written.
 
-    Refused while somebody moves an axis of the segment or has control of one. Who asked may leave
-    meanwhile: it goes on to its end.
+    Refused while an axis of the segment moves or another person has control of one. The writing
+    continues to its end even if the client disconnects.
     """
     link = opened_segment(bench, url)
     calm_segment(bench, link, connection)
@@ -141,7 +141,7 @@ async def restore_eeprom(
 async def _require_known(
     bench: Bench, link: EthercatLink, station: int, *, unknown_accepted: bool
 ) -> None:
-    """A connected drive that answers is the one that was connected."""
+    """Check that a connected drive that answers at this station is the one that was connected."""
     if unknown_accepted:
         return
     for connected in bench.connected_drives.values():
@@ -198,4 +198,4 @@ def _difference(each: Difference) -> EepromDifference:
 
 
 def _unheard(_share: float, _step: Text) -> None:
-    """Nobody waits for the steps of a request."""
+    """Discard the progress of a request, which reports none."""

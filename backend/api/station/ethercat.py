@@ -1,4 +1,4 @@
-"""Routes that only EtherCAT segments have: the segment, error counters, alias, firmware."""
+"""Routes of EtherCAT segments: survey, error counters, alias, firmware."""
 
 from __future__ import annotations
 
@@ -53,9 +53,9 @@ _FIRMWARE_BODY = {
 
 @router.get("/ethercat/segment")
 async def ethercat_segment(bench: TheBench, url: Annotated[str, Query()]) -> EthercatSegment:
-    """An opened segment: its stations in the order of the cable, ports, clocks, punctuality.
+    """Survey an opened segment: stations in the order of the cable, ports, clocks, cycle timing.
 
-    Answers as well while the segment cannot be asked; ``problem`` then states the reason.
+    It also answers while the stations cannot be read; ``problem`` then states the reason.
     """
     link = opened_segment(bench, url)
     survey: Survey = Survey((), ())
@@ -89,11 +89,11 @@ async def ethercat_segment(bench: TheBench, url: Annotated[str, Query()]) -> Eth
 
 @router.get("/ethercat/permissions")
 async def ethercat_permissions(url: Annotated[str, Query()]) -> EthercatPermissions:
-    """What is missing to use an interface that need not be opened yet."""
+    """List the permissions that are missing to use an interface; it need not be open."""
     if not url.startswith(_SCHEME):
         raise OutOfRange("api-station.no-ethercat-bus", value=url, limit=f"{_SCHEME}INTERFACE")
     interface = url.removeprefix(_SCHEME)
-    # It becomes part of commands that somebody copies into a terminal.
+    # It becomes part of commands that a person copies into a terminal.
     require_ethercat_adapter(interface)
     return _permissions(permissions.check(interface))
 
@@ -102,7 +102,7 @@ async def ethercat_permissions(url: Annotated[str, Query()]) -> EthercatPermissi
 async def clear_counters(
     bench: TheBench, request: CountersRequest, connection: Connection = None
 ) -> Response:
-    """Set the port error counters of one station or of all to zero."""
+    """Clear the port error counters of one station or of all."""
     link = opened_segment(bench, request.url)
     for connected in _members(bench, link):
         if request.station in (None, _station_of(connected, link)):
@@ -121,7 +121,7 @@ async def clear_counters(
 async def write_alias(
     bench: TheBench, request: AliasRequest, connection: Connection = None
 ) -> Response:
-    """Write a station alias; the EEPROM takes its time, so nothing may move on this bus."""
+    """Write a station alias; the EEPROM takes time, so nothing may move on this bus."""
     link = opened_segment(bench, request.url)
     calm_segment(bench, link, connection)
     require_confirmed(request.confirmed, _ALIAS_WARNING)
@@ -153,7 +153,7 @@ async def load_firmware(
     confirmed: Annotated[bool, Query()] = False,
     connection: Connection = None,
 ) -> JobInfo:
-    """Send firmware by FoE to a drive whose profile says that it takes it so.
+    """Send firmware by FoE to a drive whose profile states that it accepts it.
 
     The job cannot be cancelled: a download that breaks off may leave the drive without firmware.
     """
@@ -181,10 +181,13 @@ async def load_firmware(
 
 
 async def _require_loadable(connected: ConnectedDrive, link: EthercatLink, station: int) -> None:
-    """The drive is the one that was connected, and not enabled.
+    """Check that the drive is the one that was connected, and is not enabled.
 
-    A drive without valid firmware stays in INIT or BOOT: it cannot be enabled, and only its
-    EEPROM shows which it is.
+    A drive without valid firmware stays in INIT or BOOT: it cannot be enabled, and only
+    its EEPROM identifies it.
+
+    Raises:
+        NotAllowed: another drive answers, or it is enabled.
     """
     drive = connected.drive
     seen = next((s for s in (await link.survey()).stations if s.station == station), None)
@@ -205,7 +208,7 @@ async def _require_loadable(connected: ConnectedDrive, link: EthercatLink, stati
 async def _to_the_end(
     load: Callable[[Callable[[float, Text], None]], Coroutine[None, None, str]], progress: Progress
 ) -> str:
-    """Load, and do not let a cancellation leave the drive with half a file."""
+    """Load firmware; a cancellation must not leave the drive with half a file."""
     kept = False
 
     def tell(share: float, step: Text) -> None:
@@ -241,7 +244,7 @@ async def _body(request: Request, file: str) -> bytes:
 
 
 def opened_segment(bench: Bench, url: str) -> EthercatLink:
-    """The segment with this URL.
+    """The opened segment with this URL.
 
     Raises:
         NotFound: no such bus is open.
@@ -261,10 +264,13 @@ def _station_of(connected: ConnectedDrive, link: EthercatLink) -> int | None:
 
 
 def calm_segment(bench: Bench, link: EthercatLink, connection: str | None) -> None:
-    """Control of every drive of the segment, and nothing moves on it.
+    """Check that the connection may control every drive of the segment and nothing moves.
 
-    What follows keeps the wire busy or resets a drive; neither may happen under a neighbour's
-    motion.
+    The operation that follows keeps the bus busy or resets a drive; neither may happen
+    while another axis moves.
+
+    Raises:
+        Busy: another person has control of a drive, or an axis moves.
     """
     for connected in _members(bench, link):
         bench.leases.require(connected.drive.id, connection)
@@ -272,7 +278,7 @@ def calm_segment(bench: Bench, link: EthercatLink, connection: str | None) -> No
 
 
 def require_confirmed(confirmed: bool, warning: str) -> None:
-    """A person has read the warning.
+    """Check that a person has confirmed the warning.
 
     Raises:
         NotAllowed: not yet.
@@ -304,7 +310,8 @@ def _station(
     spec = connected.drive.profile.link("ethercat") if connected else None
     own = [f for f in survey.findings if f.station == seen.station]
     why = seen.al_text
-    # SOEM takes the first slave with a distributed clock; nobody writes its own deviation.
+    # SOEM takes the first slave with a distributed clock as reference; its own
+    # deviation is not written.
     reference = seen.station == next(
         (s.station for s in survey.stations if s.distributed_clock), None
     )

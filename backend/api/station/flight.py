@@ -1,4 +1,4 @@
-"""Routes to what went over the wires: the last minute of frames of a bus."""
+"""Routes of recorded bus traffic: the last minute of frames of a bus."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ async def bus_flight(
     url: Annotated[str, Query()],
     station: Annotated[int | None, Query(ge=0, le=0xFFFF)] = None,
 ) -> Response:
-    """The last 60 s of frames of an opened bus as a pcapng file, of one station or of all.
+    """Download the last 60 s of frames of an opened bus as pcapng, of one station or of all.
 
     Wireshark reads it: EtherCAT as Ethernet, CAN as SocketCAN, serial lines as LINKTYPE_USER0.
     """

@@ -1,4 +1,4 @@
-"""What this machine can connect through."""
+"""Interfaces of this machine through which drives can be connected."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drivers.texts.message import text
 
 
 def list_interfaces(virtual: Sequence[str]) -> Interfaces:
-    """Serial adapters, network interfaces and CAN adapters, with what keeps them from use."""
+    """Serial, network and CAN adapters, with the reason if one is not usable."""
     found = network_interfaces()
     return Interfaces(
         serial=[

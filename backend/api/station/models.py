@@ -1,4 +1,4 @@
-"""Messages about the bench: its buses, what they are connected through, and its drives."""
+"""Messages about the bench: its buses, the interfaces of the machine, and its drives."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from backend.tools.wire_message import MessageInfo
 
 
 class Health(Message):
-    """The server is alive."""
+    """State of the server."""
 
     version: str
     time: datetime
@@ -33,7 +33,7 @@ class SerialPort(Message):
 
 
 class NetworkInterface(Message):
-    """A network interface that could carry EtherCAT."""
+    """A network interface that can be used for EtherCAT."""
 
     name: str
     up: bool
@@ -44,7 +44,7 @@ class NetworkInterface(Message):
 
 
 class Interfaces(Message):
-    """What this machine can connect through."""
+    """Interfaces of this machine through which drives can be connected."""
 
     serial: list[SerialPort]
     network: list[NetworkInterface]
@@ -88,7 +88,7 @@ class CyclicInfo(Message):
 
 
 class CyclicRequest(Message):
-    """Begin to exchange process data with all drives of a bus."""
+    """Start to exchange process data with all drives of a bus."""
 
     url: str
     cycle_us: int = Field(default=1000, ge=250, le=10000)
@@ -113,7 +113,7 @@ class ScanRequest(Message):
 
 
 class ProfileMatch(Message):
-    """A profile that fits what was found, and how sure that is."""
+    """A profile that matches a found drive, and how certain that is."""
 
     profile: str
     title: str
@@ -123,7 +123,7 @@ class ProfileMatch(Message):
 
 
 class FoundDrive(Message):
-    """One drive seen by a scan."""
+    """One drive found by a scan."""
 
     url: str
     station: int
@@ -144,7 +144,7 @@ class FoundDrive(Message):
 
 
 class ConnectRequest(Message):
-    """Make a found station a drive of this bench."""
+    """Connect a found station as a drive of this bench."""
 
     url: str
     station: int = Field(ge=0, le=65535)
@@ -153,7 +153,7 @@ class ConnectRequest(Message):
 
 
 class PortRequest(Message):
-    """A further port of a drive that is already connected."""
+    """An additional port of a drive that is already connected."""
 
     url: str
     station: int = Field(ge=0, le=65535)
@@ -163,7 +163,7 @@ class PortRequest(Message):
 
 
 class DriveUpdate(Message):
-    """Name or notes of a drive."""
+    """New name or notes of a drive."""
 
     name: PrintedName | None = Field(default=None, min_length=1, max_length=60)
     notes: PrintedLines | None = Field(default=None, max_length=4000)
@@ -173,7 +173,7 @@ class DriveUpdate(Message):
 
 
 class PortInfo(Message):
-    """One connection of a drive."""
+    """One connection of a drive to a bus."""
 
     url: str
     kind: str
@@ -183,7 +183,7 @@ class PortInfo(Message):
 
 
 class Lease(Message):
-    """Who may move and write this axis now; nobody where ``holder`` is None."""
+    """Holder of control over an axis, who may move and write it; none if ``holder`` is null."""
 
     holder: str | None
     since: datetime | None
@@ -197,7 +197,7 @@ class Lease(Message):
 
 
 class PendingRestoreValue(Message):
-    """A parameter that a motion changed and could not restore, as the link was lost."""
+    """A parameter that a motion borrowed and could not restore, because the link was lost."""
 
     key: str
     name: str
@@ -231,7 +231,7 @@ class DriveSummary(Message):
 
 
 class ProfileInfo(Message):
-    """A profile that servodeck brings, or one of the user's own."""
+    """A profile of servodeck, or one of the user's own."""
 
     profile: str
     title: str

@@ -1,4 +1,4 @@
-"""Messages about drives that are not listed, line settings and further ports."""
+"""Messages about description files, profiles, line settings and additional ports."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from backend.api.models import Message
 from backend.api.station.models import FoundDrive
 from backend.tools.wire_message import MessageInfo
 
-#: What a profile may be called.
+#: Pattern of a profile's name.
 PROFILE_NAME = r"^[a-z][a-z0-9_]{0,59}$"
 
 
 class DescribedDevice(Message):
-    """One device of a maker's file: a file often holds a whole series."""
+    """One device of a maker's file, which often contains a whole series."""
 
     name: str
     product_code: int | None
@@ -23,7 +23,7 @@ class DescribedDevice(Message):
 
 
 class MotionClass(Message):
-    """Whether writing an object can cause motion, who says so, and whether it can be changed."""
+    """Whether writing an object can cause motion, with the origin of that classification."""
 
     motion: Literal["none", "at_enable", "energises"] | None = Field(
         description="null: it cannot be written"
@@ -39,7 +39,7 @@ class MotionClass(Message):
 
 
 class MotionClassRequest(Message):
-    """What writing an object does, by the word of the person who asks."""
+    """The motion class of an object, as stated by the person of the request."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -57,7 +57,7 @@ class MotionClassRequest(Message):
 
 
 class ImportFinding(Message):
-    """Something odd about a description: where, what, and what was made of it."""
+    """An irregularity in a description: its place, what it is, and how it was handled."""
 
     place: str = Field(description="the file with its line, section or element")
     text: str
@@ -83,7 +83,7 @@ class ImportedDescription(Message):
 
 
 class ReadDictionaryRequest(Message):
-    """Make a profile from what a drive reports of its own objects."""
+    """Make a profile from the object dictionary of a drive."""
 
     url: str
     station: int = Field(ge=0, le=65535)
@@ -91,21 +91,21 @@ class ReadDictionaryRequest(Message):
 
 
 class LineSearchRequest(Message):
-    """Search the baud rate and parity of a serial bus; few stations, for each costs time."""
+    """Search the baud rate and parity of a serial bus; few stations, as each costs time."""
 
     url: str
     stations: list[int] = Field(default=[1], min_length=1, max_length=16)
 
 
 class LineSearchResult(Message):
-    """Result of a line search: the URL with the settings found, None where nothing answered."""
+    """Result of a line search: the URL with the settings found; null if nothing answered."""
 
     url: str | None
     found: list[FoundDrive]
 
 
 class MissingPort(Message):
-    """A port that a drive's family has and that is not connected."""
+    """A port that the drive family has and that is not connected."""
 
     kind: Literal["ethercat", "canopen", "modbus", "mlink"]
     parameters: int = Field(description="parameters that only this port would reach")
@@ -114,7 +114,7 @@ class MissingPort(Message):
 
 
 class ImportedList(Message):
-    """A CSV list stored as a parameter set; lines that could not be used say why."""
+    """A CSV list stored as a parameter set, with the problems of lines that could not be used."""
 
     file: str
     parameters: int

@@ -1,4 +1,4 @@
-"""What the doctor's routes take and give."""
+"""Messages of the doctor's routes."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from backend.tools.wire_message import MessageInfo
 
 
 class DoctorFact(Message):
-    """A piece of evidence as it is and as it should be (null: nobody says).
+    """A piece of evidence: actual and expected value (null: not specified).
 
-    ``shown`` and ``shown_expected`` are the same in the notation of manuals.
+    ``shown`` and ``shown_expected`` are the same values in the notation of manuals.
     """
 
     name: str
@@ -24,7 +24,7 @@ class DoctorFact(Message):
 
 
 class DoctorCause(Message):
-    """A possible cause; the texts in English and Chinese."""
+    """A possible cause, with texts in English and Chinese."""
 
     code: str
     weight: int
@@ -36,7 +36,7 @@ class DoctorCause(Message):
 
 
 class DoctorTrial(Message):
-    """A setting of servodeck's own bring-up that may be the cause, and what can be tried."""
+    """A setting of servodeck's own bring-up that may be the cause, and the value to try."""
 
     setting: str = Field(description="its place in the profile, or cycle")
     before: str = Field(description="as it is; - where the profile has none")
@@ -47,7 +47,7 @@ class DoctorTrial(Message):
 
 
 class StationDiagnosis(Message):
-    """One station; without causes where it is in Operational."""
+    """Diagnosis of one station; without causes if it is in Operational."""
 
     station: int
     reached: bool
@@ -62,7 +62,7 @@ class StationDiagnosis(Message):
 
 
 class TrialRequest(Message):
-    """One of the trials that the last examination of this station has offered."""
+    """One of the trials offered by the last examination of this station."""
 
     url: str
     station: int = Field(ge=1)
@@ -71,7 +71,7 @@ class TrialRequest(Message):
 
 
 class TrialResult(Message):
-    """Result of a trial's job. The setting is undone again."""
+    """Result of a trial's job. The setting has been undone."""
 
     station: int
     setting: str

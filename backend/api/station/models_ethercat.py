@@ -1,4 +1,4 @@
-"""Messages of EtherCAT segments: stations, ports, punctuality, permissions."""
+"""Messages of EtherCAT segments: stations, ports, cycle timing, permissions, EEPROM."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from backend.tools.wire_message import MessageInfo
 
 
 class SegmentPort(Message):
-    """One port of a slave. Counters stop at 255 and count since they were last cleared."""
+    """One port of a slave. Counters saturate at 255 and count since they were last cleared."""
 
     number: int
     link: bool
@@ -22,7 +22,7 @@ class SegmentPort(Message):
 
 
 class SegmentStation(Message):
-    """One slave in the order of the cable."""
+    """One slave; slaves are listed in the order of the cable."""
 
     station: int
     name: str
@@ -52,7 +52,7 @@ class SegmentStation(Message):
 
 
 class LateBin(Message):
-    """Cycles that woke up less than ``below_us`` late, and not less than the bin before."""
+    """Cycles that began less than ``below_us`` late, and at least the previous bin's limit."""
 
     below_us: int | None = Field(description="None: everything above")
     count: int
@@ -77,7 +77,7 @@ class SegmentExchange(Message):
 
 
 class EthercatPermissions(Message):
-    """What is missing to use an interface, and the commands that grant it."""
+    """Permissions that are missing to use an interface, and the commands that grant them."""
 
     interface: str
     ready: bool
@@ -89,7 +89,7 @@ class EthercatPermissions(Message):
 
 
 class EthercatSegment(Message):
-    """A segment as it is now."""
+    """State of a segment now."""
 
     url: str
     connected: bool
@@ -107,14 +107,14 @@ class EthercatSegment(Message):
 
 
 class CountersRequest(Message):
-    """Whose error counters to set to zero; None is all stations."""
+    """Station whose error counters are cleared; null: all stations."""
 
     url: str
     station: int | None = Field(default=None, ge=1)
 
 
 class AliasRequest(Message):
-    """A station alias to write to the EEPROM of a slave."""
+    """Station alias to write to the EEPROM of a slave."""
 
     url: str
     station: int = Field(ge=1)
@@ -123,7 +123,7 @@ class AliasRequest(Message):
 
 
 class EepromDifference(Message):
-    """A field of the EEPROM: what it has (``first``) and what the file has, as bytes in hex."""
+    """A field in the EEPROM (``first``) and in the file (``second``), as bytes in hex."""
 
     field: str = Field(description="a field of the header or a category, as ETG.2010 names it")
     word: int
@@ -132,7 +132,7 @@ class EepromDifference(Message):
 
 
 class EepromComparison(Message):
-    """The EEPROM of a slave next to a file."""
+    """Comparison of the EEPROM of a slave with a file."""
 
     bytes: int
     sound: bool
@@ -146,7 +146,7 @@ class EepromComparison(Message):
 
 
 class EepromPlan(Message):
-    """What is, or was, to be written."""
+    """Contents of a planned or completed change of an EEPROM."""
 
     digest: str = Field(description="confirms this change and no other")
     words: int = Field(description="how many words are written, without the checksum's own steps")

@@ -1,4 +1,4 @@
-"""What the routes of the preflight take and give."""
+"""Messages of the routes of the preflight."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from backend.preflight.verdicts import Grade, Purpose
 
 
 class PreflightRequest(Message):
-    """A measurement. Frames that read one register of all slaves go to ``interface``."""
+    """Settings of a measurement.
+
+    Frames that read one register of all slaves are sent to ``interface``.
+    """
 
     interface: str = Field(default="", max_length=15, description="empty: wake-ups alone")
     seconds: float = Field(default=10.0, ge=1.0, le=60.0)
@@ -26,7 +29,7 @@ class FixRequest(Message):
 
 
 class PreflightFinding(Message):
-    """What hinders, the one whose removal would help most first."""
+    """An obstacle to punctual cycles; listed in the order of their effect, largest first."""
 
     code: Code
     effect: str = Field(description="blocks, interrupts or delays")
@@ -39,7 +42,7 @@ class PreflightFinding(Message):
 
 
 class PreflightVerdict(Message):
-    """Whether a purpose can be served, and the figures it rests on."""
+    """Suitability of the computer for a purpose, and the figures that it rests on."""
 
     purpose: Purpose
     grade: Grade
@@ -50,7 +53,10 @@ class PreflightVerdict(Message):
 
 
 class PreflightRun(Message):
-    """One measured cycle. ``edges_us`` are the upper ends of the classes; one more lies above."""
+    """Timing measured at one cycle time.
+
+    ``edges_us`` are the upper limits of the classes; one more class is above them.
+    """
 
     period_us: int
     cycles: int
@@ -69,7 +75,7 @@ class PreflightRun(Message):
 
 
 class PreflightInfo(Message):
-    """The computer now, with the last measurement of this interface."""
+    """State of the computer now, with the last measurement of this interface."""
 
     interface: str
     kernel: str
@@ -83,7 +89,7 @@ class PreflightInfo(Message):
 
 
 class PreflightUndone(Message):
-    """What was restored, and what somebody had changed since and so was left."""
+    """Settings that were restored, and those left because somebody has changed them since."""
 
     restored: list[str]
     left: list[str]

@@ -1,4 +1,4 @@
-"""Routes of the preflight: is this computer punctual enough, and what would help most."""
+"""Routes of the preflight: whether this computer is punctual enough, and what would help most."""
 
 from __future__ import annotations
 
@@ -43,15 +43,15 @@ async def look(
     interface: Annotated[str, Query(max_length=15)] = "",
     language: Annotated[Language, Query()] = "en",
 ) -> PreflightInfo:
-    """The computer as it is now; verdicts rest on the last measurement of this interface."""
+    """Examine the computer now; verdicts rest on the last measurement of this interface."""
     return await _info(bench, interface, language)
 
 
 @router.post("/preflight", status_code=202)
 async def start_preflight(bench: TheBench, request: PreflightRequest) -> JobInfo:
-    """Measure wake-ups, and with an interface frames, at 1 and 4 kHz; the result is kept."""
+    """Measure wake-ups, with an interface also frames, at 1 and 4 kHz; stores the result."""
     if request.interface:
-        # It sends EtherCAT frames there.
+        # EtherCAT frames are sent to this interface.
         require_not_office(bench.state_folder, f"ethercat://{request.interface}")
     if any(job.kind == "preflight" and job.state == "running" for job in bench.jobs.all()):
         raise Busy("api-station.preflight-runs-already-two")
@@ -71,7 +71,7 @@ async def start_preflight(bench: TheBench, request: PreflightRequest) -> JobInfo
 async def apply_fix(
     bench: TheBench, request: FixRequest, language: Annotated[Language, Query()] = "en"
 ) -> PreflightInfo:
-    """Change settings of the computer; what was there is kept on the disk and can be restored."""
+    """Change settings of the computer; the old values are stored and can be restored."""
     fixes = Fixes(bench.state_folder)
     await asyncio.to_thread(fixes.apply, request.fix, request.interface)
     return await _info(bench, request.interface, language)

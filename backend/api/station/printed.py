@@ -1,4 +1,4 @@
-"""Texts that people give to what is on the bench: printable, so that lists and logs show them."""
+"""Texts that people enter: only printable characters, so that lists and logs can show them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import AfterValidator
 
 
 def _printable(sign: str) -> bool:
-    # Also spaces of another width, such as U+3000 of a Chinese keyboard.
+    # Includes spaces of another width, such as U+3000 of a Chinese keyboard.
     return sign.isprintable() or unicodedata.category(sign) == "Zs"
 
 
@@ -22,7 +22,7 @@ def _require(text: str, allowed: str = "") -> str:
     return text
 
 
-#: One line of printable signs.
+#: One line of printable characters.
 PrintedName = Annotated[str, AfterValidator(_require)]
-#: Lines of printable signs, apart by line feeds (U+000A).
+#: Lines of printable characters, separated by line feeds (U+000A).
 PrintedLines = Annotated[str, AfterValidator(lambda text: _require(text, "\n"))]

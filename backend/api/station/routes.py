@@ -59,13 +59,13 @@ async def health(bench: TheBench) -> Health:
 
 @router.get("/interfaces")
 async def interfaces(bench: TheBench) -> Interfaces:
-    """What this machine can connect through."""
+    """List the interfaces of this machine through which drives can be connected."""
     return list_interfaces(list(bench.buses.wires))
 
 
 @router.get("/profiles")
 async def profiles() -> list[ProfileInfo]:
-    """Profiles that servodeck brings, and the user's own; broken ones say why."""
+    """List the profiles of servodeck and the user's own; broken ones with their problem."""
     return [
         ProfileInfo(
             profile=name,
@@ -99,7 +99,7 @@ def _broken() -> dict[str, Text]:
 
 @router.get("/buses")
 async def buses(bench: TheBench) -> list[Bus]:
-    """Opened buses with their counters."""
+    """List opened buses with their counters."""
     return [convert.bus(bench, url, link) for url, link in bench.buses.opened.items()]
 
 
@@ -107,7 +107,7 @@ async def buses(bench: TheBench) -> list[Bus]:
 async def start_cyclic(
     bench: TheBench, request: CyclicRequest, connection: Connection = None
 ) -> Bus:
-    """Exchange process data with all drives of a bus."""
+    """Start to exchange process data with all drives of a bus."""
     require_bus(bench, request.url, connection)
     await bench.start_cyclic(request.url, request.cycle_us / 1e6)
     return convert.bus(bench, request.url, bench.buses.opened[request.url])
@@ -117,14 +117,18 @@ async def start_cyclic(
 async def stop_cyclic(
     bench: TheBench, url: Annotated[str, Query()], connection: Connection = None
 ) -> Response:
-    """End the cyclic exchange of a bus; what moves is braked."""
+    """End the cyclic exchange of a bus; moving axes are braked."""
     require_bus(bench, url, connection)
     await bench.stop_cyclic(url)
     return Response(status_code=204)
 
 
 def require_bus(bench: Bench, url: str, connection: str | None) -> None:
-    """Control of every drive of a bus."""
+    """Check that the connection may control every drive of a bus.
+
+    Raises:
+        Busy: another person has control of one.
+    """
     for connected in bench.connected_drives.values():
         if any(bench.buses.url_of(port) == url for port in connected.drive.ports):
             bench.leases.require(connected.drive.id, connection)
@@ -139,7 +143,7 @@ async def close_bus(bench: TheBench, url: Annotated[str, Query()]) -> Response:
 
 @router.post("/scan", status_code=202)
 async def scan(bench: TheBench, request: ScanRequest, connection: Connection = None) -> JobInfo:
-    """Look for drives; the job's result is ``{"found": [FoundDrive]}``."""
+    """Search a bus for drives; the job's result is ``{"found": [FoundDrive]}``."""
     require_bus(bench, request.url, connection)
 
     async def work(progress: Progress) -> JobResult:
@@ -155,7 +159,7 @@ async def scan(bench: TheBench, request: ScanRequest, connection: Connection = N
 
 @router.get("/drives")
 async def drives(bench: TheBench, connection: Connection = None) -> list[DriveSummary]:
-    """Drives of the bench."""
+    """List the drives of the bench."""
     return [convert.drive_summary(bench, m, connection) for m in bench.connected_drives.values()]
 
 
@@ -163,7 +167,7 @@ async def drives(bench: TheBench, connection: Connection = None) -> list[DriveSu
 async def connect(
     bench: TheBench, request: ConnectRequest, connection: Connection = None
 ) -> DriveSummary:
-    """Make a station a drive of the bench. Its identity is asked for first."""
+    """Connect a station as a drive of the bench. Its identity is read first."""
     require_bus(bench, request.url, connection)
     seen = await bench.buses.scan(request.url, [request.station], lambda _fraction, _step: None)
     found = next((f for f in seen if f.station == request.station), None)
@@ -184,7 +188,7 @@ def _log_connected(bench: Bench, connected: ConnectedDrive, url: str, station: i
 async def drive(
     bench: TheBench, connected: TheDrive, connection: Connection = None
 ) -> DriveSummary:
-    """One drive."""
+    """Read one drive."""
     return convert.drive_summary(bench, connected, connection)
 
 
@@ -204,9 +208,9 @@ async def update_drive(
 async def add_port(
     bench: TheBench, connected: Controlled, request: PortRequest, connection: Connection = None
 ) -> DriveSummary:
-    """Connect a drive over a second bus; each parameter then goes the way that carries it.
+    """Connect a drive over a second bus; each parameter then uses the bus that carries it.
 
-    Refused where settings read there differ from the drive's, unless that is accepted.
+    Refused if settings read there differ from the drive's, unless that is accepted.
     """
     check = None if request.accept_difference else require_same_drive
     await bench.add_port(connected.drive.id, request.url, request.station, check)
@@ -216,7 +220,7 @@ async def add_port(
 
 @router.delete("/drives/{drive_id}", status_code=204)
 async def remove_drive(bench: TheBench, connected: Controlled) -> Response:
-    """Take a drive off the bench."""
+    """Remove a drive from the bench."""
     await bench.remove(connected.drive.id)
     bench.audit.add(Fact("station", "taken off the bench", connected.drive.name))
     return Response(status_code=204)
@@ -245,13 +249,13 @@ def _job(bench: TheBench, job_id: str) -> Job:
 
 @router.get("/jobs")
 async def jobs(bench: TheBench) -> list[JobInfo]:
-    """Jobs of this session, oldest first."""
+    """List the jobs of this session, oldest first."""
     return [convert.job(job) for job in bench.jobs.all()]
 
 
 @router.get("/jobs/{job_id}")
 async def job(bench: TheBench, job_id: str) -> JobInfo:
-    """One job."""
+    """Read one job."""
     return convert.job(_job(bench, job_id))
 
 
@@ -259,7 +263,7 @@ async def job(bench: TheBench, job_id: str) -> JobInfo:
 async def cancel_job(
     bench: TheBench, people: ThePeople, me: Me, job_id: str, connection: Connection = None
 ) -> JobInfo:
-    """Cancel a job and wait for its cleanup. A motion everybody may end, as with STOP."""
+    """Cancel a job and wait for its cleanup. Everybody may cancel a motion, as with STOP."""
     found = _job(bench, job_id)
     if not (found.motion and found.stoppable):
         require_right(people, me, Right.FILES, found.drive)
@@ -273,15 +277,15 @@ async def cancel_job(
 
 @router.post("/stop")
 async def stop(bench: TheBench, request: StopRequest | None = None) -> StopResult:
-    """STOP: always allowed, for everyone; without a body, of every axis.
+    """STOP: always permitted, to everybody; without a body, for every axis.
 
-    The quick stop goes out at once; the answer comes when the axes stand, or after the time that
-    their ramps allow and what is done then.
+    The quick stop is sent at once. The answer follows when the axes are at standstill, or after the
+    time that their ramps allow and the measures taken then.
     """
     request = request or StopRequest()
     wanted = [request.drive] if request.drive is not None else list(bench.connected_drives)
     known = [drive_id for drive_id in wanted if drive_id in bench.connected_drives]
-    # Of a machine with two axes, the other one is stopped as well.
+    # On a machine with two axes, the other one is stopped as well.
     stopped = list(await bench.motion.stop(known))
     bench.journal.add(text("station.stop-pressed"), level="warning", drive=request.drive)
     return stop_result(bench, wanted, await bench.motion.standstill(stopped))
@@ -289,11 +293,11 @@ async def stop(bench: TheBench, request: StopRequest | None = None) -> StopResul
 
 @router.get("/log")
 async def log(bench: TheBench) -> list[LogEntry]:
-    """The tool's log, newest first."""
+    """Read the station's log, newest first."""
     return [convert.log_entry(entry) for entry in bench.journal.entries()]
 
 
 @router.get("/drives/{drive_id}/log")
 async def drive_log(bench: TheBench, connected: TheDrive) -> list[LogEntry]:
-    """The log of one drive, newest first."""
+    """Read the log of one drive, newest first."""
     return [convert.log_entry(entry) for entry in bench.journal.entries(connected.drive.id)]

@@ -1,1 +1,1 @@
-"""Measurements, notches, gains, design and the automatic tuning."""
+"""Routes of measurements, notches, gains, design and the automatic tuning."""

@@ -1,4 +1,4 @@
-"""Routes of notches, gains and design on stored responses."""
+"""Routes of notches, gains, and design on stored responses."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def _notches(wanted: Sequence[NotchShape | None]) -> list[Notch | None]:
 
 
 async def _note(bench: Bench, connected: ConnectedDrive, what: str, before: dict[str, int]) -> Undo:
-    """Keep a change for the report, with what the drive says now; returns the way back."""
+    """Record a change for the report, with the values read back; returns the values to undo it."""
     after = {key: await connected.drive.raw(key) for key in before}
     change_log(bench).add(connected.drive.id, Change(datetime.now(UTC), what, before, after))
     return Undo(before=before, after=after)
@@ -87,7 +87,7 @@ async def _note(bench: Bench, connected: ConnectedDrive, what: str, before: dict
 
 @router.get("/drives/{drive_id}/notches")
 async def read_notches(connected: TheDrive) -> list[NotchSlotInfo]:
-    """All notches of the drive, read now."""
+    """Read all notches of the drive."""
     return [
         NotchSlotInfo(
             slot=s.slot,
@@ -104,7 +104,7 @@ async def read_notches(connected: TheDrive) -> list[NotchSlotInfo]:
 
 @router.post("/drives/{drive_id}/notches/preview")
 async def preview_notches(connected: TheDrive, request: NotchPreviewRequest) -> NotchPreviewInfo:
-    """What the drive would make of these notches. Nothing is read or written."""
+    """Preview how the drive would realise these notches. Nothing is read or written."""
     profile, name = connected.drive.profile, connected.drive.name
     wanted, meaning = _notches(request.notches), meaning_of(connected.drive)
     slots = [notch.encode(profile, name, n, w, None, meaning) for n, w in enumerate(wanted)]
@@ -130,7 +130,7 @@ async def preview_notches(connected: TheDrive, request: NotchPreviewRequest) -> 
 
 @router.put("/drives/{drive_id}/notches")
 async def write_notches(bench: TheBench, connected: Controlled, request: NotchWrite) -> Undo:
-    """Write all notches and make them act; saving is another step."""
+    """Write all notches and put them into effect; saving in the drive is a separate step."""
     with bench.motion.keeping_still(connected):
         before = await notch.write_notches(
             connected.axis, _notches(request.notches), meaning_of(connected.drive)
@@ -144,7 +144,7 @@ async def write_notches(bench: TheBench, connected: Controlled, request: NotchWr
 
 @router.get("/drives/{drive_id}/gains")
 async def read_gains(connected: TheDrive) -> GainInfo:
-    """Loop gains, read now."""
+    """Read the loop gains."""
     facts = await read_facts(connected.axis)
     found = await gains.read_gains(connected.axis, facts)
     tables = connected.drive.profile.stiffness
@@ -160,7 +160,7 @@ async def read_gains(connected: TheDrive) -> GainInfo:
 
 @router.put("/drives/{drive_id}/gains")
 async def write_gains(bench: TheBench, connected: Controlled, request: GainWrite) -> Undo:
-    """Write gains or a stiffness level and make them act; saving is another step."""
+    """Write gains or a stiffness level and put them into effect; saving is a separate step."""
     if (request.gains is None) == (request.level is None):
         raise OutOfRange("api-tuning.give-either-gains-level", drive=connected.drive.name)
     if request.gains is not None:
@@ -186,9 +186,9 @@ def _gains(speed_hz: float, integral_hz: float, position_1_s: float, inertia_kgm
 
 @router.post("/drives/{drive_id}/tune/undo")
 async def undo_tuning(bench: TheBench, connected: Controlled, request: Undo) -> Undo:
-    """Put back what a change returned as `before`; returns what was there until now.
+    """Restore the values that a change returned as `before`; returns the undo of that.
 
-    With the change's `after` nothing is restored over what somebody else has written since.
+    If the change's `after` is given, a value that was written since is not overwritten.
     """
     with bench.motion.keeping_still(connected):
         now = {key: await connected.drive.raw(key) for key in request.before}
@@ -202,7 +202,11 @@ async def undo_tuning(bench: TheBench, connected: Controlled, request: Undo) -> 
 
 
 def _require_untouched(drive: Drive, undo: Undo, now: Mapping[str, int]) -> None:
-    """Raises NotAllowed where a value is neither what the change wrote nor what was there."""
+    """Check that no value was written since the change.
+
+    Raises:
+        NotAllowed: a value is neither what the change wrote nor what was there before.
+    """
     for key, left in (undo.after or {}).items():
         raw = now.get(key)
         if raw is not None and raw not in (left, undo.before[key]):
@@ -218,7 +222,7 @@ def _require_untouched(drive: Drive, undo: Undo, now: Mapping[str, int]) -> None
 
 @lru_cache(maxsize=4)
 def _evaluated(file: Path, _changed_ns: int) -> sweep_evaluation.SweepResult:
-    """A stored response; a person who drags a notch asks for the same one many times a second."""
+    """Evaluate a stored response; cached, as dragging a notch requests it many times a second."""
     measurement = unpack(file.read_bytes(), file.name)
     if measurement.meta.get("tool") != "sweep":
         raise BadMeasurement("api-tuning.not-frequency-response", value=file.name)
@@ -230,7 +234,7 @@ def _evaluated(file: Path, _changed_ns: int) -> sweep_evaluation.SweepResult:
         ) from error
 
 
-#: Evaluations that run now, each on its event loop.
+#: Running evaluations, each on its event loop.
 _Running = dict[
     tuple[asyncio.AbstractEventLoop, Path, int], asyncio.Task[sweep_evaluation.SweepResult]
 ]
@@ -238,10 +242,10 @@ _running: _Running = {}
 
 
 async def _evaluated_once(file: Path, changed_ns: int) -> sweep_evaluation.SweepResult:
-    """As `_evaluated`; who asks while another's evaluation runs waits for that one.
+    """Like `_evaluated`; concurrent requests for the same response share one evaluation.
 
-    A page that opens a response asks several questions about it at once, each of which would
-    take a processor for itself.
+    A page that opens a response sends several requests at once, each of which
+    would occupy a processor.
     """
     place = (asyncio.get_running_loop(), file, changed_ns)
     task = _running.get(place)
@@ -266,7 +270,7 @@ async def _plant(bench: Bench, name: str) -> tuple[MeasuredPlant, sweep_evaluati
 async def candidates(
     bench: TheBench, connected: TheDrive, request: CandidatesRequest
 ) -> CandidatesInfo:
-    """Notch sets and gains for a stored response. Nothing is written."""
+    """List notch sets and gains for a stored response. Nothing is written."""
     plant, found = await _plant(bench, request.measurement)
     facts = sweep_evaluation.completed(await read_facts(connected.axis), found)
     load = request.load or tune_candidates.load_class(found)
@@ -284,7 +288,7 @@ async def candidates(
 
 @router.post("/drives/{drive_id}/tune/predict")
 async def predict(bench: TheBench, connected: TheDrive, request: PredictRequest) -> PredictionInfo:
-    """The speed loop that notches and gains would make of a stored response."""
+    """Predict the speed loop of a stored response with these notches and gains."""
     plant, found = await _plant(bench, request.measurement)
     facts = sweep_evaluation.completed(await read_facts(connected.axis), found)
     wanted = [n for n in _notches(request.notches) if n is not None]

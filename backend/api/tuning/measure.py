@@ -1,4 +1,4 @@
-"""Routes of tuning that move the axis: measurements and the automatic tuning."""
+"""Routes of the tools: measurements, automatic tuning, and their settings."""
 
 from __future__ import annotations
 
@@ -52,12 +52,11 @@ for part in (routes_design, routes_measurements, routes_report, routes_response_
 def partner_of(
     bench: Bench, connected: ConnectedDrive, name: str, connection: str | None
 ) -> ConnectedDrive:
-    """The other axis of a machine, by its name or identifier; nobody else may have control of it.
+    """The other axis of a machine, by its name or id. Nobody else may have control of it.
 
     Raises:
-        NotAllowed: there is none, several have this name, it is on another bus, or somebody else
-            has control.
-        Busy: it is moved.
+        NotAllowed: there is none on the same bus, or several have this name.
+        Busy: somebody else has control of it, or it is moved.
     """
     known = list(bench.connected_drives.values())
     named = [m for m in known if m.drive.id == name]
@@ -67,7 +66,7 @@ def partner_of(
     if not found:
         raise NotAllowed("station.no-partner", drive=connected.drive.name, value=name)
     if len(found) > 1:
-        # To guess would move an axis that nobody meant.
+        # A guess might move an axis that nobody meant.
         ids = ", ".join(each.drive.id for each in found)
         raise NotAllowed("station.partners-of-one-name", value=name, ids=ids)
     bench.leases.require(found[0].drive.id, connection)
@@ -82,7 +81,7 @@ async def start_tool(
     request: ToolSettings,
     partner: ConnectedDrive | None = None,
 ) -> JobInfo:
-    """Start a tool as a job, as its route does for whoever acts now.
+    """Start a tool as a job, like its route, for the person who acts now.
 
     Raw data are stored before they are evaluated. ``partner`` is moved as well, see `Tool.pair`.
 
@@ -103,7 +102,8 @@ async def start_tool(
         exchange.taken = True
         limits, axis = request.envelope, connected.axis
         try:
-            # A server that has just started still loads them, and could not renew a motion.
+            # A server that has just started still loads libraries, and could not
+            # renew a motion meanwhile.
             await asyncio.to_thread(libraries.load)
             async with AsyncExitStack() as held:
                 for each in (axis,) if partner is None else (axis, partner.axis):
@@ -150,7 +150,7 @@ _LOOP = "sweep-speed_loop"
 
 
 def _loop_verdict(result: ToolResult) -> dict[str, object] | None:
-    """The verdict that a tuning left on its loop, which rests on other measurements as well."""
+    """The verdict of a tuning on its loop, which also rests on other measurements."""
     if not isinstance(result, AutotuneAnswer) or result.verified is None:
         return None
     verdict = result.verified.verdict
@@ -158,7 +158,7 @@ def _loop_verdict(result: ToolResult) -> dict[str, object] | None:
 
 
 def _answer(found: ToolResult, files: Sequence[str]) -> JobResult:
-    """The result with the names of its stored raw data, as a job has it."""
+    """The result of a job, with the names of its stored raw data."""
     whole = found.model_copy(update={"measurements": tuple(files)})
     return dict(whole.model_dump(mode="json"))
 
@@ -166,9 +166,10 @@ def _answer(found: ToolResult, files: Sequence[str]) -> JobResult:
 def _conclude(
     store: MeasurementStore, files: Sequence[str], tool: AnyTool, result: ToolResult
 ) -> None:
-    """Keep with the raw data what was concluded from them.
+    """Store the result with the raw data that it was evaluated from.
 
-    Of several files of a kind (designs that were undone) the last one made the result.
+    If there are several files of a kind (of designs that were undone), the
+    result is of the last one.
     """
     kinds = {store.head(file).kind: file for file in files}
     parts = dict.fromkeys(kinds, result) if tool.parts is None else tool.parts(result)
@@ -181,7 +182,7 @@ def _conclude(
 
 @router.post("/drives/{drive_id}/tune/excitation")
 async def preview_excitation(connected: TheDrive, request: SweepRequest) -> ExcitationInfo:
-    """What a frequency response would play. Nothing moves."""
+    """Preview the excitation of a frequency response. Nothing moves."""
     found = await preview(connected.axis, request.inner, 1e3 / request.cycle_ms)
     return ExcitationInfo(
         unit=found.unit, time_s=found.time_s.tolist(), value=found.value.tolist(),
@@ -193,7 +194,7 @@ async def preview_excitation(connected: TheDrive, request: SweepRequest) -> Exci
 
 @router.get("/tools")
 async def list_tools() -> list[ToolInfo]:
-    """Every tool: its words, and the form of its settings."""
+    """List all tools with their texts and the schema of their settings."""
     return [
         ToolInfo(
             kind=tool.kind,
@@ -236,7 +237,7 @@ async def _start_reading(
 
 
 def _add(tool: AnyTool) -> None:
-    """The route that starts this tool."""
+    """Add the route that starts this tool."""
 
     async def start_reading(
         bench: TheBench, connected: TheDrive, recordings: TheRecordings, request: BaseModel
@@ -256,11 +257,11 @@ def _add(tool: AnyTool) -> None:
     ) -> JobInfo:
         name = str(request.model_dump()["partner"])
         partner = partner_of(bench, connected, name, connection)
-        # The gate knows of the drive in the path alone; a guest may have rights on that one only.
+        # The gate checks the drive in the path only; a guest may have rights on that one alone.
         require_right(people, me, tool.right, partner.drive.id)
         return await start_tool(bench, connected, tool, request, partner)
 
-    # The body is the tool's own settings, which the interface's description shows.
+    # The body is the tool's own settings model, which the OpenAPI document then shows.
     moving = start_pair if tool.pair else start
     route = moving if tool.motion else start_reading
     route.__annotations__["request"] = tool.settings

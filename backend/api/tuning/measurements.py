@@ -1,4 +1,4 @@
-"""Routes of stored measurements: list, evaluate again, take in, hand out, delete."""
+"""Routes of stored measurements: list, evaluate again, upload, download, sign, delete."""
 
 from __future__ import annotations
 
@@ -28,15 +28,16 @@ _MAX_BYTES = 64 * 1024 * 1024
 
 
 def change_log(bench: Bench) -> ChangeLog:
-    """What tuning wrote, drive by drive."""
+    """The log of changes made by tuning, by drive."""
     return ChangeLog(bench.state_folder / "changes")
 
 
 def load_measurement(bench: Bench, name: str) -> Measurement:
-    """A stored measurement.
+    """Load a stored measurement.
 
     Raises:
-        NotFound: there is none of this name. BadMeasurement: not usable.
+        NotFound: there is none of this name.
+        BadMeasurement: it is not usable.
     """
     try:
         return bench.measurements.load(name)
@@ -47,10 +48,11 @@ def load_measurement(bench: Bench, name: str) -> Measurement:
 
 
 def measurement_head(bench: Bench, name: str) -> Head:
-    """What a stored measurement says of itself.
+    """Read the header of a stored measurement.
 
     Raises:
-        NotFound: there is none of this name. BadMeasurement: not usable.
+        NotFound: there is none of this name.
+        BadMeasurement: it is not usable.
     """
     try:
         return bench.measurements.head(name)
@@ -76,7 +78,7 @@ def info_of(name: str, found: Head) -> MeasurementInfo:
 
 @router.get("/measurements")
 async def list_measurements(bench: TheBench) -> list[MeasurementInfo]:
-    """Stored measurements, newest first; unusable ones say why."""
+    """List stored measurements, newest first; unusable ones with their problem."""
     return await asyncio.to_thread(_listed, bench)
 
 
@@ -97,7 +99,7 @@ def _listed(bench: Bench) -> list[MeasurementInfo]:
 
 @router.get("/measurements/{name}")
 async def read_measurement(bench: TheBench, name: str) -> MeasurementContent:
-    """One measurement, evaluated again from its raw data and compared with its first result."""
+    """Read a measurement, evaluated again from its raw data and compared with its first result."""
     found = await asyncio.to_thread(load_measurement, bench, name)
     made = await asyncio.to_thread(evaluate, found)
     settings = found.meta.get("settings")
@@ -114,7 +116,7 @@ async def read_measurement(bench: TheBench, name: str) -> MeasurementContent:
 
 @router.get("/measurements/{name}/file", response_class=Response)
 async def download_measurement(bench: TheBench, name: str) -> Response:
-    """The file itself, raw signals included, also when it is damaged."""
+    """Download the file with its raw signals, even if it is damaged."""
     try:
         data = await asyncio.to_thread(bench.measurements.read, name)
     except NotAllowed as error:
@@ -130,7 +132,7 @@ async def download_measurement(bench: TheBench, name: str) -> Response:
 async def upload_measurement(
     bench: TheBench, request: Request, name: Annotated[str, Query(max_length=100)]
 ) -> MeasurementInfo:
-    """Take a file of another computer; the body is the file."""
+    """Store a file from another computer; the body is the file."""
     data = await request.body()
     if len(data) > _MAX_BYTES:
         raise OutOfRange(
@@ -145,9 +147,9 @@ async def upload_measurement(
 async def sign_measurement(
     bench: TheBench, me: Me, name: str, request: SignatureRequest
 ) -> SafetyResult:
-    """Sign the record of a safety function, once. It certifies nothing.
+    """Sign the record of a safety function; possible once. The signature certifies nothing.
 
-    Who is logged in signs by that name; ``person`` counts where the page is used without accounts.
+    A person who is logged in signs by that name; ``person`` is used on stations without accounts.
     """
     person = (request.person if me.kind == "local" else me.person).strip()
     if not person:
@@ -175,7 +177,7 @@ async def sign_measurement(
 
 @router.delete("/measurements/{name}", status_code=204)
 async def delete_measurement(bench: TheBench, name: str) -> None:
-    """Delete a file, also one that is damaged."""
+    """Delete a file, even if it is damaged."""
     try:
         bench.measurements.delete(name)
     except NotAllowed as error:

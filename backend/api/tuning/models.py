@@ -14,7 +14,7 @@ from backend.tools.wire_message import MessageInfo
 
 
 class ToolInfo(Message):
-    """A tool as its descriptor has it."""
+    """Descriptor of a tool."""
 
     kind: str
     texts: dict[str, list[str]] = Field(description="English, Chinese")
@@ -23,7 +23,7 @@ class ToolInfo(Message):
 
 
 class ExcitationInfo(Message):
-    """What a frequency response would play, as far as it is known before the axis is felt."""
+    """Excitation of a frequency response, as far as it is known before the axis is measured."""
 
     unit: str
     time_s: list[float]
@@ -46,7 +46,7 @@ class NotchShape(Message):
 
 
 class RealisedInfo(Message):
-    """What the drive really does after rounding; null where it cannot be said."""
+    """Notch that the drive realises after rounding; null where it is not determined."""
 
     center_hz: float
     width_hz: float | None
@@ -75,7 +75,7 @@ class NotchPreviewRequest(Message):
 
 
 class NotchPreviewInfo(Message):
-    """What they would become, and their common response at the frequencies asked for."""
+    """Realised notches, and their combined response at the requested frequencies."""
 
     slots: list[NotchSlotInfo]
     magnitude_db: list[float]
@@ -89,7 +89,7 @@ class NotchWrite(Message):
 
 
 class GainValues(Message):
-    """Gains with a physical meaning. ``inertia_kgm2`` is the whole axis'."""
+    """Gains with a physical meaning. ``inertia_kgm2`` is that of the whole axis."""
 
     speed_bandwidth_hz: float = Field(gt=0)
     integral_hz: float = Field(gt=0)
@@ -105,7 +105,7 @@ class GainWrite(Message):
 
 
 class GainInfo(Message):
-    """Gains now; null where they have no printed meaning or do not exist."""
+    """Present gains; null where they do not exist or their unit is not documented."""
 
     convention: str
     position_1_s: float | None
@@ -122,10 +122,10 @@ class GainInfo(Message):
 
 
 class Undo(Message):
-    """Raw values that were there before; writing them back undoes the change.
+    """Raw values before a change; writing them back undoes it.
 
-    ``after`` is what the change left: where it is given and something else is there now, nothing
-    is undone, as somebody has changed it since.
+    ``after`` are the values that the change left: if they are given and the drive has other ones
+    now, nothing is undone, as somebody has changed them since.
     """
 
     before: dict[str, int]
@@ -146,7 +146,7 @@ class MeasurementInfo(Message):
 
 
 class MeasurementContent(Message):
-    """Its settings, and its result evaluated again from the raw data."""
+    """Settings of a measurement, and its result evaluated again from the raw data."""
 
     info: MeasurementInfo
     settings: dict[str, object]
@@ -162,7 +162,7 @@ class MeasurementContent(Message):
 
 
 class CandidatesRequest(Message):
-    """Design on a stored frequency response of the mechanics."""
+    """Request for designs on a stored frequency response of the mechanics."""
 
     measurement: str
     inertia_kgm2: float = Field(gt=0)
@@ -173,14 +173,14 @@ class CandidatesRequest(Message):
 
 
 class CandidatesInfo(Message):
-    """The table, fastest first; up to three rows carry a mark."""
+    """Candidates, fastest first; up to three of them carry a mark."""
 
     load: str
     candidates: list[CandidateInfo]
 
 
 class PredictRequest(Message):
-    """Notches and gains on a stored frequency response of the mechanics."""
+    """Notches and gains to predict on a stored frequency response of the mechanics."""
 
     measurement: str
     notches: list[NotchShape] = Field(default_factory=list)
@@ -188,7 +188,7 @@ class PredictRequest(Message):
 
 
 class PredictionInfo(Message):
-    """Predicted speed loop: curves over ``frequency_hz`` and the step of its reference."""
+    """Predicted speed loop: curves over ``frequency_hz`` and the step response to its reference."""
 
     frequency_hz: list[float]
     open_db: list[float]
@@ -202,7 +202,7 @@ class PredictionInfo(Message):
 
 
 class SignatureRequest(Message):
-    """Who signs a record where nobody is logged in by name, and what is to be known of it."""
+    """Person who signs a record where nobody is logged in by name, and notes."""
 
     person: str = Field(default="", max_length=200)
     notes: str = Field(default="", max_length=4000)

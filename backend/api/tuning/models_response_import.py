@@ -1,4 +1,4 @@
-"""What is said of a recording that another program made, and what it holds."""
+"""Messages about a recording of another program: its contents and how to evaluate it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class RecordingColumn(Message):
 
 
 class RecordingPreview(Message):
-    """The table that a file holds."""
+    """Table contained in a file."""
 
     form: str
     rows: int
@@ -35,7 +35,7 @@ class RecordingPreview(Message):
 
 
 class ImportQuery(Message):
-    """Columns by name or number, units, and what the axis is."""
+    """Columns by name or number, units, and the structure of the axis."""
 
     name: str = Field(max_length=200, description="name of the file, for messages")
     time: str | None = Field(None, max_length=200)

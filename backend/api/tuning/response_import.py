@@ -1,4 +1,4 @@
-"""Routes of recordings that other programs made: their columns, and their responses."""
+"""Routes of recordings of other programs: their columns, and their responses."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from backend.response_import.process import ImportTask, import_in_process
 
 router = APIRouter()
 FileName = Annotated[str, Query(max_length=200, description="name of the file, for messages")]
-#: Evaluations at once: each may take a processor and much memory.
+#: Semaphores by event loop: one evaluation at a time, as each may use a processor and much memory.
 _at_once: dict[asyncio.AbstractEventLoop, asyncio.Semaphore] = {}
 
 
@@ -33,7 +33,7 @@ async def _run(task: ImportTask) -> dict[str, object]:
 
 @router.post("/measurements/import/preview")
 async def preview_recording(request: Request, name: FileName) -> RecordingPreview:
-    """Columns of a recording of another program; the body is the file. Nothing is stored."""
+    """Preview the columns of another program's recording (the body). Nothing is stored."""
     found = await _run(ImportTask(await request.body(), name, None))
     return RecordingPreview.model_validate(found)
 
@@ -61,7 +61,7 @@ async def import_recording(
 
 
 def _store(bench: TheBench, name: str, packed: str) -> str:
-    """Under the time and a plain form of the file's name; never over another file."""
+    """Store the result under the time and a plain form of the file's name, never over another."""
     stem = re.sub(r"[^\w-]+", "-", PurePath(name.replace("\\", "/")).name.split(".")[0])[:40]
     begin = f"{datetime.now(UTC):%Y%m%d-%H%M%S}-imported-{stem.strip('-') or 'recording'}"
     whole, number = begin + SUFFIX, 2

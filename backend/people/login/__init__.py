@@ -1,1 +1,1 @@
-"""Log-in under attack: budgets of wrong tries, turns at the hash, browsers that are known."""
+"""Log-in under attack: budgets of wrong tries, turns at the password hash, known browsers."""

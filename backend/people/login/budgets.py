@@ -1,11 +1,11 @@
-"""How often somebody may try a name and password wrongly before waits begin.
+"""Budgets of wrong tries of name and password, after which waits begin.
 
-Whoever guesses is slowed; whoever knows the password is not kept out by those who guess:
+Guessing is slowed down; guesses by others do not lock out a person who knows the password:
 
-- A browser that has logged in to an account before (`backend.people.login.devices`) has a budget
-  of its own for that account.
-- Everybody else has one for each name from each address. What other addresses did wrong only
-  makes it smaller, down to one try at a time: the first try of an address is never refused.
+- A browser that has logged in to an account before (`backend.people.login.devices`) has a budget of
+  its own for that account.
+- Every other client has a budget for each name from each address. Wrong tries from other addresses
+  only reduce it, down to one try at a time: the first try of an address is never refused.
 """
 
 from __future__ import annotations
@@ -19,37 +19,38 @@ from backend.people.throttle import Throttle
 
 #: Wrong tries before waits begin: of a name from one address, or from a known browser.
 FREE = 5
-#: The same once a name, or an address, has been tried wrongly this often within an hour.
+#: Wrong tries within an hour above which a name or an address counts as under attack, and the free
+#: tries that are left then.
 CROWDED, FREE_IN_CROWD = 20, 1
-#: An IPv6 host has as many addresses as it likes within its network.
+#: Prefix length. An IPv6 host can use any number of addresses within its network.
 _IPV6_NETWORK = 64
 
 
 class LoginBudgets:
-    """With wrong tries, counted by name, by address and by both together."""
+    """Wrong tries, counted by name, by address and by the pair of both."""
 
     def __init__(self) -> None:
         self._pairs = Throttle(FREE)
         self._names, self._addresses = Throttle(CROWDED), Throttle(CROWDED)
 
     def require(self, name: str, address: str, device: str = "") -> None:
-        """One may be tried now; ``device`` is the browser known for this account, if it is one.
+        """Check that a try is allowed now; ``device`` is the id of a known browser, or empty.
 
         Raises:
-            TooOften: not yet.
+            TooOften: a wait is still running.
         """
         wait = self._pairs.wait_s(_pair(name, address, device))
         if wait > 0:
             raise TooOften("people.too-many-wrong-tries", wait)
 
     def tried(self, name: str, address: str, device: str = "") -> None:
-        """Count a try as a wrong one, until `succeeded` says otherwise."""
+        """Count a try as wrong, until `succeeded` is called."""
         if device:
             self._pairs.failed(_pair(name, address, device))
             return
         key, place = _name(name), address_group(address)
         self._names.failed(key)
-        # Behind a proxy everybody comes from this machine: one must not make it hard for all.
+        # Behind a proxy all clients have this machine's address: one must not slow down all.
         if not _is_loopback(address):
             self._addresses.failed(place)
         crowded = max(self._names.failures(key), self._addresses.failures(place)) > CROWDED
@@ -60,7 +61,7 @@ class LoginBudgets:
         return self._addresses.failures(address_group(address))
 
     def succeeded(self, name: str, address: str, device: str = "") -> None:
-        """It was right; the wrong tries before are forgotten."""
+        """Reset the counts after a right password."""
         self._pairs.succeeded(_pair(name, address, device))
         if not device:
             self._names.succeeded(_name(name))
@@ -68,7 +69,7 @@ class LoginBudgets:
 
 
 def address_group(address: str) -> str:
-    """Addresses that one computer may have at will are one: an IPv6 network, an IPv4 address."""
+    """Group of addresses that one computer may use at will: IPv6 network, or IPv4 address."""
     try:
         known = ipaddress.ip_address(address.partition("%")[0])
     except ValueError:
@@ -82,7 +83,7 @@ def address_group(address: str) -> str:
 
 
 def _name(name: str) -> str:
-    """As it is looked up; of a fixed length, however long a name somebody sends."""
+    """Hash of the name's lookup key; its length is fixed, however long the name that was sent."""
     return hashlib.sha256(name_key(name).encode()).hexdigest()
 
 

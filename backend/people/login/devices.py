@@ -1,9 +1,9 @@
 """Browsers that have logged in to an account before, known by a signed cookie.
 
-The cookie opens nothing. It only sets its owner apart from strangers: their tries at the same
-name, however many, use up neither its budget nor its turn. (The method is OWASP's "slow down
-online guessing attacks with device cookies".) It names the account by its number and is signed
-with a key that the station keeps next to its database.
+The cookie gives no access. It only separates its owner from strangers, whose tries at the same
+name, however many, use up neither its budget nor its turn. (The method is OWASP's "slow down online
+guessing attacks with device cookies".) It contains the account's number and is signed with a key
+that the station keeps next to its database.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ class Device:
 
 
 class KnownDevices:
-    """Signs and checks; without a ``key`` nobody is known beyond this run of the server."""
+    """Signs and checks device cookies; without a ``key``, for this run of the server only."""
 
     def __init__(self, key: bytes = b"") -> None:
         self._key = key or secrets.token_bytes(32)
 
     def issue(self, account: int) -> str:
-        """A cookie for a browser that has just logged in to this account."""
+        """Make the cookie for a browser that has just logged in to this account."""
         device = f"{secrets.token_hex(12)}.{account}"
         return f"{device}.{self._sign(device)}"
 
     def known(self, cookie: str | None) -> Device | None:
-        """Whose browser it is; None for a cookie that is not ours, or none."""
+        """Browser and account of a cookie; None if there is none or its signature is wrong."""
         device, _, signature = (cookie or "").rpartition(".")
         identity, _, account = device.partition(".")
         if not account.isdecimal() or len(account) > 18 or not account.isascii():

@@ -1,9 +1,9 @@
-"""The note next to the database that this station has accounts.
+"""Marker file next to the database, which states that this station has accounts.
 
-A database file that was emptied, lost or replaced looks like a station that never had any, and
-such a station lets whoever reaches it do everything. So that there are accounts also stands in
-``accounts.json`` in the state folder, with the key of the known browsers, and a station that finds
-the note without an administrator in its database does not start.
+A database file that was emptied, lost or replaced looks like a station that never had accounts, and
+such a station lets anyone who reaches it do everything. The fact is therefore also stored in
+``accounts.json`` in the state folder, with the key of the known browsers. A station that finds the
+marker without an administrator in its database does not start.
 """
 
 from __future__ import annotations
@@ -22,35 +22,36 @@ _KEY_BYTES = 32
 
 
 class AccountsMissing(NotAllowed):
-    """The station has had accounts, and its database has none."""
+    """The station has had accounts, but its database has no administrator."""
 
     kind = "accounts-gone"
 
 
 @dataclass(frozen=True, slots=True)
 class Marker:
-    """Since when (UTC) there are accounts, empty where the note is unreadable; the devices' key."""
+    """Since when (UTC) there are accounts (empty if unreadable), and the key of device cookies."""
 
     since: str
     key: bytes
 
 
 class AccountsMarker:
-    """The note of one state folder. All of it blocks."""
+    """Marker file of one state folder. All methods block."""
 
     def __init__(self, folder: Path) -> None:
         self.path = folder / FILE
 
     @property
     def exists(self) -> bool:
-        """Whether the station has ever had accounts; a note that cannot be read is one."""
+        """Whether the station has ever had accounts; an unreadable marker also counts."""
         return self.path.is_symlink() or self.path.exists()
 
     def read(self) -> Marker | None:
-        """The note, or None where there is none; one that is damaged still says that there is one.
+        """Read the marker; None if there is none. A damaged marker is returned with empty values.
 
         Raises:
-            AccountsMissing: it cannot be read, so that nobody can know.
+            AccountsMissing: the file cannot be read, so that it is unknown
+            whether there are accounts.
         """
         try:
             content = json.loads(self.path.read_bytes())
@@ -68,7 +69,7 @@ class AccountsMarker:
             ) from error
 
     def write(self) -> Marker:
-        """Note that there are accounts, unless that is noted; a damaged note is written again.
+        """Write the marker, unless a valid one exists; a damaged one is replaced.
 
         Raises:
             StorageFailed: it cannot be written.
@@ -78,15 +79,15 @@ class AccountsMarker:
             return found
         made = Marker(datetime.now(UTC).isoformat(timespec="seconds"), secrets.token_bytes(32))
         content = {"version": 1, "since": made.since, "device_key": made.key.hex()}
-        # Temporary files are made readable by their user only, and so is what they become.
+        # Temporary files are readable by their user only, and the renamed file keeps that mode.
         write_atomically(self.path, json.dumps(content, indent=2).encode())
         return made
 
     def require_accounts(self, database: Path | None, *, set_up: bool) -> None:
-        """A station that has had accounts still has an administrator.
+        """Check that a station that has had accounts still has an administrator.
 
         Raises:
-            AccountsMissing: it has none; the message says how to recover on purpose.
+            AccountsMissing: it has none; the message states how to recover on purpose.
         """
         found = self.read()
         if found is None or set_up:

@@ -1,11 +1,12 @@
-"""Turns at the password hash: one at a time, and nobody's crowd keeps another waiting.
+"""Queue for the password hash: one computation at a time, and no crowd delays other clients.
 
-A hash costs a tenth of a second of a core on purpose, and more than one at a time would keep the
-cores from what moves. So turns are given in a fixed order: first to those who are known (a browser
-that has logged in before, somebody who changes their password), then to everybody else's address
-with the fewest wrong tries, and between equal ones in rotation: those who guess go behind those
-who have not been wrong. Of one address the newest has the turn and the oldest goes away with "try
-again", so that a crowd of guesses in front does not keep back the one that comes after it.
+A hash deliberately costs a tenth of a second of a core, and several at a time would take the
+cores from the cyclic exchange. Turns are therefore given in a fixed order: first to known
+clients (a browser that has logged in before, somebody who changes their password), then to the
+other address with the fewest wrong tries, and between equal ones in rotation: clients that guess
+come after those that have not been wrong. Within one address the newest client has the turn and
+the oldest is refused with "try again", so that a crowd of earlier guesses does not delay the
+client that comes after it.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from contextlib import asynccontextmanager
 
 from backend.people.errors import TooOften
 
-#: Waiting at a time: of one place, and places.
+#: Limits of the queue: clients of one place, and places.
 MOST_OF_PLACE, MOST_PLACES = 3, 64
 _RETRY_S = 1.0
 
@@ -25,17 +26,17 @@ Waiting = asyncio.Future[None]
 
 
 class _Lane:
-    """Those who wait, by the place that they come from."""
+    """Waiting clients, grouped by the place that they come from."""
 
     def __init__(self) -> None:
         self._places: OrderedDict[str, deque[Waiting]] = OrderedDict()
         self._wrong: dict[str, int] = {}
 
     def join(self, place: str, wrong: int) -> Waiting:
-        """Wait for a turn; ``wrong`` counts the wrong tries of this place.
+        """Join the queue; ``wrong`` is the number of wrong tries of this place.
 
         Raises:
-            TooOften: too many places wait already that were not wrong more often.
+            TooOften: too many places wait already, none with more wrong tries.
         """
         waiting = self._places.get(place)
         if waiting is None:
@@ -59,7 +60,7 @@ class _Lane:
             _refuse(each)
 
     def leave(self, place: str, mine: Waiting) -> None:
-        """Wait no longer."""
+        """Leave the queue."""
         waiting = self._places.get(place)
         if waiting is not None and mine in waiting:
             waiting.remove(mine)
@@ -67,7 +68,7 @@ class _Lane:
                 del self._places[place], self._wrong[place]
 
     def next(self) -> Waiting | None:
-        """The newest of the place whose turn it is; None where nobody waits."""
+        """Newest client of the place whose turn it is; None if nobody waits."""
         while self._places:
             place = min(self._places, key=self._wrong.__getitem__)  # of equal ones the first
             waiting = self._places.pop(place)
@@ -87,7 +88,7 @@ def _refuse(waiting: Waiting) -> None:
 
 
 class HashTurns:
-    """The turns of one station."""
+    """Turns at the password hash of one station."""
 
     def __init__(self) -> None:
         self._busy = False
@@ -95,12 +96,12 @@ class HashTurns:
 
     @asynccontextmanager
     async def turn(self, place: str, *, known: bool, wrong: int = 0) -> AsyncIterator[None]:
-        """Wait for a turn and have it. ``place`` is an address, or a browser or session.
+        """Wait for a turn and hold it. ``place`` is an address, or the id of a browser or session.
 
-        ``wrong`` counts its wrong tries.
+        ``wrong`` is the number of its wrong tries.
 
         Raises:
-            TooOften: others of the same place came after, or too many places wait.
+            TooOften: newer clients of the same place replaced this one, or too many places wait.
         """
         if self._busy:
             lane = self._known if known else self._strangers
@@ -120,7 +121,7 @@ class HashTurns:
 
     def _pass_on(self) -> None:
         following = self._known.next() or self._strangers.next()
-        # It stays in use in between: who comes now does not get in before who was called.
+        # Still busy in between: a client that arrives now must not overtake the one just called.
         self._busy = following is not None
         if following is not None:
             following.set_result(None)

@@ -1,4 +1,4 @@
-"""Run by Alembic for every upgrade; the connection comes from backend.store.database."""
+"""Alembic environment, run for every upgrade; the connection comes from backend.store.database."""
 
 from alembic import context
 from sqlalchemy import Connection

@@ -1,1 +1,1 @@
-"""Name and network ports of a station in the cabinet."""
+"""Routes of the name and network ports of a station in the cabinet."""

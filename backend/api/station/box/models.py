@@ -22,7 +22,7 @@ class BoxPort(Message):
 
 
 class BoxInfo(Message):
-    """What was set up, and what could be chosen."""
+    """Current settings, and the ports that can be chosen."""
 
     configured: bool
     name: str
@@ -32,7 +32,7 @@ class BoxInfo(Message):
 
 
 class BoxChange(Message):
-    """The name is in force from the next start of the server on, the ports at once."""
+    """New settings. The name takes effect at the next start of the server, the ports at once."""
 
     name: Annotated[str, Field(min_length=1, max_length=63)]
     ethercat: PortName = ""

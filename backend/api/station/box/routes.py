@@ -18,13 +18,13 @@ router = APIRouter()
 
 @router.get("/box")
 async def box(request: Request, bench: TheBench) -> BoxInfo:
-    """The station's name, what its network ports are for, and what could be chosen."""
+    """Read the station's name, the use of its network ports, and the possible choices."""
     return _info(read(bench.state_folder), _came_by(request))
 
 
 @router.put("/box")
 async def set_box(request: Request, bench: TheBench, me: Me, body: BoxChange) -> BoxInfo:
-    """Name the station and say which port is EtherCAT's and which the office's."""
+    """Set the station's name, and which ports are for EtherCAT and for the office network."""
     wanted = Box(body.name, body.ethercat, body.office)
     used = _came_by(request)
     made = checked(wanted, network_interfaces(), used)

@@ -1,4 +1,4 @@
-"""The audit: a chain that the database itself refuses to change."""
+"""Tables of the audit: a chain of entries that the database itself refuses to change."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -9,12 +9,12 @@ branch_labels = ("audit",)
 depends_on = None
 
 _NUMBER = sa.BigInteger().with_variant(sa.Integer, "sqlite")
-#: The hash before the first entry.
+#: Hash that the first entry refers to.
 _ZERO = "0" * 64
 
 
 def upgrade() -> None:
-    """Make the tables, the head of an empty chain, and what keeps rows as they are."""
+    """Create the tables, the head of an empty chain, and triggers that keep rows unchanged."""
     op.create_table(
         "audit_entry",
         sa.Column("number", _NUMBER, primary_key=True, autoincrement=False),
@@ -53,5 +53,5 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """An audit is not thrown away."""
+    """Refused: an audit must not be discarded."""
     raise NotImplementedError("restore a backup of the older version")

@@ -1,4 +1,4 @@
-"""The condition of axes: rounds of health checks, and signed baselines."""
+"""Tables of axis condition: rounds of health checks, and signed baselines."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -12,7 +12,7 @@ depends_on = None
 
 
 def upgrade() -> None:
-    """Make the tables."""
+    """Create the tables."""
     op.create_table(
         "health_run",
         sa.Column("id", sa.Integer, primary_key=True),
@@ -46,5 +46,5 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Baselines would be lost: an older program starts from a backup instead."""
+    """Refused, as baselines would be lost: restore a backup of the older version instead."""
     raise NotImplementedError("restore a backup of the older version")

@@ -1,4 +1,4 @@
-"""The library: items, versions, tags and small contents."""
+"""Tables of the library: items, versions, tags and small contents."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -12,7 +12,7 @@ depends_on = None
 
 
 def upgrade() -> None:
-    """Make the tables."""
+    """Create the tables."""
     op.create_table(
         "library_item",
         sa.Column("id", sa.Integer, primary_key=True),
@@ -69,5 +69,5 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Versions would be lost: an older program starts from a backup instead."""
+    """Refused, as versions would be lost: restore a backup of the older version instead."""
     raise NotImplementedError("restore a backup of the older version")

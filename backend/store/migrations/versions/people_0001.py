@@ -1,4 +1,4 @@
-"""Accounts, their sessions, and tokens for scripts."""
+"""Tables of accounts, their sessions, and tokens for scripts."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -22,7 +22,7 @@ def _owner() -> sa.Column[int]:
 
 
 def upgrade() -> None:
-    """Make the tables."""
+    """Create the tables."""
     op.create_table(
         "people_account",
         sa.Column("id", sa.Integer, primary_key=True),
@@ -52,5 +52,5 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Accounts are not thrown away."""
+    """Refused: accounts must not be discarded."""
     raise NotImplementedError("restore a backup of the older version")
