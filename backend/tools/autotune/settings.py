@@ -1,4 +1,4 @@
-"""What an automatic tuning may be asked for."""
+"""Settings of an automatic tuning."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class AutotuneRequest(ToolSettings):
 
     @property
     def inner(self) -> AutotuneSettings:
-        """The same for the tool's own layers."""
+        """The same settings for the tool's inner layers."""
         return AutotuneSettings(
             self.envelope, self.mark, self.load, self.loop, self.scheme, self.ends_rev, self.apply,
             self.rated_torque_nm, self.motor_inertia_kgm2,
