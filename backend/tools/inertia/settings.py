@@ -1,4 +1,4 @@
-"""What an inertia measurement may be asked for."""
+"""Settings of an inertia measurement."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class InertiaRequest(ToolSettings):
 
     @property
     def inner(self) -> InertiaSettings:
-        """The same for the tool's own layers."""
+        """The same settings for the tool's inner layers."""
         return InertiaSettings(
             self.envelope, self.scheme, self.ends_rev, self.search_torque, self.search_speed,
             self.repetitions, self.rated_torque_nm, self.motor_inertia_kgm2,
