@@ -78,8 +78,7 @@ async def si(drive: Drive, key: str | None) -> float | None:
 
 
 async def brake_opens_s(drive: Drive) -> float:
-    """Time that the drive waits for its holding brake before following setpoints, by parameters
-    [s].
+    """Time that the drive waits for its brake before it follows setpoints, by its parameters [s].
 
     It starts at Operation enabled; 0 where the family documents no such time.
     """

@@ -150,8 +150,7 @@ class Trials:
     time_left: TimeLeft = field(default_factory=TimeLeft)
 
     async def first(self, order: Sequence[Candidate], plant: MeasuredPlant) -> Applied | None:
-        """Apply the first candidate that holds; keep the present settings if only slower ones
-        remain.
+        """Apply the first candidate that holds; keep the present settings if the rest is slower.
 
         ``plant`` is the plant that the designs were made for.
 

@@ -19,8 +19,7 @@ NOT_AGAIN = text("autotune.not-measured-again")
 
 @dataclass
 class TimeLeft:
-    """Time left until ``until_s`` (`time.monotonic`); ``left_out``: designs dropped for lack of it.
-    """
+    """Time until ``until_s`` (`time.monotonic`); ``left_out``: designs dropped for lack of it."""
 
     until_s: float = math.inf
     longest_s: float = 0.0
@@ -65,8 +64,7 @@ class TimeLeft:
         return max(0, int(min(left_s / max(first_s, 1e-3), float(most))))
 
     def learning(self) -> Repeats:
-        """Permitted repetitions of measurements before the design; a verification must still fit.
-        """
+        """Permitted repetitions of measurements before the design; one verification must fit."""
         return Repeats(self._measured_by_s - self.lossy * threshold.LOST_S)
 
     def measuring(self, learning_s: float) -> Repeats:

@@ -173,8 +173,7 @@ class _Way:
         return float(np.median(signal[at[at.size // 2 :]])) if at.size else 0.0
 
     def _halted_at(self) -> int:
-        """Index of the first sample after the torque was removed; the sample count if it was not.
-        """
+        """Index of the first sample after the torque was removed; the sample count if none."""
         sent = np.abs(self._trial.sent_nm) > 0
         if not self._trial.halted or not np.any(sent):
             return sent.size

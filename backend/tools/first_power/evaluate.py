@@ -134,8 +134,7 @@ def covered_pole_pairs(travel_rev: float) -> int:
 
 
 def way_of(pulses: Sequence[Pulse], goal_rev: float, cap_percent: float) -> Way:
-    """Motion of the shaft for one sign of the torque; ``cap_percent`` is the highest pulse torque.
-    """
+    """Motion of the shaft for one sign of the torque; ``cap_percent`` is the highest pulse."""
     if not pulses:
         return "short"
     went = pulses[0].direction * (pulses[-1].to_rev - pulses[0].from_rev)

@@ -16,9 +16,9 @@ Phases = Literal[
     "blocked", "pulled", "no_motion", "short", "no_torque_mode", "counts_first", "supply_first",
     "resolution_first", "not_done",
 ]  # fmt: skip
-"""What the torque did: see docs/first-power.md."""
-Way = Literal["with", "against", "locked", "none", "short"]
 """Finding on the motor phases: see docs/first-power.md."""
+Way = Literal["with", "against", "locked", "none", "short"]
+"""Motion of the shaft for one sign of the torque; short: still moving when the test ended."""
 Guide = Literal["pole_identification", "identification"]
 
 
@@ -27,9 +27,7 @@ class _Part(BaseModel):
 
 
 class Check(_Part):
-    """One line of the checklist. ``finding`` is the key of a text of the tool under the check's
-    name.
-    """
+    """One line of the checklist. ``finding`` names a text of the tool under the check's name."""
 
     name: CheckName
     status: Status

@@ -245,8 +245,7 @@ class _Test:
         self._percent, self._still, self._made = threshold.FIRST_PERCENT, 0, 0
 
     async def direction(self, direction: Literal[1, -1]) -> None:
-        """Make pulses of one sign until the shaft has moved far enough or the strongest moves
-        nothing.
+        """Make pulses of one sign until the shaft has moved far enough or the strongest fails.
 
         A pulse that moves the shaft by more than `threshold.CUT_REV` is cut off by the cyclic loop,
         which removes the power: the axis is enabled again for the next pulse.
@@ -286,9 +285,7 @@ class _Test:
             self._percent = max(self._percent / threshold.WEAKER, threshold.FIRST_PERCENT)
 
     def _far(self, begin: float) -> float:
-        """Distance from the start beyond which no further pulse fits into the permitted travel
-        [rev].
-        """
+        """Distance from the start beyond which no further pulse fits into the travel [rev]."""
         return max(self._settings.travel_limit - threshold.LARGE_REV / 2, abs(begin) + STILL_REV)
 
     async def _place(self) -> float:

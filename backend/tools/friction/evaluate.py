@@ -31,8 +31,7 @@ _RPM = 60.0 / _TURN
 
 @dataclass(frozen=True)
 class Map:
-    """Raw data [n]: ``plateau`` numbers the constant speeds, negative backwards; 0 is between them.
-    """
+    """Raw data [n]: ``plateau`` numbers the constant speeds, negative backwards; 0 between them."""
 
     sample_rate_hz: float
     position_rad: FloatArray
@@ -51,8 +50,7 @@ class Map:
         torque_step_nm: float, inertia_kgm2: float, ripple_rpm: float | None, by_travel: bool,
         by_time: bool,
     ) -> Map:  # fmt: skip
-        """Join the recordings, one for each speed, with the signed plateau number of each sample.
-        """
+        """Join the recordings, one for each speed, with each sample's signed plateau number."""
         plateau = [
             np.sign(n) * (100 * index * (n != 0) + np.abs(n)) for index, n in enumerate(numbers)
         ]

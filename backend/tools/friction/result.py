@@ -102,8 +102,7 @@ class FrictionResult(ToolResult):
     motion_s: float
 
     def compensation_csv(self) -> str | None:
-        """Compensation table over one motor revolution: position in rev, torques in % of rated
-        torque.
+        """Compensation table over one motor revolution: position in rev, torques in % of rated.
 
         Both directions are about their mean, as measured; a field is empty where there is no
         sample. None without a ripple.

@@ -85,8 +85,7 @@ class Experiments:
     partner: str
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
-        """The samples as arrays for storage, complex numbers as pairs of real and imaginary part.
-        """
+        """The samples as arrays for storage; complex numbers as real and imaginary parts."""
         return {
             "lines": self.lines, "sent": self.sent, "torque": self.torque, "speed": self.speed,
             "valid": self.valid, "direction": self.direction, "skew_rad": self.skew_rad,
@@ -296,8 +295,7 @@ def _steady(
 
 
 def _square_rev(data: Experiments, steady: _Steady, modes: CoupledModes) -> GantryValue | None:
-    """Skew without opposing torques: these over the skew stiffness [rev]; None without a stiffness.
-    """
+    """Skew at which no torques oppose each other [rev]; None where the stiffness is unknown."""
     stiffness = _stiffness(modes)
     if stiffness is None or not data.torque_known:
         return None

@@ -47,9 +47,7 @@ class Shape:
 
     @staticmethod
     def against(swing_hz: float) -> Shape:
-        """Shape that averages over one period of the oscillation and so does not excite it (FIR
-        shaper).
-        """
+        """Shape with a mean over one period of the oscillation, which does not excite it."""
         period_s = 1.0 / swing_hz
         return Shape(max(threshold.RAMP_S, 3.0 * period_s), max(threshold.SMOOTHING_S, period_s))
 
@@ -168,8 +166,7 @@ async def _first_move(
     facts: AxisFacts,
     speed_rpm: npt.NDArray[np.float64],
 ) -> Recording:
-    """Make the move; repeat it after a wait where the axis was still at standstill at its
-    beginning.
+    """Make the move; repeat it after a wait where the axis did not move at its beginning.
 
     A holding brake that opens some 100 ms after Operation enabled blocks the axis until then, and
     no status bit shows it.
@@ -316,10 +313,10 @@ def _moves(
     shape: Shape,
     share: float,
 ) -> _Moves:
-    """The moves with this share of the torque that goes into acceleration.
+    """Plan the moves with this share of the torque that is available for acceleration.
 
     Raises:
-        OutOfRange: the envelope does not allow it.
+        OutOfRange: the envelope does not allow them.
     """
     envelope, rate = settings.envelope, 1.0 / cycle_s(session)
     friction = rough.coulomb_nm + abs(rough.gravity_nm)
