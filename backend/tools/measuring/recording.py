@@ -107,8 +107,7 @@ class Catch:
         self.blocks = [part for block in self.blocks for part in self._of_motion(block)]
 
     def _of_motion(self, block: bus.ScopeBlock) -> list[bus.ScopeBlock]:
-        """The part of a block that may belong to the motion; all of it while ``first`` is unknown.
-        """
+        """Part of a block that may belong to the motion; all of it while ``first`` is unknown."""
         if self.first is None or block.cycle is None:
             return [block]
         early = self.first - threshold.RUN_IN - block.cycle
@@ -137,8 +136,7 @@ class Catch:
         return newest.cycle + len(newest.samples) - self.first
 
     def since(self, number: int) -> FloatArray:
-        """Rows [n, 3] of raw position, velocity and torque of the blocks from index ``number`` on.
-        """
+        """Rows [n, 3] of raw position, velocity and torque of the blocks from this index on."""
         rows = [
             block.samples[:, [block.channels.index(name) for name in self.names[:3]]]
             for block in self.blocks[number:]

@@ -22,9 +22,7 @@ class Repeats:
     repeated: int = 0
 
     def allow(self, takes_s: float) -> bool:
-        """Whether something of this duration ends in time; counted in ``left_out`` where it does
-        not.
-        """
+        """Whether something of this duration ends in time; if not, counted in ``left_out``."""
         if time.monotonic() + takes_s <= self.by_s:
             return True
         self.left_out += 1

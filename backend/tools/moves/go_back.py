@@ -95,8 +95,7 @@ async def _move(
 
 
 def _to_ask(rest: float, moves: list[tuple[float, float]]) -> float:
-    """Distance to command so that the axis moves ``rest``, extrapolated from earlier moves [rev].
-    """
+    """Distance to command so that the axis moves ``rest``, by the earlier moves [rev]."""
     if not moves:
         return rest
     asked, gone = moves[-1]

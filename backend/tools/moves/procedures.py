@@ -116,8 +116,7 @@ async def _carry_out(
 
 
 def _rest_from(steps: Sequence[Step], number: int) -> float:
-    """Time for which the drive must not be accessed by others from this step on [s]; 0: none
-    begins.
+    """Time without access by others to the drive, beginning with this step [s]; 0: none begins.
 
     It begins before the write that a wait follows: if an EP3E receives a request between the two,
     while it stores, it stores nothing (001:1212).
