@@ -69,8 +69,7 @@ async def read_settings(
 
 
 def without(keys: Sequence[str]) -> Text | None:
-    """Text on the settings that a set lacks, to be added to a sentence; None where it is complete.
-    """
+    """Text on the settings that a set lacks, for the end of a sentence; None if complete."""
     if not keys:
         return None
     named = ", ".join(keys[:_NAMED]) + (" …" if len(keys) > _NAMED else "")

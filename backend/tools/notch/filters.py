@@ -108,8 +108,7 @@ def _hz_width_db(
 
 
 def _width_steps(slot: NotchSlot, width: Parameter) -> IntegerRange:
-    """Steps of a width whose effect is measured: Hz, or levels where the depth is a level as well.
-    """
+    """Steps of a width whose effect is measured: Hz, or levels where the depth has levels too."""
     return hz_steps(width) if slot.depth_key is None else level_steps(width)
 
 

@@ -191,9 +191,7 @@ class _Check:
         self._sign: Sign | None = None if found is None else found[1]
 
     def _torque_noise(self) -> float:
-        """Limit below which torque is not distinguished from noise, from the time before enabling
-        [%].
-        """
+        """Torque that is distinguished from noise, from the time before enabling [%]."""
         enabled = np.flatnonzero(self._trace.enabled)
         quiet = self._trace.torque_percent[: enabled[0]] if enabled.size else np.empty(0)
         scatter = float(np.std(quiet)) if quiet.size > _FILTER else 0.0
@@ -237,16 +235,14 @@ class _Check:
         return min(signs, default=None)
 
     def _last_above(self, values: FloatArray, limit: float, begin: int) -> int | None:
-        """First sample from ``begin`` on after which none is above; None where the last one is
-        above.
+        """First sample from ``begin`` on after which no value exceeds the limit; None without one.
         """
         above = np.flatnonzero(values[begin:] > limit)
         found = begin if not above.size else begin + int(above[-1]) + 1
         return found if found < values.size else None
 
     def _rest(self, at: int, stands_rpm: float) -> int | None:
-        """First sample from which the axis stays at its final position; None where it still turns.
-        """
+        """First sample from which the axis stays at its final position; None if it still turns."""
         last = np.abs(self._speed[-max(1, round(_BEFORE_S * self._rate)) :])
         if float(np.median(last)) > stands_rpm:
             return None
@@ -329,9 +325,7 @@ class _Check:
         return None
 
     def _cut(self, at: int, free: int, speed: float) -> bool:
-        """Whether a quick stop was cut short because the exchange removed the power at its
-        beginning.
-        """
+        """Whether the power was removed by the exchange at the beginning of a quick stop."""
         fast = abs(float(self._speed[free])) > _AT_STANDSTILL * abs(speed)
         return fast and bool(np.any(self._trace.quick_stop[at : free + 1]))
 
