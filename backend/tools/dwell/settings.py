@@ -12,7 +12,7 @@ By = Literal["speed", "torque"]
 
 
 class DwellSettings(ToolSettings):
-    """A sine of the speed setpoint, or of the torque after the speed loop, faded in and out."""
+    """A sine of the speed setpoint, or of the torque offset, faded in and out."""
 
     time_limit_s: float = Field(
         default=70.0, gt=0, le=120, description="longest time of the motion, in s"

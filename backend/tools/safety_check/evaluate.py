@@ -235,8 +235,7 @@ class _Check:
         return min(signs, default=None)
 
     def _last_above(self, values: FloatArray, limit: float, begin: int) -> int | None:
-        """First sample from ``begin`` on after which no value exceeds the limit; None without one.
-        """
+        """First sample, not before ``begin``, from which no value exceeds the limit; else None."""
         above = np.flatnonzero(values[begin:] > limit)
         found = begin if not above.size else begin + int(above[-1]) + 1
         return found if found < values.size else None

@@ -10,7 +10,9 @@ from backend.analysis.signals.shaper import Kind
 from backend.tools.tool import Interval, ToolResult
 
 Verdict = Literal["verified", "improved", "no_better", "designed", "stated", "not_seen"]
-"""``verified``: residual or settling time is at most half. ``designed``: not tried. ``stated``:
+"""Verdict on the shaper.
+
+``verified``: residual or settling time is at most half. ``designed``: not tried. ``stated``:
 designed for a mode that the motor does not show.
 """
 Signal = Literal["position_error", "speed", "torque"]

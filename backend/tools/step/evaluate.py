@@ -23,8 +23,7 @@ LEAD_S = threshold.LEAD_S
 
 @dataclass(frozen=True, slots=True)
 class StepSettings:
-    """``size`` in rpm (speed) or rev (move). A move uses ``speed_rpm`` and ``acceleration_rpm_s``.
-    """
+    """``size`` in rpm (speed) or rev (move); ``speed_rpm`` and ``acceleration_rpm_s`` of a move."""
 
     envelope: Envelope
     kind: Literal["speed", "move"] = "speed"
@@ -51,9 +50,7 @@ class StepResult:
     torque_peak_percent: float
     torque_rms_percent: float
     noise: float = 0.0
-    """Standard deviation about the trend, of the held speed [rpm] or of the position at the end of
-    a move [rev].
-    """
+    """Standard deviation about the trend, of a held speed [rpm] or a final position [rev]."""
     window: float | None = None
     """The settling window, in rpm or rev."""
     widened: bool = False

@@ -54,8 +54,7 @@ async def play_informative(
 def _more_informative(
     first: Records, further: tuple[excite.Sequence, ...], settings: SweepSettings, setup: Setup
 ) -> tuple[excite.Sequence, ...]:
-    """Further realisations of the size that the first pair reached, with weights derived from it.
-    """
+    """Further realisations of the size that the first pair reached, weighted by its result."""
     sent = first[0][0]
     base = np.zeros(1) if sent.base is None else sent.base
     peak = float(np.max(np.abs(sent.excitation.samples - base)))

@@ -245,8 +245,7 @@ def _mechanics(
 
 
 def _slow(corner_hz: float, facts: AxisFacts) -> bool:
-    """Whether the torque follows more slowly than the drive reports, or than usual current loops.
-    """
+    """Whether the torque follows more slowly than the drive reports, or than current loops do."""
     as_reported = facts.current_bandwidth_hz
     return corner_hz < (
         threshold.SLOW_HZ if as_reported is None else threshold.SLOWER * as_reported
@@ -299,9 +298,7 @@ def _known_inertia(settings: SweepSettings) -> KnownInertia | None:
 
 
 def completed(facts: AxisFacts, result: SweepResult) -> AxisFacts:
-    """Facts completed by what the measurement of the mechanics found where the drive reports
-    nothing.
-    """
+    """Facts completed by the measurement of the mechanics where the drive reports nothing."""
     return replace(
         facts,
         current_bandwidth_hz=facts.current_bandwidth_hz or result.current_bandwidth_hz,

@@ -142,8 +142,7 @@ async def setup_of(
 
 
 async def drive_limit_percent(axis: Axis) -> float:
-    """The drive's own torque limit, at which a higher command is clipped [% of rated]; inf if none.
-    """
+    """The drive's own torque limit, at which commands are clipped [% of rated]; inf if none."""
     drive, units = axis.drive, await axis.units()
     roles = ("torque_limit_positive", "torque_limit_negative", "max_torque")
     found = await existing(drive, [drive.key(role) for role in roles])

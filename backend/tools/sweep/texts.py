@@ -188,8 +188,7 @@ def _judged(figures: tuple[float | None, ...]) -> tuple[Literal["good", "warn", 
 
 
 def _within(figures: tuple[float | None, ...], limits: tuple[float, float, float]) -> bool:
-    """Whether the figures meet the limits; a missing figure neither violates nor meets its limit.
-    """
+    """Whether the figures meet the limits; a missing figure neither violates nor meets one."""
     phase, gain, peak = figures
     return (
         (phase is None or phase >= limits[0])

@@ -326,8 +326,7 @@ def _matters(found: Levels, column: int, speed_rps: float) -> bool:
 
 
 def _largest(found: Levels, column: int) -> tuple[float, float, float]:
-    """Speed [rpm] at which a component is largest, its amplitude [rpm], and that of the torque [%].
-    """
+    """Speed [rpm] at which a component is largest, its amplitude [rpm], and the torque's [%]."""
     level = np.where(np.isfinite(found.speed[:, column]), found.speed[:, column], -1.0)
     at = int(np.argmax(level))
     largest, torque = float(level[at]), float(np.nan_to_num(found.torque[at, column]))

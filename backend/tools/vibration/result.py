@@ -95,8 +95,7 @@ class SpeedRange(_Part):
 
 
 class VibrationResonance(_Part):
-    """A mode of the axis with its present loops, excited where order · speed equals its frequency.
-    """
+    """A mode of the axis with its present loops, excited where order · speed matches it."""
 
     frequency_hz: float
     frequency_ci95_hz: tuple[float, float]

@@ -150,8 +150,7 @@ class _Measured:
     taken: list[tuple[Recording, FloatArray]]
 
     async def strokes(self, strokes: tuple[Stroke, ...], low: float, high: float) -> None:
-        """Play these strokes, each from the start position; progress goes from ``low`` to ``high``.
-        """
+        """Play these strokes, each from the start; progress goes from ``low`` to ``high``."""
         run, envelope = self.run, self.settings.envelope
         total_s, done_s = sum(one.duration_s for one in strokes), 0.0
         slow_rps = threshold.POSITIONING * envelope.speed_rpm / 60.0
