@@ -36,7 +36,7 @@ Keep: TypeAlias = "Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, 
 Interval = tuple[float | None, float | None]
 """Lower and upper limit of a 95 % interval; None where a limit is not known."""
 Texts = Mapping[str, tuple[str, str]]
-"""English and Chinese by name."""
+"""English and Chinese text by name."""
 
 
 @dataclass(frozen=True)

@@ -79,7 +79,7 @@ class Again:
 
     @property
     def verified_anew(self) -> bool:
-        """Whether a second verification counts."""
+        """Whether a second verification was made and its result is in force."""
         return self.outcome in ("same", "other")
 
     def reported(self, verified: Verified) -> Text:

@@ -140,7 +140,7 @@ class FiguresInfo(_Part):
 
 
 class VerifiedInfo(_Part):
-    """The tuned loop as it was measured."""
+    """Measurement and verdict of the tuned loop."""
 
     verdict: VerdictInfo | None
     gain_steps: GainStepsInfo | None
@@ -186,7 +186,7 @@ class AutotuneAnswer(ToolResult):
     cautious: bool
 
     def in_language(self, language: Language) -> Self:
-        """With all its sentences in this language."""
+        """The same result with all its texts in this language."""
         verified = self.verified
         if verified is not None:
             sweep = verified.sweep.in_language(language)

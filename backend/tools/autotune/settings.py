@@ -14,7 +14,7 @@ from backend.tools.tool import Option, ToolSettings
 
 
 class AutotuneRequest(ToolSettings):
-    """All steps in one job."""
+    """Settings of a tuning; all its steps are one job."""
 
     mark: Mark = Field(default="balanced", description="the design to apply")
     load: LoadClass | None = Field(default=None, description="judged from the response if not said")

@@ -96,7 +96,7 @@ def reevaluate(arrays: Arrays, meta: Meta) -> FirstPowerResult:
 
 
 def evaluate(seen: Seen, pulses: Sequence[Pulse], settings: FirstPowerSettings) -> FirstPowerResult:
-    """The checklist and its verdict."""
+    """Evaluate the observations: the checklist and its verdict."""
     backwards = None if seen.turned_rev is None else seen.turned_rev < 0
     covers = covered_pole_pairs(settings.travel_limit)
     phases = seen.obstacle or ("not_done" if not pulses else None)

@@ -11,7 +11,7 @@ from backend.tools.tool import Option, ToolSettings
 
 
 class InertiaRequest(ToolSettings):
-    """Inertia and friction."""
+    """Settings of an inertia and friction measurement."""
 
     scheme: Scheme = Field(default="free", description="how the axis may travel")
     ends_rev: Annotated[tuple[float, float] | None, Option(("--end-low-rev", "--end-high-rev"))] = (

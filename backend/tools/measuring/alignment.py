@@ -49,7 +49,7 @@ def aligned(
         high += missing
         if low != high:
             low, high, hits = _places(of_sent, echo, low, high)
-            if not moves:  # nothing shows; it began with the recording
+            if not moves:  # no setpoint changes: assume that the sequence began with the recording
                 low = high
             found = found or hits >= needed
         rows = np.arange(low, low + len(samples))

@@ -25,7 +25,7 @@ Verdict = Literal[
 Obstacle = Literal[
     "torque_in_noise", "too_slow", "samples_lost", "stayed_enabled", "quick_stop_cut"
 ]
-"""Why something cannot be shown."""
+"""Reason why a property of the function cannot be shown."""
 Sign = Literal["state", "speed"]
 """First sign: the drive left Operation enabled, or the speed left the commanded one."""
 Exceeded = Literal["torque_free", "stop_time", "stop_distance", "speed"]

@@ -11,7 +11,7 @@ from backend.tools.tool import Option, ToolSettings
 
 
 class StepRequest(ToolSettings):
-    """A step of speed (rpm) or a move (rev)."""
+    """Settings of a step of speed (rpm) or a move (rev)."""
 
     kind: Literal["speed", "move"] = Field(default="speed", description="what is commanded")
     size: float = Field(

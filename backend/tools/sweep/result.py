@@ -100,5 +100,5 @@ class SweepAnswer(ToolResult):
     warning_messages: tuple[MessageInfo, ...]
 
     def in_language(self, language: Language) -> Self:
-        """With ``warnings`` in this language."""
+        """The same result with ``warnings`` in this language."""
         return self.model_copy(update={"warnings": words_of(self.warning_messages, language)})

@@ -10,7 +10,7 @@ from backend.tools.tool import ToolSettings
 
 
 class SweepRequest(ToolSettings):
-    """Frequency response."""
+    """Settings of a frequency response."""
 
     kind: Kind = Field(default="mechanics", description="what is measured")
     loop: Loop = Field(default="auto", description="which loop is closed meanwhile")

@@ -93,7 +93,7 @@ def report(result: SweepAnswer) -> Section:
 
 
 def resonances_grid(result: SweepAnswer) -> Grid:
-    """A row for each resonance and antiresonance."""
+    """Table with a row for each resonance and antiresonance."""
     return Grid(
         ("kind", "frequency", "damping", "height"),
         tuple(
