@@ -1,1 +1,1 @@
-"""Motion and measurement tools; each is a cancellable job."""
+"""Motion and measurement tools; each runs as a job that can be cancelled."""

@@ -22,24 +22,24 @@ from drivers.texts.answers import sentence
 from drivers.texts.message import Text, text
 from profiles.schema import Raw
 
-#: Tag of the sets that are made before something is loaded.
+#: Tag of the sets that are stored before something is loaded.
 UNDO = "undo"
-#: As many of the settings that a set lacks are named.
+#: Number of missing settings that are named in a message.
 _NAMED = 5
 
 
 def readable_keys(drive: Drive) -> list[str]:
-    """Keys of everything that can be read over the connected ports."""
+    """Keys of all parameters that can be read over the connected ports."""
     return [
         p.key for p in drive.profile.parameters if p.access != "wo" and not drive.unreachable_why(p)
     ]
 
 
 async def read_all(drive: Drive, keys: Sequence[str] | None, progress: Progress) -> JobResult:
-    """Read ``keys``, or all that can be read. Values go out as they arrive.
+    """Read ``keys``, or all that can be read; values are published as they arrive.
 
     Raises:
-        LinkLost: the bus is gone.
+        LinkLost: the link to the bus is lost.
     """
     wanted = readable_keys(drive) if keys is None else list(keys)
     readings = await drive.read_many(wanted, progress)
@@ -54,10 +54,11 @@ async def read_all(drive: Drive, keys: Sequence[str] | None, progress: Progress)
 async def read_settings(
     drive: Drive, *, motor_individual: bool, progress: Progress | None = None
 ) -> dict[str, Reading]:
-    """Everything that belongs in a parameter set, as it is now.
+    """Read everything that belongs in a parameter set.
 
     Raises:
-        LinkTimeout: not one could be read. LinkLost: the bus is gone.
+        LinkTimeout: no parameter could be read.
+        LinkLost: the link to the bus is lost.
     """
     wanted = parameter_set.storable(drive.profile, motor_individual=motor_individual)
     keys = [p.key for p in wanted if not drive.unreachable_why(p)]
@@ -68,7 +69,7 @@ async def read_settings(
 
 
 def without(keys: Sequence[str]) -> Text | None:
-    """What a set lacks, to be added to a sentence; None where it lacks nothing."""
+    """Text on the settings that a set lacks, for the end of a sentence; None if complete."""
     if not keys:
         return None
     named = ", ".join(keys[:_NAMED]) + (" …" if len(keys) > _NAMED else "")
@@ -89,7 +90,9 @@ async def save_set(
     """Read the drive's settings and store them; returns the file name.
 
     Raises:
-        NotAllowed: the name is in use. StorageFailed: disk. LinkLost: the bus is gone.
+        NotAllowed: the name is in use.
+        StorageFailed: the file cannot be stored.
+        LinkLost: the link to the bus is lost.
     """
     readings = await read_settings(drive, motor_individual=motor_individual, progress=progress)
     data = parameter_set.dump(
@@ -100,7 +103,7 @@ async def save_set(
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """One row of a load report; raw values."""
+    """One row of the report on loading a set; raw values."""
 
     key: str
     before: Raw | None
@@ -110,7 +113,7 @@ class Written:
     problem: Text | None = None
 
     def answer(self) -> dict[str, object]:
-        """As a row of the job's result."""
+        """The row as part of the job's result."""
         row: dict[str, object] = {
             "key": self.key,
             "before": self.before,
@@ -131,13 +134,14 @@ async def load_set(
     accept_other_identity: bool,
     accept_motor_individual: bool = False,
 ) -> JobResult:
-    """Write the chosen rows one by one, each read back, after storing what was there before.
+    """Write the chosen rows one by one, each read back, after storing the present values.
 
-    All rows are checked before the first is written, and the drive is asked who it is.
+    All rows and the identity of the drive are checked before the first one is written.
 
     Raises:
         NotAllowed: another family's or drive's file without consent, or a chosen row that cannot
             be written; nothing was written.
+        LinkLost: the set was written in part; states how far, and the stored previous values.
     """
     await confirm_identity(drive)
     other = _check_identity(drive, content, accept_other_identity)
@@ -158,7 +162,7 @@ async def load_set(
         try:
             report.append(await _write_verified(drive, key, raw))
         except LinkLost as error:
-            # Half a set is in force now: which half, and how to undo it.
+            # Part of the set is in force now: state which part, and how to undo it.
             error.text = text(
                 "set.written-in-part",
                 cause=error.text,
@@ -180,7 +184,7 @@ def _check_identity(drive: Drive, content: ParameterSet, accepted: bool) -> bool
     """Whether it is another drive's file, which the person has accepted.
 
     Raises:
-        NotAllowed: another family's, or another drive's without consent.
+        NotAllowed: another family's file, or another drive's without consent.
     """
     if content.profile != drive.profile.drive:
         raise NotAllowed(
@@ -202,7 +206,7 @@ def _check_identity(drive: Drive, content: ParameterSet, accepted: bool) -> bool
 
 
 def _refuse_motor_individual(drive: Drive, keys: Sequence[str]) -> None:
-    """Values of one motor (commutation offset, encoder bias, address) would harm another.
+    """Refuse values of one motor (commutation offset, encoder bias, address), unsafe on another.
 
     Raises:
         NotAllowed: one of the keys is such a value; nothing was written.
@@ -219,7 +223,7 @@ def _refuse_motor_individual(drive: Drive, keys: Sequence[str]) -> None:
 
 
 async def _back_up(drive: Drive, library: SetStore, keys: Sequence[str]) -> str:
-    """The undo: what the chosen parameters are now, as a set of its own."""
+    """Store the present values of these parameters as a set, for undo; returns its name."""
     readings = await drive.read_many(keys)
     now = datetime.now(UTC)
     data = parameter_set.dump(

@@ -1,4 +1,4 @@
-"""Every tool that has a descriptor; what surrounds the tools is made from this list."""
+"""Every tool that has a descriptor; routes, commands and reports are made from this list."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Results of all tools, distinguished by their field ``tool``.
 
-Apart from the tools themselves, so that who only reads results imports no analysis.
+Separate from the tools, so that code that only reads results need not import the analysis.
 """
 
 from __future__ import annotations

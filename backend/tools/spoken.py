@@ -1,4 +1,4 @@
-"""Results of tools as plain values, their sentences in the language of whoever reads them."""
+"""Results of tools as plain values, with their texts in the language of the reader."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drivers.texts.message import Language
 
 
 def result_in_language(result: Mapping[str, object], language: Language) -> dict[str, object]:
-    """The same result; what has neither code nor message, as in older files, stays as it is."""
+    """The result in a language; texts without code or message, as in older files, are unchanged."""
     known = BY_KIND.get(str(result.get("tool", "")))
     if known is None:
         return in_language(result, language)

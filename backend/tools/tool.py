@@ -1,8 +1,8 @@
-"""What a measuring tool is: one descriptor, from which everything around the tool derives.
+"""Descriptor of a measuring tool, from which everything around the tool is derived.
 
-Routes, rights, audit, command line, evaluation of stored files, report section and the form of
-the page are made from a `Tool`; a tool itself is a package of settings, run, evaluation, result
-and texts.
+Routes, rights, audit, command line, evaluation of stored files, report section and the form of the
+page are made from a `Tool`; a tool itself is a package of settings, run, evaluation, result and
+texts.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from backend.tools.measuring.repeats import Repeats
 from backend.work.jobs import Progress
 from drivers.texts.message import Language, Text
 
-if TYPE_CHECKING:  # who only reads results or settings imports no analysis
+if TYPE_CHECKING:  # code that only reads results or settings imports no analysis
     from pathlib import Path
 
     import numpy as np
@@ -34,16 +34,16 @@ Arrays: TypeAlias = "Mapping[str, npt.NDArray[np.generic]]"
 Meta = Mapping[str, object]
 Keep: TypeAlias = "Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]"
 Interval = tuple[float | None, float | None]
-"""Lower and upper end of a 95 % interval; None where an end is not known."""
+"""Lower and upper limit of a 95 % interval; None where a limit is not known."""
 Texts = Mapping[str, tuple[str, str]]
-"""English and Chinese by name."""
+"""English and Chinese text by name."""
 
 
 @dataclass(frozen=True)
 class Option:
-    """How a setting is called on the command line, where not by its own name.
+    """Names of a setting on the command line, where different from its own.
 
-    A pair has two names. ``default`` stands in where the interface asks for a value.
+    A pair has two names. ``default`` is the initial value where the interface asks for one.
     """
 
     names: tuple[str, ...] = ()
@@ -91,7 +91,7 @@ class ToolSettings(BaseModel):
 
 
 class ToolResult(BaseModel):
-    """What every result of a tool carries; its ``tool`` shows which result it is."""
+    """Common fields of the results of all tools; ``tool`` identifies the kind of result."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -99,18 +99,18 @@ class ToolResult(BaseModel):
     measurements: tuple[str, ...] = Field(default=(), description="names of the stored raw data")
 
     def in_language(self, language: Language) -> Self:  # noqa: ARG002
-        """The same result, its sentences in a language where it has any next to its codes."""
+        """The same result with its texts, if any, in this language."""
         return self
 
 
 @dataclass(frozen=True)
 class Run:
-    """What a tool is given for one measurement.
+    """Environment of a tool for one measurement.
 
     ``exchange`` exchanges process data, None for a tool that moves nothing; ``keep`` stores raw
     data before they are evaluated; ``partner`` is the other axis of a tool that moves two;
-    ``repeats`` bounds what is measured again only to know it
-    better; ``recording`` finds the file of a recording by its name.
+    ``repeats`` limits optional repetitions of measurements; ``recording`` finds the file of a
+    recording by its name.
     """
 
     axis: Axis
@@ -124,7 +124,7 @@ class Run:
 
     @property
     def session(self) -> CyclicSession:
-        """The exchange of a tool that moves the axis."""
+        """The exchange, for a tool that moves the axis."""
         assert self.exchange is not None, "a tool that moves has one"
         return self.exchange
 
@@ -136,14 +136,14 @@ class Run:
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity of a result; ``name`` is a text of the tool, None what is not known."""
+    """One quantity of a result; ``name`` is a text of the tool, ``value`` None where unknown."""
 
     name: str
     value: float | None
     unit: str
     ci95: Interval | None = None
     values: Mapping[str, str] = field(default_factory=dict)
-    """For the places in the text."""
+    """Values for the placeholders of the text."""
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class Note:
 
 
 Cell = Note | str
-"""A text of the tool, or a figure with its unit as it is shown."""
+"""A text of the tool, or a formatted figure with its unit."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class Grid:
 
 @dataclass(frozen=True)
 class Line:
-    """A curve [n] with half the width of its 95 % band, where it has one."""
+    """A curve [n], optionally with half the width of its 95 % band."""
 
     name: str
     x: tuple[float, ...]
@@ -189,7 +189,7 @@ class Chart:
 
 @dataclass(frozen=True)
 class Section:
-    """What a report and the command line show of a result; the first note is the verdict."""
+    """Section of a result for report and command line; the first note is the verdict."""
 
     notes: tuple[Note, ...]
     rows: tuple[Row, ...] = ()
@@ -216,19 +216,19 @@ def _nothing_written(_result: ToolResult) -> Written | None:
 
 @dataclass(frozen=True)
 class Tool(Generic[S, R]):
-    """One measuring tool.
+    """Descriptor of one measuring tool.
 
     ``kind`` names it in routes, jobs, commands, files and results; ``title`` is a message of the
-    catalogue, since jobs and log lines name the tool to readers of both languages. ``texts`` hold
-    at least "help" and "field.<name>" of every setting of its own. ``reevaluate`` makes the result
-    again from arrays and meta data as ``run`` kept them and raises ValueError where they are not
-    of this tool. ``parts`` are the results inside a result, by the kind of the raw data that they
-    were concluded from. ``written``: what it left in the drive. ``right`` is what a person needs to
-    start it. ``motion`` False: it reads alone, so that no exchange is started for it, it holds no
-    grant, and needs no control of the axis; its settings have no envelope then.
-    ``closes_loops`` False: it runs before anybody knows whether a loop may be closed, so that no
-    speed is tried and no ramp is prepared before it. ``pair``: it moves two axes of one bus, the
-    second one named by the setting ``partner``.
+    catalogue, since jobs and log lines name the tool to readers of both languages. ``texts``
+    contain at least "help" and "field.<name>" of every setting of its own. ``reevaluate``
+    reproduces the result from arrays and metadata as ``run`` stored them and raises ValueError
+    where they are not of this tool. ``parts`` are the results inside a result, by the kind of raw
+    data that they were concluded from. ``written``: the values that it left in the drive. ``right``
+    is what a person needs to start it. ``motion`` False: it only reads, so that no exchange is
+    started for it, it holds no grant, and needs no control of the axis; its settings then have no
+    envelope. ``closes_loops`` False: it runs before it is known whether a loop may be closed, so
+    that no speed is tried and no ramp is prepared before it. ``pair``: it moves two axes of one
+    bus, the second one named by the setting ``partner``.
     """
 
     kind: str
@@ -252,14 +252,14 @@ class Tool(Generic[S, R]):
         language: Literal["en", "zh"] = "en",
         values: Mapping[str, str] | None = None,
     ) -> str:
-        """A text of this tool with its places filled in."""
+        """A text of this tool with its placeholders filled in."""
         if name == "title":
             return self.title.words(language)
         found = self.texts[name][1 if language == "zh" else 0]
         return found.format(**values) if values else found
 
     def cells(self, grid: Grid, language: Language) -> list[tuple[str, ...]]:
-        """The head and the rows of a table as text."""
+        """Head and rows of a table as text."""
 
         def shown(cell: Cell) -> str:
             return cell if isinstance(cell, str) else self.text(cell.name, language, cell.values)

@@ -1,4 +1,4 @@
-"""A message as results carry it next to its English words."""
+"""Messages in results, as codes with parameters next to their English words."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from drivers.texts.message import Language, Text
 
 
 class MessageInfo(BaseModel):
-    """A message without words: a code of the catalogue and its facts.
+    """A message without words: a code of the catalogue and its parameters.
 
-    Empty codes carry words that others made in ``params.words``; the code ``+`` strings the other
-    params together with ``params.joint``.
+    An empty code carries text from elsewhere in ``params.words``; the code ``+`` joins the other
+    params with ``params.joint``.
     """
 
     code: str
@@ -21,10 +21,10 @@ class MessageInfo(BaseModel):
 
 
 def wire_messages(texts: Iterable[Text]) -> tuple[MessageInfo, ...]:
-    """Messages as results carry them."""
+    """Messages in the form that results contain."""
     return tuple(MessageInfo.model_validate(each.to_wire()) for each in texts)
 
 
 def words_of(messages: Iterable[MessageInfo], language: Language) -> tuple[str, ...]:
-    """The sentences of messages in a language."""
+    """The messages as texts in a language."""
     return tuple(Text.from_wire(each.model_dump()).words(language) for each in messages)

@@ -1,1 +1,1 @@
-"""From an unknown axis to a tuned and verified one."""
+"""Automatic tuning: from an unknown axis to a tuned and verified one."""

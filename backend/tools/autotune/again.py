@@ -1,9 +1,9 @@
-"""A tuned loop that answers otherwise than predicted shows what its axis is within it.
+"""Redesign from the verified loop where its response contradicts the prediction.
 
-The verification is a measurement of the axis as it is used, which no measurement without the loop
-replaces where there is play. What it says of the plant is joined with what was known, the design
-is judged again and where it must be made again, and then verified by realisations that nobody has
-seen before: the prediction never rests on the data that it is held against.
+The verification measures the axis under its operating conditions; with backlash, no measurement
+without the loop can replace it. The plant that it shows is combined with the plant known before.
+The design is judged again, replaced if it no longer meets its goals, and verified with new noise
+realisations: a prediction is never compared with the data that it was derived from.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ from backend.tools.measuring.temporary import write_settings
 from backend.tools.thresholds import autotune_again as threshold
 from drivers.texts.message import Text, joined, text
 
-#: What came of it. *same*: the design holds for the axis as its loop shows it, too, and was
-#: verified once more; *other*: another one took its place; *not kept*: that one was verified and
-#: undone; *none*: no design keeps the goals; *time*: too little was left; *unclear*: too few
-#: lines of the loop are known.
+#: Outcome of the redesign. *same*: the design also holds for the plant that its loop shows, and was
+#: verified again; *other*: another design replaced it; *not kept*: the second verification failed
+#: and the design was undone; *none*: no design meets the goals; *time*: too little time was left;
+#: *unclear*: too few lines of the loop are known.
 Outcome = Literal["same", "other", "not kept", "none", "time", "unclear"]
 
 _OUTCOMES: dict[Outcome, Text] = {
@@ -49,7 +49,7 @@ _OUTCOMES: dict[Outcome, Text] = {
 
 @dataclass(frozen=True)
 class Figures:
-    """Of one loop, read on the lines that were verified; None beyond them."""
+    """Figures of one loop, read on the verified lines; None where they lie outside them."""
 
     bandwidth_hz: float | None
     phase_margin_deg: float | None
@@ -58,13 +58,13 @@ class Figures:
 
 @dataclass(frozen=True)
 class Again:
-    """The first verification compared with what was predicted for it, and what was made of that.
+    """Comparison of the first verification with its prediction, and the outcome of the redesign.
 
-    ``predicted`` and ``measured`` are of the same lines, for which the axis was moved for
-    ``motion_s``. ``gain_ratio`` is the second design's
-    speed gain over the first one's, None without a second, ``plant`` what it was made for.
-    ``frequency_hz``, ``closed_db`` and
-    ``closed_deg`` [lines] are the closed loop that was predicted for the second verification.
+    ``predicted`` and ``measured`` refer to the same lines, for which the axis moved for
+    ``motion_s``. ``gain_ratio`` is the second design's speed gain over the first one's, None
+    without a second design; ``plant`` is the plant that the second design was made for.
+    ``frequency_hz``, ``closed_db`` and ``closed_deg`` [lines] are the closed loop predicted for the
+    second verification.
     """
 
     predicted: Figures
@@ -79,11 +79,11 @@ class Again:
 
     @property
     def verified_anew(self) -> bool:
-        """Whether a second verification counts."""
+        """Whether a second verification was made and its result is in force."""
         return self.outcome in ("same", "other")
 
     def reported(self, verified: Verified) -> Text:
-        """Everything; ``verified`` is the last verification that counts."""
+        """The whole comparison as a text; ``verified`` is the last verification that counts."""
         parts = [*contradictions(self.predicted, self.measured), self._outcome()]
         have, want = verified.measured_bandwidth_hz, verified.predicted_bandwidth_hz
         if self.verified_anew and have is not None and want is not None:
@@ -98,7 +98,7 @@ class Again:
 
 @dataclass(frozen=True)
 class Designing:
-    """What the first design was made of."""
+    """Inputs of the first design."""
 
     plant: MeasuredPlant
     load: LoadClass
@@ -110,7 +110,9 @@ class Designing:
 async def first_that_holds(
     trials: Trials, order: Sequence[Candidate], how: Designing
 ) -> tuple[Applied | None, Again | None]:
-    """The first of these that meets its prediction, also where its loop has to be seen twice.
+    """Apply the first candidate that meets its prediction, redesigning from its loop if necessary.
+
+    Returns that candidate, None where none does, and the comparison of the last redesign.
 
     Raises:
         DriveError: the drive has a fault, or the link is lost; nothing stays written.
@@ -131,16 +133,16 @@ async def first_that_holds(
 async def again(
     trials: Trials, first: Applied, how: Designing
 ) -> tuple[Applied | None, Again | None]:
-    """Where the verification contradicts the prediction: the plant from the loop, verified again.
+    """Where the verification contradicts the prediction: redesign from the loop, and verify again.
 
-    Returns what is in force then, and nothing next to it where the prediction stands. Nothing is in
-    force where the same design did not meet its prediction the second time.
+    Returns what is in force afterwards, and the comparison; the comparison is None where the
+    prediction holds. Nothing is in force where the same design failed its second verification.
 
     Raises:
         DriveError: the drive has a fault, or the link is lost; nothing stays written.
     """
     if not first.before:
-        return first, None  # What the axis had: nothing was designed.
+        return first, None  # No design was written: the axis has its previous settings.
     candidate = first.candidate
     async with nothing_stays(trials.axis, first.before):
         reported = Again(
@@ -151,7 +153,7 @@ async def again(
         )
         if not contradictions(reported.predicted, reported.measured):
             return first, None
-        # Where the second one fails, a more careful design must still be possible.
+        # If the second design fails, there must be time left for a more careful one.
         if trials.time_left.verifications() < LOOKS:
             return first, replace(reported, outcome="time")
         trials.progress(0.6, text("autotune.designing-axis-loop-shows", step=4, steps=6))
@@ -182,7 +184,7 @@ async def again(
 
 
 def loop_lines(frf: Frf) -> LoopLines:
-    """The lines of a verified loop within their band."""
+    """Lines of a verified loop within its band, with their standard deviations."""
     use = frf.in_band
     parts = (np.log(10.0) / 20.0 * frf.std_db[use], np.radians(frf.std_deg[use]))
     deviation = np.sqrt(0.5 * (parts[0] ** 2 + parts[1] ** 2))
@@ -190,9 +192,9 @@ def loop_lines(frf: Frf) -> LoopLines:
 
 
 def expected(trials: Trials, applied: Applied, plant: MeasuredPlant) -> Figures:
-    """What this plant lets expect, read as the verification was, on the lines that it was read on.
+    """Figures that ``plant`` predicts, read in the same way and on the same lines as measured.
 
-    The figures of a design are of the whole loop: its smallest margin may lie above those lines.
+    The figures of a design cover the whole loop; its smallest margin may lie above those lines.
     """
     verified = applied.verified
 
@@ -208,7 +210,7 @@ def expected(trials: Trials, applied: Applied, plant: MeasuredPlant) -> Figures:
 
 
 def _measured(verified: Verified) -> Figures:
-    """As the verification was judged."""
+    """Measured figures, as the verification judged them."""
     found = _figures(verified.sweep.margins)
     return replace(found, bandwidth_hz=verified.measured_bandwidth_hz)
 
@@ -222,7 +224,7 @@ def _figures(found: Mapping[str, float | bool | None]) -> Figures:
 
 
 def contradictions(predicted: Figures, measured: Figures) -> list[Text]:
-    """What a prediction is too far off by; what is not shown contradicts nothing."""
+    """Texts of the measured figures that differ too much from the prediction, None skipped."""
     said = []
     want, have = predicted.bandwidth_hz, measured.bandwidth_hz
     if want and have and abs(have / want - 1.0) > threshold.WIDTH:
@@ -237,7 +239,7 @@ def contradictions(predicted: Figures, measured: Figures) -> list[Text]:
 
 
 def _controller(trials: Trials, candidate: Candidate, frequency_hz: FloatArray) -> ComplexArray:
-    """All of a loop but the plant."""
+    """Frequency response of the whole open loop without the plant [lines]."""
     fixed = fixed_of(
         trials.axis, trials.check.facts, candidate.notches, candidate.filters, frequency_hz
     )
@@ -247,7 +249,7 @@ def _controller(trials: Trials, candidate: Candidate, frequency_hz: FloatArray) 
 def _closed(
     trials: Trials, candidate: Candidate, plant: MeasuredPlant, frequency_hz: FloatArray
 ) -> ComplexArray:
-    """The closed loop of a design on a plant."""
+    """Closed loop of a design on a plant [lines]."""
     controller = _controller(trials, candidate, frequency_hz)
     return closed_from_open(plant.on(frequency_hz).response() * controller)
 
@@ -260,9 +262,10 @@ def _alike(one: Candidate, other: Candidate) -> bool:
 def _designed(
     trials: Trials, candidate: Candidate, how: Designing, plant: MeasuredPlant
 ) -> Candidate | None:
-    """The design as it is where it keeps its goals for both, else the best that does; or none.
+    """The same design if it meets its goals on both plants, else the best that does, or None.
 
-    It was the best for the axis as measured, so no other is better for both where it holds.
+    It was the best design for the plant as first measured; where it also holds for the second
+    plant, no other is better for both.
     """
     axis, check = trials.axis, trials.check
     mark = how.mark if how.mark in candidate.marks else next(iter(candidate.marks), how.mark)
@@ -272,7 +275,7 @@ def _designed(
     )
     if sound:
         return replace(made, marks=candidate.marks, phase_cost_deg=candidate.phase_cost_deg)
-    # Not above what was verified: the axis may hum there.
+    # Limited to the verified bandwidth: the axis may oscillate above it.
     table = candidates_for(
         axis.drive, check.facts, plant, check.inertia_kgm2, how.load, how.sample_rate_hz,
         filters=not how.cautious, notches=not how.cautious,
@@ -284,9 +287,9 @@ def _designed(
 async def _in_place_of(
     trials: Trials, first: Applied, second: Candidate, plant: MeasuredPlant, *, fall_back: bool
 ) -> Applied | None:
-    """The second one where it meets the prediction, else the first one again; or nothing.
+    """Apply the second design; if it fails its verification, restore the first one or nothing.
 
-    ``fall_back``: the first one may stay; not so where it is the second one.
+    ``fall_back``: whether the first design may be restored; not where it equals the second.
     """
     axis = trials.axis
     async with nothing_stays(axis, first.before):

@@ -1,4 +1,4 @@
-"""Writing candidates one after another until one meets its prediction; all others are undone."""
+"""Writing candidates one after another until one meets its prediction; the others are undone."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from backend.work.jobs import Progress
 from drivers.errors import DriveError
 from drivers.texts.message import Text, joined, text
 
-#: A candidate with this share of its gain; None where that keeps no margins.
+#: Makes a candidate with this share of the gain; None where it does not meet the margins.
 Softer = Callable[[Candidate, float], Awaitable[Candidate | None]]
 
 
 @dataclass(frozen=True)
 class Applied:
-    """What is in force now; ``before`` are the raw values that undo it."""
+    """The candidate in force; ``before`` holds the raw values that undo it."""
 
     candidate: Candidate
     verified: Verified
     before: dict[str, int]
     written: datetime | None = None
-    """When that was; None where nothing was written."""
+    """Time of writing; None where nothing was written."""
 
 
 async def first_kept(
@@ -41,12 +41,13 @@ async def first_kept(
     guaranteed: Goals, tried: list[Text], progress: Progress, keep: Keep | None,
     softer: Softer | None = None, time_left: TimeLeft | None = None,
 ) -> Applied | None:  # fmt: skip
-    """The first candidate that meets its prediction stays; ``tried`` states why others do not.
+    """Apply the first candidate that meets its prediction; ``tried`` receives why others failed.
 
-    ``candidates`` are tried in their order; what is ``guaranteed`` is what was asked for, which a
-    more careful one may keep where it does not reach its own goals. One with torque ripple only
-    is tried again with less gain, as ``softer`` makes it, before a slower one is. The last one that
-    ``time_left`` allows is the most careful of all.
+    ``candidates`` are tried in their order. ``guaranteed`` are the requested goals; a more careful
+    candidate that misses its own goals may still meet them. A candidate whose only fault is torque
+    ripple is tried again with less gain, made by ``softer``, before a slower one is tried. When
+    ``time_left`` allows only one more verification, the most careful (last) candidate is used for
+    it.
 
     Raises:
         DriveError: the drive has a fault or was disabled by others, or the link is lost; nothing
@@ -66,7 +67,8 @@ async def first_kept(
         progress(0.65, text("autotune.applying", step=5, steps=6))
         raw = await plan(axis, candidate, check.inertia_kgm2, check.motor_inertia_kgm2)
         earlier = {key: await axis.drive.raw(key) for key in raw}
-        # Noted for the next server: killed here, this one would leave what nobody has verified.
+        # On the restore list: if this server is killed now, the next one undoes the unverified
+        # values.
         with axis.drive.pending_restores.temporary(earlier):
             before = await write_settings(axis, raw)
             written = datetime.now(UTC)
@@ -95,7 +97,7 @@ async def first_kept(
             and softened < threshold.SOFTENED
         ):
             softened += 1
-            # A sensor's noise comes back as torque by the gain.
+            # The torque ripple that sensor noise causes is proportional to the gain.
             less = await softer(candidate, threshold.QUIETER * HUM_PERCENT / verified.hum_percent)
             if less is not None:
                 waiting = _in_turn(waiting, candidate, less)
@@ -103,14 +105,14 @@ async def first_kept(
 
 
 def _in_turn(waiting: Sequence[Candidate], hummed: Candidate, less: Candidate) -> list[Candidate]:
-    """With ``less`` before what is slower; what has more gain and the same filters would hum."""
+    """Insert ``less`` before slower candidates; drop others with more gain and the same filters."""
     gain = less.gains.speed_nms
     faster = [c for c in waiting if c.gains.speed_nms >= gain and c.filters != hummed.filters]
     return [*faster, less, *(c for c in waiting if c.gains.speed_nms < gain)]
 
 
 def stages(progress: Progress) -> tuple[Progress, Progress, Progress]:
-    """The three parts of a verification, as parts of the whole."""
+    """Progress of the three parts of a verification, as parts of the whole."""
     return (
         part(progress, 0.7, 0.72, text("autotune.verifying-standstill", step=6, steps=6)),
         part(progress, 0.72, 0.92, text("autotune.measuring-tuned-loop", step=6, steps=6)),
@@ -119,13 +121,13 @@ def stages(progress: Progress) -> tuple[Progress, Progress, Progress]:
 
 
 async def take_back(axis: Axis, before: dict[str, int]) -> None:
-    """Put these raw values back, whatever happens meanwhile."""
+    """Restore these raw values, even while the job is being cancelled."""
     await put_back_in_time(axis, before)
 
 
 @asynccontextmanager
 async def nothing_stays(axis: Axis, before: dict[str, int]) -> AsyncIterator[None]:
-    """What ends the tuning in here takes back what is written."""
+    """Restore the values of ``before`` if an error or a cancellation leaves the context."""
     try:
         yield
     except BaseException:
@@ -134,7 +136,7 @@ async def nothing_stays(axis: Axis, before: dict[str, int]) -> AsyncIterator[Non
 
 
 def part(progress: Progress, low: float, high: float, step: Text) -> Progress:
-    """A step's own progress, shown as a part of the whole."""
+    """Progress of one step, shown as the part from ``low`` to ``high`` of the whole."""
 
     def reported() -> None:
         inner = own.step

@@ -1,4 +1,4 @@
-"""What the tuning tools must know of a drive, in SI units, read from it by its profile."""
+"""Data of a drive that the tuning tools need, in SI units, read by its profile."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drivers.errors import NotAllowed
 from profiles.schema import Parameter
 
 _TURN = 2.0 * math.pi
-#: Printed units of parameters to SI.
+#: Factors from the units printed for parameters to SI.
 _SI = {
     "Nm": 1.0, "mNm": 1e-3, "0.1 Nm": 0.1, "0.01 Nm": 0.01, "A": 1.0, "mA": 1e-3, "0.1 A": 0.1,
     "Nm/A": 1.0, "mNm/A": 1e-3, "kg·m²": 1.0, "kg·cm²": 1e-4, "g·cm²": 1e-7, "Hz": 1.0,
@@ -22,7 +22,7 @@ _SI = {
 
 
 def si_value(parameter: Parameter, value: float) -> float | None:
-    """A parameter's engineering value in SI units; None where its unit is not known here."""
+    """Engineering value of a parameter in SI units; None where its unit is not known here."""
     factor = _SI.get(parameter.unit)
     return None if factor is None else float(value) * factor
 
@@ -46,11 +46,11 @@ def si_raw(parameter: Parameter, value: float) -> int:
 
 @dataclass(frozen=True, slots=True)
 class AxisFacts:
-    """None where neither the drive nor the profile reports.
+    """Data of drive and motor; None where neither the drive nor the profile states it.
 
-    ``rated_torque_nm`` is what 100 % of torque is; 1.0 is in its place where it is unknown
-    (``torque_known`` False), so that "Nm" then means "of rated torque".
-    ``interpolates`` is whether cyclic setpoints are reached linearly (60C2h).
+    ``rated_torque_nm`` is the torque at 100 %; where it is unknown (``torque_known`` False) it is
+    1.0, so that "Nm" then means "of rated torque". ``interpolates``: whether the drive interpolates
+    linearly between cyclic setpoints (60C2h).
     """
 
     rated_torque_nm: float
@@ -62,11 +62,11 @@ class AxisFacts:
     drive_inertia_kgm2: float | None
     interpolates: bool
     torque_filter_hz: float | None = None
-    """Corner of a first-order filter of the torque command that the profile names, while on."""
+    """Corner of the first-order torque command filter that the profile names, while it is on."""
 
 
 async def si(drive: Drive, key: str | None) -> float | None:
-    """A parameter in SI units, read now; None where it does not exist here."""
+    """Read a parameter in SI units; None where it does not exist or is not readable."""
     if key is None:
         return None
     parameter = drive.parameter(key)
@@ -78,9 +78,9 @@ async def si(drive: Drive, key: str | None) -> float | None:
 
 
 async def brake_opens_s(drive: Drive) -> float:
-    """How long the drive waits for its brake before it takes commands, by its parameters [s].
+    """Time that the drive waits for its brake before it follows setpoints, by its parameters [s].
 
-    0 where its family prints no such time; it counts from Operation enabled.
+    It starts at Operation enabled; 0 where the family documents no such time.
     """
     timing = drive.profile.functions.brake
     if timing is None:
@@ -92,7 +92,7 @@ async def brake_opens_s(drive: Drive) -> float:
 async def read_facts(
     axis: Axis, rated_torque_nm: float | None = None, motor_inertia_kgm2: float | None = None
 ) -> AxisFacts:
-    """Read them; given values override the drive's.
+    """Read the data; the given values replace the drive's.
 
     Raises:
         DriveError: a parameter cannot be read.

@@ -1,4 +1,4 @@
-"""Designs for a drive from what was measured of its axis, and the raw values that make them."""
+"""Designs for a drive from the measured plant, and the raw values that realise them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _UNMET: dict[LoadClass, Text] = {
 
 @dataclass(frozen=True)
 class Design:
-    """All candidates, fastest first; ``caution`` states why they are careful, None where not."""
+    """All candidates, fastest first; ``caution`` is the reason for careful ones, else None."""
 
     load: LoadClass
     candidates: tuple[Candidate, ...]
@@ -40,7 +40,7 @@ class Design:
 
 
 def load_class(mechanics: SweepResult) -> LoadClass:
-    """Stiff, medium or compliant, by where the first antiresonance lies."""
+    """Stiff, medium or compliant, by the frequency of the first antiresonance."""
     low = [r.frequency_hz for r in mechanics.resonances if r.kind == "antiresonance"]
     first = min(low, default=np.inf)
     return "compliant" if first < 80.0 else "medium" if first < 300.0 else "stiff"
@@ -53,8 +53,8 @@ def candidates_for(
 ) -> tuple[Candidate, ...]:  # fmt: skip
     """All candidates for a measured plant; with a sample rate only those that can be verified.
 
-    ``filters``: the drive's torque and speed filters may be set, too. No speed bandwidth comes out
-    above ``highest_hz``.
+    ``filters``: the drive's torque and speed filters may be changed, too. No candidate has a speed
+    bandwidth above ``highest_hz``.
     """
     profile = drive.profile
     loops = gain_tool.loops_of(drive, facts)
@@ -85,7 +85,7 @@ def _seen_by_the_bus(
     loops: DriveLoops,
     sample_rate_hz: float | None,
 ) -> tuple[Candidate, ...]:
-    """Slower designs as long as the -3 dB point of one lies above what this bus can see."""
+    """Slow the designs down until their -3 dB bandwidth lies in the band that this bus resolves."""
     table: tuple[Candidate, ...] = ()
     for _ in range(threshold.NARROWINGS):
         table = designed(loops)
@@ -107,9 +107,9 @@ def design_for(
     load: LoadClass | None,
     sample_rate_hz: float,
 ) -> Design:
-    """The best designs; cautious ones where no model explains what was measured, or none is good.
+    """The best designs; cautious ones if no model fits the data or no design meets its goals.
 
-    Empty where not even those keep their goals.
+    Empty where not even cautious designs meet their goals.
     """
     caution = text("autotune.no-mechanical-model")
     if mechanics.model is not None:
@@ -127,7 +127,7 @@ def design_for(
 def plant_of(
     mechanics: SweepResult, inertia_kgm2: float, facts: AxisFacts, *, cautious: bool
 ) -> MeasuredPlant:
-    """What designs are made for: the measured axis, or only what is certain of it."""
+    """Plant for the design: the measured axis, or with ``cautious`` only the certain part of it."""
     if mechanics.model is None or cautious:
         return cautious_plant(mechanics, inertia_kgm2, facts.motor_inertia_kgm2)
     return measured_plant(mechanics.frf, mechanics.model)
@@ -141,9 +141,9 @@ def cautious_design(
     sample_rate_hz: float,
     caution: Text,
 ) -> Design:
-    """Gains alone, safe for whatever the axis may be, slower than a design on a model.
+    """Designs of gains alone that are safe for any axis, slower than a design on a model.
 
-    An axis with backlash is now the whole and now the motor alone.
+    An axis with backlash is at times the whole inertia and at times the motor alone.
     """
     plant = plant_of(mechanics, inertia_kgm2, facts, cautious=True)
     table = candidates_for(
@@ -155,11 +155,11 @@ def cautious_design(
 def cautious_plant(
     mechanics: SweepResult, inertia_kgm2: float, motor_inertia_kgm2: float | None
 ) -> MeasuredPlant:
-    """What is certain of an axis that no model explains.
+    """The certain part of an axis that no model fits.
 
-    The coherent lines of the direct estimate, a rigid axis above and below them, and as a variant
-    the lightest that it ever is: the motor alone, as within a backlash, or where that inertia is
-    not known what the measured lines show.
+    It consists of the coherent lines of the direct estimate and a rigid axis above and below them.
+    A variant has the lowest inertia possible: the motor alone, as within a backlash, or, where that
+    inertia is unknown, the lowest that the measured lines show.
     """
     frf = mechanics.direct
     use = frf.in_band & (frf.coherence > threshold.COHERENT)
@@ -168,7 +168,8 @@ def cautious_plant(
         omega = 2.0 * np.pi * frf.frequency_hz[use]
         lightest = min(lightest, float(np.min(1.0 / (np.abs(frf.response[use]) * omega))))
     if motor_inertia_kgm2 is not None:
-        # Nothing is lighter than the motor; a line that says so is a peak, which is in the lines.
+        # The inertia is at least the motor's; a line that shows less is a resonance peak, which the
+        # lines contain.
         lightest = motor_inertia_kgm2
     rigid = MechanicalModel(1.0 / inertia_kgm2, 1e-3)
     variants = (MechanicalModel(1.0 / lightest, 1e-3),)
@@ -178,7 +179,7 @@ def cautious_plant(
 async def plan(
     axis: Axis, candidate: Candidate, inertia_kgm2: float, motor_inertia_kgm2: float | None = None
 ) -> dict[str, int]:
-    """Raw values of a candidate: gains, inertia, filters and notches."""
+    """Raw values that realise a candidate: gains, inertia, filters and notches."""
     rotor = await gain_tool.rotor_inertia(axis, motor_inertia_kgm2)
     raw = gain_tool.plan_gains(axis.drive, candidate.gains, inertia_kgm2, rotor)
     raw |= gain_tool.plan_filters(axis.drive, candidate.filters)

@@ -1,8 +1,8 @@
-"""Raising a tuned loop's gain in steps, and watching whether it begins to oscillate.
+"""Raising the gain of a tuned loop in steps, and checking whether it begins to oscillate.
 
-What lies above the band that a bus cycle shows can be seen by its effect: a loop that is stable
-with so much more gain has at least that gain margin, at whatever frequency it crosses. An
-oscillation above half the sample rate is folded, but keeps its size.
+Behaviour above the band that a bus cycle resolves can be detected by its effect: a loop that is
+stable with a raised gain has at least that gain margin, at whatever frequency its phase crosses
+-180 degrees. An oscillation above half the sample rate is aliased, but keeps its amplitude.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _DECAYS = 0.5**0.5
 
 @dataclass(frozen=True)
 class GainStep:
-    """One raised gain: how much, and the torque's oscillation in % of the rated (RMS)."""
+    """One raised gain [dB], and the torque's oscillation in % of the rated torque (RMS)."""
 
     gain_db: float
     oscillation_percent: float
@@ -42,7 +42,7 @@ class GainStep:
 
 @dataclass(frozen=True)
 class GainSteps:
-    """``shown_db`` is the highest gain at which the loop was stable, ``onset_db`` the next."""
+    """Result: ``shown_db``, the highest gain with a stable loop, and ``onset_db``, the next one."""
 
     shown_db: float
     onset_db: float | None
@@ -58,12 +58,12 @@ async def gain_steps(
     progress: Progress,
     keep: Keep | None = None,
 ) -> GainSteps:
-    """Raise the speed gain up to ``wanted_db`` and step at each; the gain is as before afterwards.
+    """Raise the speed gain up to ``wanted_db`` with a step at each; restore the gain afterwards.
 
-    ``present`` is the same step with the gain as it is.
+    ``present`` is the same step at the unchanged gain.
 
     Raises:
-        DriveError: the drive has a fault, or the link is lost; an oscillation is no error.
+        DriveError: the drive has a fault, or the link is lost; an oscillation is not an error.
     """
     drive = axis.drive
     key = gain_tool.spec_of(drive).speed
@@ -100,25 +100,27 @@ async def gain_steps(
 
 
 def steps_to(wanted_db: float) -> int:
-    """How many raised gains lead up to this one."""
+    """Number of raised gains up to ``wanted_db``."""
     return max(1, int(np.ceil(wanted_db / threshold.STEP_DB)))
 
 
 def judged(
     step: StepResult, present: StepResult, settings: StepSettings, gain_db: float
 ) -> GainStep:
-    """Whether the torque settles, as it does of a loop that is stable.
+    """Judge whether the torque settles, as it does in a stable loop.
 
-    ``present`` is the same step with the gain as it is. A torque that goes with the place (cogging,
-    a load off its axis, an inertia by place) is the same in both, and may well be larger in the
-    second half: an oscillation is in the step and in what it differs from ``present`` by.
+    ``present`` is the same step at the unchanged gain. Torque that depends on position (cogging, an
+    eccentric load, an inertia that varies with position) is the same in both steps and may be
+    larger in the second half; an oscillation is therefore present both in the step and in its
+    difference from ``present``.
 
-    An oscillation is narrow, and persists or grows. What decays in its own band is what the step
-    leaves, such as the swing of the load; it counts with what is left of it at the end.
-    What persists may rise with the gain and by what a sensitivity with 1 dB left makes of noise
-    (`threshold.NOISE` over all frequencies). A band grows where it is above what noise of the
-    present step reaches there by chance (`threshold.FALSE_ALARM`, F distribution) and larger at the
-    end than before.
+    An oscillation is narrow-band, and persists or grows. What decays within its own band is the
+    transient of the step, such as swinging of the load; only its level at the end counts.
+
+    The persistent part may rise with the gain, and by the factor by which a loop with 1 dB of gain
+    margin amplifies noise (`threshold.NOISE` over all frequencies). A band grows if it is larger at
+    the end than before and above what noise of the present step reaches there by chance
+    (`threshold.FALSE_ALARM`, F distribution).
     """
     before = _steady(present, settings)
     after = _steady(step, settings)
@@ -132,7 +134,7 @@ def judged(
 
 
 def _powers(torque: npt.NDArray[np.float64]) -> npt.NDArray[np.float64] | None:
-    """Power [piece, line] of a steady part by the time; None where there are too few samples.
+    """Power [piece, line] of successive pieces of a steady part; None with too few samples.
 
     The lines of one piece add up to its mean square (Parseval).
     """
@@ -147,9 +149,9 @@ def _powers(torque: npt.NDArray[np.float64]) -> npt.NDArray[np.float64] | None:
 
 
 def _persistent(torque: npt.NDArray[np.float64]) -> float:
-    """Root mean square over time, of a band that decays over the last piece.
+    """RMS of the persistent part; bands that decay count with the power of the last piece.
 
-    What persists in a band that decays is no larger than what is there at the end.
+    What persists in a decaying band is no larger than its level at the end.
     """
     powers = _powers(torque)
     if powers is None:
@@ -161,7 +163,7 @@ def _persistent(torque: npt.NDArray[np.float64]) -> float:
 
 
 def _grows(torque: npt.NDArray[np.float64], before: npt.NDArray[np.float64], factor: float) -> bool:
-    """Whether a band grows beyond what ``factor`` makes of the noise ``before``."""
+    """Whether a band grows beyond the noise ``before`` times ``factor``."""
     powers, noise = _powers(torque), _powers(before)
     if powers is None or noise is None:
         first, second = (float(np.std(part)) for part in np.array_split(torque, 2))
@@ -175,7 +177,7 @@ def _grows(torque: npt.NDArray[np.float64], before: npt.NDArray[np.float64], fac
 
 
 def _steady(step: StepResult, settings: StepSettings) -> npt.NDArray[np.float64]:
-    """Torque while the speed is held, without its trend."""
+    """Torque in the second half of the constant-speed phase, without its quadratic trend."""
     time = step.time_s
     begin = LEAD_S + 0.5 * settings.hold_s
     part = step.torque_percent[(time >= begin) & (time < LEAD_S + settings.hold_s)]

@@ -1,9 +1,9 @@
 """Loop gains of a drive in physical units, by the convention of its profile.
 
 Bandwidth convention (MMS7): speed gain = 2π·bandwidth·J with J as the drive holds it, integral
-corner = 2π·value times that, position gain = 2π·value (004:2847). Gain convention: position in
-1/s, speed in Hz with J from the inertia ratio, integral as a time. Gains without a printed
-meaning are shown raw and never designed for.
+corner = 2π·value times that, position gain = 2π·value (004:2847). Gain convention: position in 1/s,
+speed in Hz with J from the inertia ratio, integral as a time. Gains without a documented meaning
+are shown raw; no design is made for them.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class GainState:
-    """Gains now: Hz, 1/s, s; None where the family has none or its unit has no printed meaning.
+    """Present gains in Hz, 1/s and Nm·s; None where the family lacks one or documents no unit.
 
     ``speed_nms`` is the gain in Nm per rad/s with the drive's own inertia. ``level`` is the
-    stiffness level that acts instead of the single gains, None when they act themselves.
+    stiffness level that replaces the single gains, None where the single gains act.
     """
 
     convention: str
@@ -41,7 +41,11 @@ class GainState:
 
 
 def spec_of(drive: Drive) -> GainSpec:
-    """Raises NotAllowed where the profile has no gains."""
+    """Gain parameters of the profile.
+
+    Raises:
+        NotAllowed: the profile has no gains.
+    """
     if drive.profile.gains is None:
         raise NotAllowed(
             "autotune.profile-not-name-gains", drive=drive.name, profile_title=drive.profile.title
@@ -54,7 +58,7 @@ def _table(drive: Drive) -> StiffnessTable | None:
 
 
 async def read_gains(axis: Axis, facts: AxisFacts | None = None) -> GainState:
-    """Read them now.
+    """Read the present gains.
 
     Raises:
         DriveError: a parameter cannot be read.
@@ -112,13 +116,14 @@ def _row(drive: Drive, table: StiffnessTable, level: int) -> dict[str, float | N
 def plan_gains(
     drive: Drive, gains: Gains, inertia_kgm2: float, rotor_kgm2: float | None = None
 ) -> dict[str, int]:
-    """Raw values that make the drive's loops these gains, its inertia parameter included.
+    """Raw values that give the drive's loops these gains, its inertia parameter included.
 
     ``rotor_kgm2`` is needed where that parameter is a ratio to the motor's own inertia: a speed
-    gain means nothing before the ratio is right.
+    gain has no physical value before the ratio is right. The values are limited to what the
+    parameters can hold.
 
     Raises:
-        NotAllowed: a family whose gains have no printed meaning.
+        NotAllowed: a family whose gains have no documented meaning.
         OutOfRange: later, by the write, when a value exceeds the parameter's limits.
     """
     spec = spec_of(drive)
@@ -151,14 +156,14 @@ def plan_gains(
 
 
 def raised(drive: Drive, key: str, raw: int, factor: float) -> int:
-    """A gain's raw value times a factor, as far as the parameter holds it."""
+    """Raw value of a gain multiplied by a factor, limited to the parameter's range."""
     parameter = drive.parameter(key)
     value = _engineering(drive, key, raw)
     return _within(drive, key, round(parameter.to_raw(value * factor)))
 
 
 def filter_choices(drive: Drive, now: LoopFilters) -> tuple[LoopFilters, ...]:
-    """Wider filters that the drive can be given in place of those that it has now."""
+    """Wider filters that the drive can be given in place of its present ones."""
     spec = spec_of(drive)
     found: list[LoopFilters] = []
     last = now
@@ -179,14 +184,14 @@ def filter_choices(drive: Drive, now: LoopFilters) -> tuple[LoopFilters, ...]:
 
 
 def _held(drive: Drive, key: str, value: float) -> float:
-    """A value in SI units as the parameter can hold it."""
+    """A value in SI units, rounded to what the parameter can hold."""
     parameter = drive.parameter(key)
     raw = _within(drive, key, si_raw(parameter, value))
     return si_value(parameter, _engineering(drive, key, raw)) or 0.0
 
 
 def plan_filters(drive: Drive, filters: LoopFilters) -> dict[str, int]:
-    """Raw values that make the drive's filters these; a corner of None leaves one as it is."""
+    """Raw values that give the drive's filters these corners; None leaves a filter unchanged."""
     spec = spec_of(drive)
     raw: dict[str, int] = {}
     if spec.speed_filter is not None and filters.speed_hz is not None:
@@ -198,7 +203,7 @@ def plan_filters(drive: Drive, filters: LoopFilters) -> dict[str, int]:
 
 
 def _by_hand(drive: Drive) -> str:
-    """What is left where nothing can be computed."""
+    """Advice for manual tuning where nothing can be computed."""
     what = "choose its stiffness level" if _table(drive) else "change its gains in small steps"
     return f"{what} on the Tune or Parameters page, and look at a step after each change"
 
@@ -206,7 +211,7 @@ def _by_hand(drive: Drive) -> str:
 def _inertia_raw(
     drive: Drive, spec: GainSpec, inertia_kgm2: float, rotor_kgm2: float | None
 ) -> int:
-    """The drive's inertia parameter for a whole axis of ``inertia_kgm2``."""
+    """Raw value of the drive's inertia parameter for a whole axis of ``inertia_kgm2``."""
     parameter = drive.parameter(spec.inertia or "")
     if spec.inertia_meaning == "total":
         return si_raw(parameter, inertia_kgm2)
@@ -222,12 +227,12 @@ def _inertia_raw(
 
 
 async def rotor_inertia(axis: Axis, given_kgm2: float | None = None) -> float | None:
-    """The motor's own inertia: given, or from the drive where it shows."""
+    """The motor's own inertia: the given one, or the drive's where it states one."""
     return given_kgm2 or await si(axis.drive, axis.drive.key("motor_inertia"))
 
 
 def _within(drive: Drive, key: str, raw: int) -> int:
-    """The nearest value that the parameter can hold: a gain may always be lower than designed."""
+    """Limit a raw value to the parameter's range: a lower gain than designed is always allowed."""
     low, high = drive.parameter(key).raw_limits
     raw = raw if high is None else min(raw, int(high))
     return raw if low is None else max(raw, int(low))
@@ -251,8 +256,8 @@ def plan_level(drive: Drive, level: int) -> dict[str, int]:
 def loops_of(drive: Drive, facts: AxisFacts) -> DriveLoops:
     """The fixed parts of the drive's loop, for prediction.
 
-    The speed is the difference of two samples (half a period late), the torque is held for one
-    period (half a period late).
+    The speed is the difference of two samples (half a period of delay); the torque is held for one
+    period (half a period of delay).
 
     Raises:
         NotAllowed: the current loop's bandwidth is not known.

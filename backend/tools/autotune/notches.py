@@ -1,4 +1,4 @@
-"""What a drive's notches do, where no manual prints it: learned on the way to a design."""
+"""Measuring the effect of a drive's notches, where no manual documents it, during a tuning."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _PARTLY = text("autotune.notch-values-left-out")
 
 @dataclass(frozen=True)
 class Learning:
-    """What the user permits: the envelope, which loop, and how the axis may travel."""
+    """What the user permits: the envelope, the loop to close, and how the axis may travel."""
 
     envelope: Envelope
     loop: sweep_evaluation.Loop
@@ -50,11 +50,12 @@ async def learn_notches(
     progress: Progress,
     time_left: TimeLeft | None = None,
 ) -> Text | None:
-    """Measure what no manual prints, where it is worth it: with the loop where one is needed.
+    """Measure the undocumented effect of the notches where useful, with a loop where one is needed.
 
-    A load that pulls needs one, and an axis whose mechanics were measured with one.
+    A loop is needed where the load exerts a static torque, and where the mechanics were measured
+    with one.
 
-    Returns why the design goes without notches; None where it does not.
+    Returns why the design does without notches; None where it can use them.
     """
     if _known(axis):
         return None
@@ -64,7 +65,7 @@ async def learn_notches(
         return None
     found = outcome.result
     clock = time_left or TimeLeft()
-    # Where friction rules, a torque that is off by little makes a speed that is off by much.
+    # With dominant friction, a small error in torque makes a large error in speed.
     ruled = how.scheme == "free" and mechanics.loop != "none"
     in_loop = _held(how, facts, outcome) or ruled
     takes_s = notch_trials.least_s(axis.drive) * (1.0 if in_loop else threshold.FREE)
@@ -88,7 +89,7 @@ async def learn_notches(
     except NotAllowed as error:
         if await ends_all(axis, error):
             raise
-        # It was stopped somewhere; travel counts from where the tuning began.
+        # The attempt ended at an unknown place; travel counts from where the tuning began.
         await quiet(axis)
         await go_back(axis, session, home, how.envelope, facts)
         return text("autotune.without-notches", cause=error.text)
@@ -101,7 +102,7 @@ async def learn_notches(
 def learning_s(
     axis: Axis, how: Learning, facts: AxisFacts, outcome: inertia_evaluation.InertiaOutcome
 ) -> float:
-    """About how long `learn_notches` will take, from what is known before the mechanics are."""
+    """Estimated duration of `learn_notches` [s], before the mechanics are measured."""
     if _known(axis):
         return 0.0
     takes_s = notch_trials.every_s(axis.drive)
@@ -109,19 +110,19 @@ def learning_s(
 
 
 def _known(axis: Axis) -> bool:
-    """Whether nothing of the drive's notches is left to be measured."""
+    """Whether nothing about the drive's notches is left to be measured."""
     known = meaning_of(axis.drive)
     return not notch_effect.unknown(axis.drive) or (known is not None and not known.left_out)
 
 
 def _held(how: Learning, facts: AxisFacts, outcome: inertia_evaluation.InertiaOutcome) -> bool:
-    """Whether a load pulls, or the user wants a loop."""
+    """Whether a loop is needed: the load exerts a static torque, or the user chose a loop."""
     pulled = abs(outcome.result.gravity_nm.value) > PULLED * facts.rated_torque_nm
     return pulled or how.loop not in ("auto", "none")
 
 
 def out_of_sight(mechanics: sweep_evaluation.SweepResult) -> Text | None:
-    """That a resonance above the measured lines bounds the gain; else None."""
+    """Text that a resonance above the measured lines limits the gain; None otherwise."""
     model, frf = mechanics.model, mechanics.frf
     highest_hz = float(np.max(frf.frequency_hz[frf.in_band], initial=0.0))
     above = [m for m in model.modes if m.frequency_hz > highest_hz] if model is not None else []
@@ -142,7 +143,7 @@ async def _learn_free(
     progress: Progress,
     repeats: Repeats,
 ) -> NotchMeaning:
-    """On an axis that no load pulls, without a loop."""
+    """Measure it without a loop, on an axis whose load exerts no static torque."""
     envelope: Envelope | None = how.envelope
     still = how.scheme != "free"
     if still:

@@ -1,8 +1,8 @@
-"""What an axis had before it is tuned, as one more design: it stays where no other one is better.
+"""The settings that an axis had before the tuning, as one more design: kept if none is better.
 
-Its gains may be higher than every design's: chosen by somebody who knows the machine, or more than
-this bus could verify in a search. They are predicted on the same measurement, for everything that
-the axis may be, and then verified like any design.
+Its gains may be higher than every design's: chosen by somebody who knows the machine, or higher
+than this bus could verify in a search. Their response is predicted from the same measurement, for
+all variants of the plant, and then verified like any design.
 """
 
 from __future__ import annotations
@@ -37,20 +37,20 @@ from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import Text, text
 
 _TURN = 2.0 * np.pi
-#: Said where nothing was changed.
+#: Note where nothing was changed.
 KEPT = text("autotune.kept-as-it-was")
 
 
 @dataclass(frozen=True)
 class Present:
-    """The loop as it is; ``candidate`` None where its gains or notches have no known meaning."""
+    """The present loop; ``candidate`` is None where its gains or notches have no known meaning."""
 
     speed_nms: float | None
     candidate: Candidate | None = None
     sound: bool = False
 
     def slower(self, design: Candidate) -> bool:
-        """Whether a design would make the axis clearly slower than it is."""
+        """Whether a design would make the axis clearly slower than it is now."""
         now, then = self.candidate and self.candidate.bandwidth_hz, design.bandwidth_hz
         if now and then and then > now:
             return False
@@ -60,7 +60,7 @@ class Present:
         )
 
     def reported(self, design: Candidate, tried: bool) -> Text | None:
-        """That a design is slower than what the axis had, and why it is accepted all the same."""
+        """Note that the applied design is slower than the previous settings, and why; else None."""
         if not self.slower(design) or not self.speed_nms:
             return None
         share = design.gains.speed_nms / self.speed_nms
@@ -75,7 +75,7 @@ class Present:
 async def present(
     axis: Axis, facts: AxisFacts, plant: MeasuredPlant, inertia_kgm2: float, goals: Goals
 ) -> Present:
-    """What the drive holds now, and whether it keeps these goals for all that the axis may be.
+    """Read the present settings, and judge whether they meet these goals for all plant variants.
 
     Raises:
         DriveError: a parameter cannot be read.
@@ -119,7 +119,7 @@ def judged(
     filters: LoopFilters,
     goals: Goals,
 ) -> tuple[Candidate, bool]:
-    """A loop as a design, and whether it keeps the goals for all that the axis may be.
+    """A loop as a candidate, and whether it meets the goals for all plant variants.
 
     Raises:
         NotAllowed, ValueError: a part of the loop has no known meaning.
@@ -136,7 +136,7 @@ def judged(
 
 @dataclass
 class Trials:
-    """Everything that is verified on one axis, in turn; ``tried`` states why what failed did."""
+    """All verifications on one axis, in order; ``tried`` lists why candidates failed."""
 
     axis: Axis
     session: CyclicSession
@@ -150,9 +150,9 @@ class Trials:
     time_left: TimeLeft = field(default_factory=TimeLeft)
 
     async def first(self, order: Sequence[Candidate], plant: MeasuredPlant) -> Applied | None:
-        """The first of these, or what the axis has where all that is left is slower.
+        """Apply the first candidate that holds; keep the present settings if the rest is slower.
 
-        ``plant`` is what the designs were made for.
+        ``plant`` is the plant that the designs were made for.
 
         Raises:
             DriveError: the drive has a fault, or the link is lost; nothing stays written.
@@ -170,13 +170,14 @@ class Trials:
         return applied
 
     def _may_stay(self) -> bool:
-        """Whether what it had can be verified: it did not fail before, and there is time."""
+        """Whether the previous settings can be verified: not failed before, and time is left."""
         return not self.had_failed and self.time_left.verifications() >= 1
 
     async def _as_it_was_or(self, slower: Applied) -> Applied:
-        """The prediction was wrong for a slower design, so it is no reason against what it had.
+        """Verify the previous settings after all, as the prediction was wrong for a slower design.
 
-        That is measured in turn, and stays where it meets the prediction; else the design is back.
+        A wrong prediction is no reason to reject them. They stay if they meet their prediction;
+        otherwise the slower design is restored.
         """
         if not self._may_stay():
             return slower
@@ -210,7 +211,7 @@ class Trials:
         )  # fmt: skip
 
     async def _as_it_was(self) -> Applied | None:
-        """Verified like a design; nothing is written."""
+        """Verify the previous settings like a design; nothing is written."""
         candidate = self.had.candidate
         assert candidate is not None
         self.progress(0.65, text("autotune.faster-designs-left", step=5, steps=6))
@@ -232,7 +233,7 @@ class Trials:
         return None
 
     def note(self, applied: Applied) -> Text | None:
-        """What the result says of the axis as it was; None where it became faster."""
+        """Note of the result on the previous settings; None where the axis became faster."""
         if applied.candidate is self.had.candidate:
             return KEPT
         return self.had.reported(applied.candidate, self.had_failed)

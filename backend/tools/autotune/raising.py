@@ -1,4 +1,4 @@
-"""How far a loop's gain is raised to show what no measured line does, and what stays open."""
+"""How far to raise a loop's gain to cover the unmeasured band, and what that leaves unverified."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from drivers.texts.message import Text, text
 
 
 def by_raised_gain(missed: Missed) -> bool:
-    """Whether a raised gain can still show it: what is possible above the measured band."""
+    """Whether raising the gain can still verify it: anything above the measured band."""
     return missed.what == "coverage" or missed.end == "predicted"
 
 
 def wanted_db(missed: tuple[Missed, ...], guaranteed: Goals) -> float:
-    """How much more gain must be shown; where uncertain, the required margin less its tolerance."""
+    """Raise of the gain to verify [dB]; the required margin less its tolerance if uncertain."""
     if any(each.what != "coverage" for each in missed):
         return guaranteed.gain_margin_db - WORST_DB
     return min(guaranteed.gain_margin_db - threshold.NOT_SHOWN_DB, threshold.MOST_SHOWN_DB)
@@ -35,11 +35,11 @@ def raised_to(
     guaranteed: Goals,
     missed: tuple[Missed, ...],
 ) -> float:
-    """By how many dB the gain is raised: what must be shown, or more, where that shows the goals.
+    """By how many dB the gain is raised: as much as must be verified, or more if that is decisive.
 
-    A slow loop of which too few lines stand out may be late by a whole loop period; with so much
-    more gain it would oscillate if it were. What is tried beyond `wanted_db` leaves
-    `threshold.KEPT_BACK_DB` of the predicted gain margin.
+    In a slow loop of which too few lines are significant, an extra delay of up to a whole loop
+    period remains possible; with enough gain it would oscillate if it had that delay. A raise
+    beyond `wanted_db` leaves `threshold.KEPT_BACK_DB` of the predicted gain margin.
 
     Raises:
         NotAllowed, ValueError: a part of the loop has no known meaning.
@@ -60,7 +60,7 @@ def raised_to(
 def not_shown(
     verdict: LoopVerdict | None, guaranteed: Goals, shown: GainSteps, missed: tuple[Missed, ...]
 ) -> list[Text]:
-    """What raising the gain leaves open above the measured band; empty where nothing."""
+    """What remains unverified above the measured band after raising the gain; empty if nothing."""
     if verdict is None:
         return []
     said = in_words(misses(verdict, guaranteed))

@@ -1,4 +1,4 @@
-"""What an automatic tuning measured and decided, as page, report and files have it."""
+"""Result of an automatic tuning, as used by page, report and files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class _Part(BaseModel):
 
 
 class NotchInfo(_Part):
-    """Centre, width and depth, which is negative."""
+    """Centre, width and depth of a notch; the depth is negative."""
 
     center_hz: float
     width_hz: float
@@ -37,7 +37,7 @@ class GainsInfo(_Part):
 
 
 class MarginsInfo(_Part):
-    """Margins of an open loop; None where there is no such crossing."""
+    """Margins of an open loop; None where there is no such crossover."""
 
     crossover_hz: float | None
     phase_margin_deg: float | None
@@ -50,7 +50,7 @@ class MarginsInfo(_Part):
 
 
 class GoalsInfo(_Part):
-    """The worst margins that were guaranteed or found; None where they are not finite."""
+    """The worst margins that were guaranteed or found; None where they are infinite."""
 
     gain_margin_db: float | None
     phase_margin_deg: float | None
@@ -58,14 +58,14 @@ class GoalsInfo(_Part):
 
 
 class FiltersInfo(_Part):
-    """Corners of filters that the drive can be given; None: not there, or unknown."""
+    """Corner frequencies of filters that can be set in the drive; None: absent or unknown."""
 
     speed_hz: float | None
     torque_hz: float | None
 
 
 class CandidateInfo(_Part):
-    """A design: what it sets, and what is predicted of it."""
+    """A design: its settings and the predicted figures."""
 
     notches: tuple[NotchInfo, ...]
     gains: GainsInfo
@@ -81,7 +81,7 @@ class CandidateInfo(_Part):
 
 
 class IntervalInfo(_Part):
-    """A value and the limits that hold the truth in 95 of 100 cases; None: without a limit."""
+    """A value and its 95 % confidence interval; a limit of None is unbounded."""
 
     value: float | None
     low: float | None
@@ -89,7 +89,7 @@ class IntervalInfo(_Part):
 
 
 class BandInfo(_Part):
-    """Margins over one band; None where nothing crosses there."""
+    """Margins over one band; None where there is no crossover in it."""
 
     low_hz: float
     high_hz: float | None
@@ -99,7 +99,7 @@ class BandInfo(_Part):
 
 
 class VerdictInfo(_Part):
-    """What is known of the tuned loop: measured over a band, predicted beyond it."""
+    """Verification of the tuned loop: measured over a band, predicted beyond it."""
 
     measured: BandInfo | None
     predicted: BandInfo | None
@@ -116,7 +116,7 @@ class VerdictInfo(_Part):
 
 
 class GainStepInfo(_Part):
-    """One raised gain and the oscillation of the torque in % of the rated (RMS)."""
+    """One raised gain and the oscillation of the torque in % of the rated torque (RMS)."""
 
     gain_db: float
     oscillation_percent: float
@@ -124,7 +124,7 @@ class GainStepInfo(_Part):
 
 
 class GainStepsInfo(_Part):
-    """The highest gain at which the loop was stable, and the next where it was not."""
+    """The highest gain with a stable loop, and the next one, where it was not stable."""
 
     shown_db: float
     onset_db: float | None
@@ -132,7 +132,7 @@ class GainStepsInfo(_Part):
 
 
 class FiguresInfo(_Part):
-    """Of one loop, read on the lines that were verified; None beyond them."""
+    """Figures of one loop, read on the verified lines; None outside them."""
 
     bandwidth_hz: float | None
     phase_margin_deg: float | None
@@ -140,7 +140,7 @@ class FiguresInfo(_Part):
 
 
 class VerifiedInfo(_Part):
-    """The tuned loop as it was measured."""
+    """Measurement and verdict of the tuned loop."""
 
     verdict: VerdictInfo | None
     gain_steps: GainStepsInfo | None
@@ -151,7 +151,7 @@ class VerifiedInfo(_Part):
 
 
 class AgainInfo(_Part):
-    """A loop that answered otherwise than predicted, and what was made of it."""
+    """A loop whose response differed from the prediction, and the outcome of the redesign."""
 
     predicted: FiguresInfo
     measured: FiguresInfo
@@ -163,7 +163,7 @@ class AgainInfo(_Part):
 
 
 class AutotuneAnswer(ToolResult):
-    """All that was measured and decided; ``before`` holds raw values that undo what was applied."""
+    """Everything measured and decided; ``before`` holds raw values that undo what was applied."""
 
     tool: Literal["autotune"] = "autotune"
     inertia: InertiaAnswer
@@ -186,7 +186,7 @@ class AutotuneAnswer(ToolResult):
     cautious: bool
 
     def in_language(self, language: Language) -> Self:
-        """With all its sentences in this language."""
+        """The same result with all its texts in this language."""
         verified = self.verified
         if verified is not None:
             sweep = verified.sweep.in_language(language)

@@ -1,8 +1,8 @@
-"""From an unknown axis to a tuned and verified one, in named steps that all can be cancelled.
+"""Automatic tuning: from an unknown axis to a verified one, in steps that can be cancelled.
 
-Pre-checks, inertia, frequency response, candidates, apply, verify. What is applied stays only
-if the verification keeps what was guaranteed; on every other way out the drive's parameters are
-as they were before.
+Pre-checks, inertia, frequency response, candidates, apply, verify. What is applied stays only if
+the verification meets the guaranteed goals; on every other way out the drive's parameters are
+restored.
 """
 
 from __future__ import annotations
@@ -47,20 +47,20 @@ from drivers.cia402 import State
 from drivers.errors import EnvelopeExceeded, NotAllowed
 from drivers.texts.message import Text, joined, text
 
-#: Said where no margins could be verified.
+#: Note where no margins could be verified.
 _BY_STEP = text("autotune.verified-by-step")
-#: Said where a load that swings was not moved a second time.
+#: Note where the time did not suffice to repeat the inertia move of a swinging load.
 _ONE_MOVE = text("autotune.not-moved-again")
-#: Deviations to either side that hold 95 of 100 cases.
+#: Half width of a 95 % interval in standard deviations.
 _CI95 = 1.96
 
 
 @dataclass(frozen=True, slots=True)
 class AutotuneSettings:
-    """``mark`` is the candidate to apply; ``load`` None is judged from the measurement.
+    """Settings: ``mark`` is the candidate to apply; ``load`` None is judged from the measurement.
 
     ``apply`` False ends with the table of candidates and changes nothing. After ``budget_s``
-    nothing more is verified, and what is not verified is not applied.
+    nothing more is verified, and nothing unverified is applied.
     """
 
     envelope: Envelope
@@ -77,13 +77,13 @@ class AutotuneSettings:
 
 @dataclass(frozen=True)
 class AutotuneResult:
-    """Everything that was measured and decided.
+    """Everything measured and decided.
 
-    ``before`` holds raw values that undo what was applied, empty when nothing was written, also
-    because ``applied`` is what the axis had. ``tried`` says
-    of designs that were undone why; ``notes`` what the design does without. ``cautious``: no
-    model could be relied on. ``again``: what was made of a loop that answered otherwise than
-    predicted. ``expected`` is the prediction for ``applied``, read where the verification was.
+    ``before`` holds raw values that undo what was applied; it is empty when nothing was written,
+    also when ``applied`` is the previous settings. ``tried`` states why designs were undone;
+    ``notes`` what the design does without. ``cautious``: no model could be relied on. ``again``:
+    the redesign of a loop whose response contradicted the prediction. ``expected`` is the
+    prediction for ``applied``, read on the lines of the verification.
     """
 
     inertia: inertia_evaluation.InertiaOutcome
@@ -100,7 +100,7 @@ class AutotuneResult:
     again: Again | None = None
     expected: Figures | None = None
     written: datetime | None = None
-    """When what is in force was written; its verification came after that."""
+    """When the settings in force were written; their verification came after that."""
 
 
 async def autotune(
@@ -113,8 +113,8 @@ async def autotune(
     """Carry out all steps.
 
     Raises:
-        NotAllowed: a step cannot be done or its answer cannot be trusted; says which and why.
-        DriveError: as the single tools.
+        NotAllowed: a step cannot be done or its result cannot be trusted; states which and why.
+        DriveError: as in the single tools.
     """
     time_left = TimeLeft.of(settings.budget_s, cycle_s(session))
     progress(0.0, text("autotune.pre-checks", step=1, steps=6))
@@ -133,7 +133,7 @@ async def _tuned(
     keep: Keep | None,
     time_left: TimeLeft,
 ) -> AutotuneResult:
-    """Everything that moves."""
+    """Carry out the steps that move the axis."""
     home = await axis.position_raw()
     gains = await _steady_gains(axis, session, facts)
     try:
@@ -141,7 +141,8 @@ async def _tuned(
     except EnvelopeExceeded:
         if gains or await axis.state() in (State.FAULT, State.FAULT_REACTION):
             raise
-        # It stood still, but with its own gains a motion leaves the envelope, mostly by its torque.
+        # It held standstill, but a motion under its own gains exceeds the envelope, mostly in
+        # torque.
         gains = _soft_gains(axis, facts)
         found = await _measured(
             axis, session, settings, facts, gains, progress, keep, time_left, home
@@ -159,9 +160,10 @@ async def _measured(
     gains: dict[str, int], progress: Progress, keep: Keep | None, time_left: TimeLeft,
     begun_raw: int | None = None,
 ) -> AutotuneResult:  # fmt: skip
-    """Inertia, frequency response and what the notches do, with these gains meanwhile.
+    """Measure inertia, frequency response and the effect of the notches with these gains in force.
 
-    ``begun_raw`` is where it stood before something ended it elsewhere: travel counts from there.
+    ``begun_raw`` is the position before an earlier attempt ended elsewhere: travel counts from
+    there.
     """
     async with temporary(axis, gains):
         if begun_raw is not None:
@@ -225,7 +227,7 @@ async def _measured(
 
 
 async def _pre_checks(axis: Axis, settings: AutotuneSettings) -> AxisFacts:
-    """What must be known before anything moves."""
+    """Check and read what must be known before anything moves."""
     drive = axis.drive
     await axis.require_certain_scales()
     if await axis.state() in (State.FAULT, State.FAULT_REACTION):
@@ -237,7 +239,7 @@ async def _pre_checks(axis: Axis, settings: AutotuneSettings) -> AxisFacts:
             drive=drive.name,
             pending_count=len(drive.pending),
         )
-    # Gains without a meaning and a motor whose inertia is not known are reported before it moves.
+    # Gains without a meaning and an unknown motor inertia are reported before the axis moves.
     if settings.apply or gain_tool.spec_of(drive).convention == "unit":
         rotor = await gain_tool.rotor_inertia(axis, settings.motor_inertia_kgm2)
         gain_tool.plan_gains(drive, Gains(1.0, 1.0, 1.0, 1.0), rotor or 1e-4, rotor)
@@ -248,7 +250,7 @@ async def _pre_checks(axis: Axis, settings: AutotuneSettings) -> AxisFacts:
 
 
 async def _steady_gains(axis: Axis, session: CyclicSession, facts: AxisFacts) -> dict[str, int]:
-    """Nothing where the axis stands still under its own gains, else gains that are soft."""
+    """Empty where the axis holds standstill under its own gains, else soft gains as raw values."""
     try:
         await holding_torque(axis, session, facts)
     except NotAllowed as error:
@@ -261,7 +263,8 @@ async def _steady_gains(axis: Axis, session: CyclicSession, facts: AxisFacts) ->
 def _soft_gains(axis: Axis, facts: AxisFacts) -> dict[str, int]:
     """Raw values with which hardly any axis oscillates, and which still overcome friction.
 
-    By the motor alone where it is known: what the drive holds as inertia may be what is wrong.
+    They use the motor's inertia alone where it is known: the inertia that the drive holds may be
+    wrong.
     """
     rotor = facts.motor_inertia_kgm2
     hz = threshold.SOFT_HZ if rotor is None else threshold.SOFT_ALONE_HZ
@@ -309,7 +312,11 @@ async def _design(
     axis: Axis, session: CyclicSession, settings: AutotuneSettings, facts: AxisFacts,
     found: AutotuneResult,
 ) -> Design:  # fmt: skip
-    """The table, from the measured response."""
+    """The candidates, from the measured response.
+
+    Raises:
+        NotAllowed: not even a careful design meets its goals.
+    """
     drive = axis.drive
     made = await asyncio.to_thread(
         design_for, drive, facts, found.mechanics, found.inertia.result.inertia_kgm2.value,
@@ -329,12 +336,12 @@ async def apply_and_verify(
     found: AutotuneResult, progress: Progress, keep: Keep | None,
     time_left: TimeLeft | None = None,
 ) -> AutotuneResult:  # fmt: skip
-    """The wanted candidate, then more careful ones, until one meets its prediction.
+    """Apply the wanted candidate, then more careful ones, until one meets its prediction.
 
-    What the axis has comes before designs that are slower than it.
+    The previous settings are tried before designs that are slower than they are.
 
     Raises:
-        NotAllowed: none did; all parameters are as before.
+        NotAllowed: no candidate was verified; all parameters are as before.
         DriveError: the drive has a fault, or the link is lost.
     """
     inertia = found.inertia.result.inertia_kgm2.value
@@ -377,7 +384,7 @@ async def apply_and_verify(
         unseen(applied.candidate.nominal.crossover_hz, verified),
     )  # fmt: skip
     if twice is not None:
-        # With the measurement, for whoever reads it without the tuning.
+        # Attached to the measurement too, for readers who see it without the tuning.
         warnings = (*verified.sweep.warnings, twice)
         verified = replace(verified, sweep=replace(verified.sweep, warnings=warnings))
     plant = again.plant if again and again.plant else how.plant
@@ -390,7 +397,7 @@ async def apply_and_verify(
 
 
 def _with(found: AutotuneResult, made: Design) -> AutotuneResult:
-    """With the candidates of a design, and the reason why they are careful."""
+    """Add the candidates of a design, and the reason why they are careful."""
     notes = found.notes
     if made.caution is not None:
         notes += (text("autotune.tuned-with-caution", caution=made.caution),)
@@ -404,7 +411,7 @@ def _with(found: AutotuneResult, made: Design) -> AutotuneResult:
 
 
 def _order(found: AutotuneResult, mark: Mark) -> list[Candidate]:
-    """The wanted one, then those that are more careful, the slowest of all at last."""
+    """The wanted candidate, then the more careful ones, the slowest of all last."""
     marks: tuple[Mark, ...] = ("fast", "balanced", "robust")
     wanted = marks[marks.index(mark) :]
     chosen = [next((c for c in found.candidates if m in c.marks), None) for m in wanted]

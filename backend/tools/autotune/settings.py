@@ -1,4 +1,4 @@
-"""What an automatic tuning may be asked for."""
+"""Settings of an automatic tuning."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from backend.tools.tool import Option, ToolSettings
 
 
 class AutotuneRequest(ToolSettings):
-    """All steps in one job."""
+    """Settings of a tuning; all its steps are one job."""
 
     mark: Mark = Field(default="balanced", description="the design to apply")
     load: LoadClass | None = Field(default=None, description="judged from the response if not said")
@@ -30,7 +30,7 @@ class AutotuneRequest(ToolSettings):
 
     @property
     def inner(self) -> AutotuneSettings:
-        """The same for the tool's own layers."""
+        """The same settings for the tool's inner layers."""
         return AutotuneSettings(
             self.envelope, self.mark, self.load, self.loop, self.scheme, self.ends_rev, self.apply,
             self.rated_torque_nm, self.motor_inertia_kgm2,

@@ -1,4 +1,4 @@
-"""The words of an automatic tuning, English and Chinese, and what is shown of it."""
+"""Texts of an automatic tuning, English and Chinese, and its section of a report."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ TEXTS: dict[str, tuple[str, str]] = {
 
 
 def report(result: AutotuneAnswer) -> Section:
-    """The marked designs, what became of the chosen one, and what it does without."""
+    """The marked designs, the outcome of the applied one, and what it does without."""
     marked = tuple(_row(each) for each in result.candidates if each.marks)
     heads = (
         "design", "speed_loop", "bandwidth", "phase_margin", "gain_margin", "ms", "settling",
@@ -111,7 +111,7 @@ def _row(each: CandidateInfo) -> tuple[Cell, ...]:
 
 
 def _figures(applied: CandidateInfo, verified: VerifiedInfo) -> Grid:
-    """What was predicted compared with what the verification states."""
+    """Table of the predicted figures and those that the verification states."""
     goals, read = applied.promised, verified.sweep.margins
     stated = verified.verdict.stated if verified.verdict else None
     phase, gain, peak = (
@@ -132,7 +132,7 @@ def _figures(applied: CandidateInfo, verified: VerifiedInfo) -> Grid:
 
 
 def _bands(verified: VerifiedInfo) -> Iterator[Note]:
-    """The margins of each band with their intervals, and which of them are predictions."""
+    """Notes on the margins of each band with their intervals; predictions are marked as such."""
     verdict = verified.verdict
     if verdict is None:
         return
@@ -153,7 +153,7 @@ def _of_band(band: BandInfo) -> dict[str, str]:
 
 
 def _interval(found: IntervalInfo | None, digits: int, unit: str = "") -> str:
-    """A value with the ends of its 95 % interval."""
+    """A value with the limits of its 95 % interval as text."""
     if found is None:
         return NONE
     ends = f"{fixed(found.low, digits)} … {fixed(found.high, digits)}"

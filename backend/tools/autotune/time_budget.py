@@ -1,4 +1,4 @@
-"""How long a tuning may take, and what still fits into that: first of all one verification."""
+"""Time budget of a tuning: what still fits into it. One verification is always reserved."""
 
 from __future__ import annotations
 
@@ -13,49 +13,49 @@ from backend.tools.measuring.repeats import Repeats
 from backend.tools.thresholds import autotune_time_budget as threshold
 from drivers.texts.message import Text, text
 
-#: Said where realisations that lost samples count as they are.
+#: Note where realisations with lost samples are used without being measured again.
 NOT_AGAIN = text("autotune.not-measured-again")
 
 
 @dataclass
 class TimeLeft:
-    """``until_s`` is by `time.monotonic`; ``left_out`` counts designs that it did not allow."""
+    """Time until ``until_s`` (`time.monotonic`); ``left_out``: designs dropped for lack of it."""
 
     until_s: float = math.inf
     longest_s: float = 0.0
-    """The longest verification so far, 0 before the first."""
+    """Duration of the longest verification so far [s]; 0 before the first."""
     left_out: int = 0
     extra_s: float = 0.0
-    """Spent on what only time that is left is spent on."""
+    """Time spent on optional measurements, which only use time that is left [s]."""
     lossy: float = 0.0
-    """How much of the frequency response was measured again for lost samples, 0 to 1."""
+    """Share of the frequency response that was measured again for lost samples, 0 to 1."""
     given_up: list[Text] = field(default_factory=list)
-    """What was not measured as well as it could be."""
+    """Notes on what was measured less well than possible, for lack of time."""
     raising_s: float = 0.0
-    """What raising the gain in steps takes, where a loop may cross above the measured band."""
+    """Time reserved for raising the gain where a crossover may lie above the measured band [s]."""
 
     @classmethod
     def of(cls, budget_s: float, cycle_s: float | None = None) -> TimeLeft:
-        """From now on, for a bus with this cycle time; None: it shows any loop."""
+        """Start the budget now, for a bus with this cycle time; None: it resolves any loop."""
         time_left = cls(time.monotonic() + budget_s)
         if cycle_s is not None and DIRECT_SHARE / cycle_s < threshold.CROSSES_HZ:
             time_left.require_raising(threshold.GAIN_STEPS)
         return time_left
 
     def require_raising(self, steps: int) -> None:
-        """Keep time for so many raised gains."""
+        """Reserve time for this many raised gains."""
         self.raising_s = threshold.GAIN_STEP_S * steps
 
     def verifications(self) -> float:
-        """How many more as long as the longest fit; the first always does."""
+        """How many more verifications as long as the longest fit; infinite before the first."""
         if not self.longest_s or math.isinf(self.until_s):
             return math.inf
         return math.floor(max(self.until_s - time.monotonic(), 0.0) / self.longest_s)
 
     def pairs(self, first_s: float, most: int, looks: int = 0) -> int:
-        """How many pairs of realisations there is time for, where the first took ``first_s``.
+        """Number of pairs of realisations that fit, where the first pair took ``first_s``.
 
-        Next to so many ``looks``, further verifications, where there is time for all of them.
+        Time for ``looks`` further verifications is reserved where all of them fit.
         """
         left_s = self.until_s - self.raising_s - time.monotonic() - threshold.AROUND_S
         spare_s = looks * (first_s + threshold.AROUND_S)
@@ -64,34 +64,34 @@ class TimeLeft:
         return max(0, int(min(left_s / max(first_s, 1e-3), float(most))))
 
     def learning(self) -> Repeats:
-        """What may be measured before the designs, as long as one is verified in time."""
+        """Permitted repetitions of measurements before the design; one verification must fit."""
         return Repeats(self._measured_by_s - self.lossy * threshold.LOST_S)
 
     def measuring(self, learning_s: float) -> Repeats:
-        """What of a frequency response, where learning what notches do takes so long after it."""
+        """Permitted repetitions of a frequency response, before ``learning_s`` for the notches."""
         return Repeats(self._measured_by_s - learning_s)
 
     def moving(self) -> Repeats:
-        """What of moves for the inertia; the frequency response comes after them."""
+        """Permitted repetitions of moves for the inertia, before the frequency response."""
         return Repeats(self._measured_by_s - threshold.SWEEP_S)
 
     def verifying_again(self) -> Repeats:
-        """What of a tuned loop."""
+        """Permitted repetitions when measuring a tuned loop."""
         return Repeats(self.until_s - threshold.AROUND_S - self.raising_s)
 
     @property
     def _measured_by_s(self) -> float:
-        """When designing and verifying must begin at the latest."""
+        """Latest time at which designing and verifying must begin [s]."""
         return self.until_s - threshold.DESIGNED_AND_VERIFIED_S - self.raising_s
 
     def give_up(self, what: Text) -> None:
-        """Note once what was not done for its time."""
+        """Note, once each, what was not done for lack of time."""
         if what not in self.given_up:
             self.given_up.append(what)
 
     @contextmanager
     def extra(self) -> Iterator[None]:
-        """Counts as no part of what one verification takes."""
+        """Exclude the time spent here from the duration of a verification."""
         begun_s = time.monotonic()
         try:
             yield
@@ -100,18 +100,18 @@ class TimeLeft:
 
     @contextmanager
     def verifying(self) -> Iterator[None]:
-        """Measures what one verification takes."""
+        """Measure the duration of one verification."""
         begun_s, extra_s = time.monotonic(), self.extra_s
         try:
             yield
         finally:
             took_s = time.monotonic() - begun_s - (self.extra_s - extra_s)
-            # One that fails early may be followed by one that does not.
+            # After one that fails early, the next one may take its full time.
             took_s = max(took_s, threshold.AROUND_S)
             self.longest_s = max(self.longest_s, took_s)
 
     def reported(self) -> Text | None:
-        """That designs were left out for their time; else None."""
+        """Note that designs were left out for lack of time; None otherwise."""
         if not self.left_out:
             return None
         return text("autotune.designs-not-verified", count=self.left_out)

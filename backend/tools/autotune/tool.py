@@ -1,4 +1,4 @@
-"""The automatic tuning for everything around it: its published result, and its descriptor."""
+"""The automatic tuning as a tool: its published result and its descriptor."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from drivers.texts.message import text
 
 
 def answer_of(result: AutotuneResult, after: Mapping[str, int] | None = None) -> AutotuneAnswer:
-    """The result as page, report, files and command line have it."""
+    """The result in the form that page, report, files and command line use."""
     tried, notes = wire_messages(result.tried), wire_messages(result.notes)
     return AutotuneAnswer(
         inertia=inertia_evaluation.answer_of(result.inertia),
@@ -56,7 +56,7 @@ def answer_of(result: AutotuneResult, after: Mapping[str, int] | None = None) ->
 def candidate_info(candidate: Candidate) -> CandidateInfo:
     """One row of the table of designs."""
     figures = figures_of(candidate)
-    # Stored results have named the guaranteed margins so since their first version.
+    # The name of the guaranteed margins in stored results since their first version.
     figures["promised"] = figures.pop("guaranteed")
     return CandidateInfo.model_validate(figures)
 
@@ -92,9 +92,9 @@ def _again(again: Again) -> AgainInfo:
 
 
 async def run(run: Run, request: AutotuneRequest) -> AutotuneAnswer:
-    """As `autotune`, for the descriptor.
+    """Run `autotune` for the descriptor.
 
-    Whoever cancels before there is a result has not seen one: all parameters are as before.
+    A cancellation before the result exists restores all parameters.
     """
     found = await autotune(run.axis, run.session, request.inner, run.progress, run.keep)
     try:
@@ -106,7 +106,7 @@ async def run(run: Run, request: AutotuneRequest) -> AutotuneAnswer:
 
 
 def reevaluate(_arrays: Arrays, _meta: Meta) -> AutotuneAnswer:
-    """Never: its measurements keep their raw data, and it keeps none of its own.
+    """Not possible: a tuning has no raw data of its own; its measurements keep theirs.
 
     Raises:
         ValueError: always.
@@ -115,7 +115,7 @@ def reevaluate(_arrays: Arrays, _meta: Meta) -> AutotuneAnswer:
 
 
 def parts(result: AutotuneAnswer) -> dict[str, ToolResult | None]:
-    """What was concluded from each kind of raw data."""
+    """The partial result that belongs to each kind of raw data."""
     return {
         "inertia": result.inertia,
         "sweep-mechanics": result.mechanics,
@@ -125,7 +125,7 @@ def parts(result: AutotuneAnswer) -> dict[str, ToolResult | None]:
 
 
 def written(result: AutotuneAnswer) -> Written | None:
-    """The gains and filters that are in force now."""
+    """The gains and filters that were written; None where nothing was."""
     if not result.before:
         return None
     return Written(result.written or datetime.now(UTC), result.before, result.after)

@@ -1,4 +1,4 @@
-"""The verdict on a tuned loop from its measurement and from the plant it was designed for."""
+"""Verdict on a tuned loop from its measurement and from the plant it was designed for."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ MS_RATIO = threshold.MS_RATIO
 COHERENT = threshold.COHERENT
 BLURRED_DEG = threshold.BLURRED_DEG
 LINES = threshold.LINES
-#: A loop is seen where its lines begin within its bandwidth: its crossover may else be missed.
+#: The lines must begin within the loop's bandwidth, or its crossover may lie below them.
 WITHIN = 10 ** (-3.0103 / 20.0)
-#: By what is missed and where: the message, and the unit at the end of its facts.
+#: By goal and band: the message code, and the unit suffix of its parameters.
 _MARGINS: dict[tuple[str, str], tuple[str, str]] = {
     ("phase_margin", "measured"): ("autotune.phase-margin-measured", "_deg"),
     ("phase_margin", "predicted"): ("autotune.phase-margin-predicted", "_deg"),
@@ -39,7 +39,7 @@ _MARGINS: dict[tuple[str, str], tuple[str, str]] = {
     ("peak_sensitivity", "measured"): ("autotune.sensitivity-measured", ""),
     ("peak_sensitivity", "predicted"): ("autotune.sensitivity-predicted", ""),
 }
-#: The same where the whole loop misses it.
+#: The same where the whole loop misses the goal.
 _STATED = {
     "phase_margin": ("autotune.phase-margin", "_deg"),
     "gain_margin": ("autotune.gain-margin", "_db"),
@@ -50,7 +50,7 @@ _STATED = {
 def fixed_of(
     axis: Axis, facts: AxisFacts, notches: tuple[Notch, ...], filters: LoopFilters, f: FloatArray
 ) -> ComplexArray:
-    """All of a drive's loop but its gains and the mechanics, on these lines.
+    """Frequency response of the drive's loop without its gains and the mechanics [lines].
 
     Raises:
         NotAllowed, ValueError: a part of the loop has no known meaning.
@@ -63,16 +63,16 @@ def fixed_of(
 
 
 def sharp_lines(frf: Frf) -> Lines | None:
-    """The lines that margins are read from; None where they begin above the loop's bandwidth."""
+    """Lines from which margins can be read; None where they begin above the loop's bandwidth."""
     found = reported_lines(frf)
     return None if found is None or np.abs(found.closed[0]) < WITHIN else found
 
 
 def reported_lines(frf: Frf) -> Lines | None:
-    """The lines that noise hardly moves, up to the first gap; None where there are too few.
+    """Lines with a small standard deviation, up to the first gap; None where there are too few.
 
-    Of a slow loop they lie above its crossover: they show its size and its delay all the same,
-    though not the margins of that crossover.
+    In a slow loop they lie above its crossover: they show its gain and delay, but not the margins
+    of that crossover.
     """
     use = frf.in_band & (frf.coherence > COHERENT) & ~(frf.std_deg > BLURRED_DEG)
     f, closed = frf.frequency_hz[use], frf.response[use]
@@ -81,7 +81,7 @@ def reported_lines(frf: Frf) -> Lines | None:
     parts = (np.log(10.0) / 20.0 * frf.std_db[use], np.radians(frf.std_deg[use]))
     deviation = np.sqrt(0.5 * sum(np.nan_to_num(part, nan=0.0) ** 2 for part in parts))
     gaps = np.flatnonzero(f[1:] > threshold.GAP * f[:-1])
-    # Below 20 Hz lines of a linear grid are far apart by themselves.
+    # Below 20 Hz the lines of a linear grid are far apart anyway.
     end = next((int(i) + 1 for i in gaps if f[i] > 20.0), f.size)
     return Lines(f[:end], closed[:end], np.asarray(deviation)[:end])
 
@@ -89,7 +89,7 @@ def reported_lines(frf: Frf) -> Lines | None:
 def loops_of(
     axis: Axis, facts: AxisFacts, candidate: Candidate, f: FloatArray, plants: ComplexArray
 ) -> ComplexArray:
-    """The speed loops of this design with each of these plants.
+    """Open speed loops of this design with each of these plants [plants, lines].
 
     Raises:
         NotAllowed, ValueError: a part of the loop has no known meaning.
@@ -107,7 +107,7 @@ def verdict_of(
     hold: Hold | None,
     shown_gain_db: float | None = None,
 ) -> LoopVerdict:
-    """What is known of this design's loop; the worst over the ways its reference may have come.
+    """Verdict on this design's loop; the worst one over the possible paths of its reference.
 
     Raises:
         NotAllowed, ValueError: a part of the loop has no known meaning.
@@ -154,7 +154,7 @@ def verdict_of(
 
 
 def in_words(missed: tuple[Missed, ...]) -> list[Text]:
-    """What a verdict misses, for people."""
+    """Messages for the goals that a verdict misses."""
     said = []
     for each in missed:
         if each.what == "contradiction":
@@ -176,5 +176,5 @@ def in_words(missed: tuple[Missed, ...]) -> list[Text]:
 
 
 def misses(verdict: LoopVerdict, guaranteed: Goals) -> tuple[Missed, ...]:
-    """What a verdict misses of the goals, with what a margin may be off by."""
+    """Goals that a verdict misses by more than the tolerance of a margin."""
     return verdict.missed(guaranteed, MARGIN_DEG, MARGIN_DB, MS_RATIO)

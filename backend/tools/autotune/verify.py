@@ -1,4 +1,4 @@
-"""Whether a tuned axis keeps what its design guaranteed: measured, not trusted."""
+"""Verification by measurement: whether a tuned axis meets the goals guaranteed by its design."""
 
 from __future__ import annotations
 
@@ -55,9 +55,10 @@ HUM_PERCENT = threshold.HUM_PERCENT
 
 @dataclass(frozen=True)
 class Verified:
-    """The speed loop as measured after applying, compared with what was predicted.
+    """The speed loop as measured after applying, compared with its prediction.
 
-    ``hum_percent`` is set where nothing but a hum is wrong, in % of the rated torque.
+    ``hum_percent`` is set where torque ripple at standstill is the only fault, in % of rated torque
+    (RMS).
     """
 
     sweep: sweep_evaluation.SweepResult
@@ -69,21 +70,21 @@ class Verified:
     why: Text | None
     hum_percent: float | None = None
     every: Frf | None = None
-    """The response of all realisations together, where the loop was measured again."""
+    """Response over all realisations of the repeated measurement; None if not repeated."""
     verdict: LoopVerdict | None = None
-    """What is known of the margins and in which band; None without a plant to predict from."""
+    """Margins and the band they are known in; None without a plant to predict from."""
     shown: GainSteps | None = None
-    """What raising the gain showed, where the measured band does not reach the last crossover."""
+    """Result of raising the gain, where the measured band does not reach the last crossover."""
 
     @property
     def seen(self) -> Frf:
-        """What is known of the loop's response."""
+        """Best known response of the loop."""
         return self.every or self.sweep.frf
 
 
 @dataclass(frozen=True)
 class Check:
-    """What the verification must know of the measurements before it."""
+    """Data of the earlier measurements that the verification needs."""
 
     envelope: Envelope
     facts: AxisFacts
@@ -93,11 +94,11 @@ class Check:
     motor_inertia_kgm2: float | None
     coulomb_nm: float | None = None
     home_raw: int | None = None
-    """Where each verification begins, whatever ended the one before."""
+    """Position where each verification begins, wherever the one before ended."""
     pairs_before: int = 0
-    """Realisations that a prediction rests on, which are not to verify it."""
+    """Realisations that the prediction was derived from; they must not be used to verify it."""
     plant: MeasuredPlant | None = None
-    """What the design was made for; what is not measured of a loop is predicted from it."""
+    """Plant that the design was made for; unmeasured parts of the loop are predicted from it."""
 
 
 async def verify(
@@ -110,13 +111,13 @@ async def verify(
     keep: Keep | None,
     time_left: TimeLeft | None = None,
 ) -> Verified:
-    """Stand still, measure the closed speed loop, make a step; ``reported``: a progress each.
+    """Check standstill, measure the closed speed loop, make a step; ``reported``: progress of each.
 
     The loop is measured once more, with as many pairs of realisations as ``time_left`` allows,
-    where the first pair shows too little, or another bandwidth than was predicted.
+    where the first pair shows too little, or another bandwidth than predicted.
 
     Raises:
-        NotAllowed: it does not stand still, or the envelope or a fault ended it.
+        NotAllowed: the axis does not hold standstill, or the envelope or a fault ended it.
     """
     standing, measuring, stepping = reported
     standing(0.0, prose(""))
@@ -139,7 +140,7 @@ async def verify(
     again = clock.verifying_again()
     swept = await sweep_tool.sweep(axis, session, settings, measuring, keep, again)
     read = sharp_margins(swept)
-    # To verify once more what this loop says is worth more than to measure it for longer.
+    # A further verification of a redesign is worth more than a longer measurement of this loop.
     looks = LOOKS - bool(check.pairs_before) if read else 0
     took_s = time.monotonic() - begun_s
     verdict = _verdict(axis, check, candidate, swept, None)
@@ -200,7 +201,7 @@ def _verdict(
     swept: sweep_evaluation.SweepResult,
     shown_db: float | None,
 ) -> LoopVerdict | None:
-    """None where there is no plant to predict from: a design always has one."""
+    """Verdict on the measured loop; None where there is no plant to predict from."""
     if check.plant is None:
         return None
     return verdict_of(axis, check.facts, check.plant, candidate, swept.frf, check.hold, shown_db)
@@ -211,10 +212,10 @@ def _misses(verdict: LoopVerdict | None, guaranteed: Goals) -> tuple[Missed, ...
 
 
 def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool | None]:
-    """Margins of the lines that noise hardly moves; empty where there are too few of them.
+    """Margins from lines with a small standard deviation; empty where there are too few of them.
 
-    Where a loop's answer is weak against the noise of its sensor, a line says nothing of margins;
-    where only lines above its bandwidth do, its crossover is none of them.
+    Where the loop's response is weak against the sensor noise, a line yields no margins. Where only
+    lines above the bandwidth are left, the crossover is not among them.
     """
     frf = swept.frf
     use = frf.in_band & (frf.coherence > COHERENT) & ~(frf.std_deg > BLURRED_DEG)
@@ -228,12 +229,13 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
         return {}
     width = bandwidth(f, closed)
     if width.minus_3db_hz is None:
-        # It may fall into an antiresonance, where its lines are weak.
+        # The -3 dB point may fall into an antiresonance, where the lines are weak.
         seen = frf.in_band & (frf.coherence > threshold.SEEN)
         width = bandwidth(frf.frequency_hz[seen], frf.response[seen])
     return {
         **found,
-        # Measured closed, it is stable: its distance to the critical point on either side counts.
+        # Measured in closed loop, it is stable: the distance to the critical point on either side
+        # counts.
         "phase_margin_deg": abs(phase),
         "bandwidth_hz": width.minus_3db_hz,
         "bandwidth_90deg_hz": width.minus_90deg_hz,
@@ -241,7 +243,7 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
 
 
 def restless(step: step_evaluation.StepResult) -> Text | None:
-    """What a step shows of a loop that answers too few lines, such as a slow one; else None."""
+    """Message that a loop with too few usable lines has no well-damped step either; else None."""
     found = step.step
     if found is not None and found.overshoot_percent <= threshold.OVERSHOOT_PERCENT:
         return None
@@ -253,10 +255,10 @@ def _joined(
     read: dict[str, float | bool | None],
     more: sweep_evaluation.SweepResult,
 ) -> tuple[sweep_evaluation.SweepResult, dict[str, float | bool | None]]:
-    """A loop measured again with more realisations, and what to read from both.
+    """A loop measured again with more realisations, and the figures read from both measurements.
 
-    The bandwidth is that of the mean over all of them. What they differ by blurs lines, so margins
-    stay with the first where it showed any, which reached further up.
+    The bandwidth is that of the repeated measurement. Differences between realisations blur lines,
+    so the margins of the first measurement, which reach higher, are kept where it had any.
     """
     again = sharp_margins(more)
     moved_s = first.motion_s + more.motion_s
@@ -267,7 +269,7 @@ def _joined(
 
 
 def _width_of(found: dict[str, float | bool | None]) -> float | None:
-    """The bandwidth among margins, in Hz."""
+    """The bandwidth among the figures of a loop [Hz]."""
     width = found.get("bandwidth_hz")
     return width if isinstance(width, float) else None
 
@@ -275,14 +277,14 @@ def _width_of(found: dict[str, float | bool | None]) -> float | None:
 def _as_predicted(
     predicted_hz: float | None, measured_hz: float | None, within: float = threshold.AS_PREDICTED
 ) -> bool:
-    """Whether a bandwidth is the predicted one; also where one of them is not known."""
+    """Whether a bandwidth is as predicted; also True where one of them is unknown."""
     if not predicted_hz or not measured_hz:
         return True
     return abs(measured_hz / predicted_hz - 1.0) <= within
 
 
 def worse_than(guaranteed: Goals, found: dict[str, float | bool | None]) -> list[Text]:
-    """What of a measured loop is worse than guaranteed."""
+    """Messages for the figures of a measured loop that are worse than guaranteed."""
     said = []
     ms, pm, gm = found.get("ms"), found.get("phase_margin_deg"), found.get("gain_margin_db")
     if isinstance(ms, float) and ms > guaranteed.ms * MS_RATIO:
@@ -297,9 +299,10 @@ def worse_than(guaranteed: Goals, found: dict[str, float | bool | None]) -> list
 
 
 def otherwise(verified: Verified) -> Text | None:
-    """That a tuned loop answers otherwise than predicted, though it keeps its margins; else None.
+    """Note that the bandwidth differs from the prediction although the margins hold; else None.
 
-    An axis with backlash does: how much of the time its gap is open depends on how it is driven.
+    This is typical of an axis with backlash: how much of the time its gap is open depends on the
+    excitation.
     """
     predicted, measured = verified.predicted_bandwidth_hz, verified.measured_bandwidth_hz
     if _as_predicted(predicted, measured):
@@ -308,10 +311,10 @@ def otherwise(verified: Verified) -> Text | None:
 
 
 def unseen(last_hz: float | None, verified: Verified) -> Text | None:
-    """That the last crossover possible lies above what was verified; else None.
+    """Note that the highest possible crossover lies above the verified band; None otherwise.
 
-    The motor of a soft axis is alone above its resonances, and lighter: its loop may cross 0 dB
-    for the last time where the samples of this exchange show nothing.
+    Above its resonances, the motor of a compliant axis is decoupled and lighter: its loop may cross
+    0 dB for the last time at a frequency that the samples of this exchange do not show.
     """
     verdict = verified.verdict
     if verdict is not None:
@@ -333,9 +336,9 @@ def unseen(last_hz: float | None, verified: Verified) -> Text | None:
 
 
 def hum(step: step_evaluation.StepResult) -> Text | None:
-    """That the torque is not quiet before the step; None where it is.
+    """Message that the torque oscillates at standstill before the step; None where it does not.
 
-    A sensor's noise comes back as torque, the more the higher the gain and the wider the filters.
+    Sensor noise causes torque ripple that rises with the gain and with the filters' bandwidth.
     """
     rms = hum_percent_of(step)
     if rms <= HUM_PERCENT:
@@ -344,7 +347,7 @@ def hum(step: step_evaluation.StepResult) -> Text | None:
 
 
 def hum_percent_of(step: step_evaluation.StepResult) -> float:
-    """Root mean square of the torque before the step, less its mean, in % of the rated."""
+    """RMS of the torque before the step, without its mean, in % of rated torque."""
     before = step.torque_percent[step.time_s < 0.8 * step_evaluation.LEAD_S]
     return float(np.std(before))
 
@@ -354,13 +357,13 @@ def _named(candidate: Candidate, missed: Sequence[Text]) -> Text | None:
 
 
 def of_candidate(candidate: Candidate, why: Text) -> Text:
-    """A reason with the design that it is about."""
+    """A reason together with the design that it refers to."""
     width = candidate.gains.speed_bandwidth_hz
     return text("autotune.candidate", bandwidth_hz=width, why=why)
 
 
 def _largest_step(check: Check, candidate: Candidate) -> float:
-    """Speed in rpm whose first torque, gain times step, leaves half of what is permitted."""
+    """Step [rpm] whose initial torque, gain times step, uses half of the permitted torque."""
     envelope = check.envelope
     torque_nm = envelope.torque_percent / 100.0 * check.facts.rated_torque_nm
     gentle = 0.5 * torque_nm / candidate.gains.speed_nms * 60.0 / (2 * np.pi)
@@ -368,7 +371,7 @@ def _largest_step(check: Check, candidate: Candidate) -> float:
 
 
 def _step_settings(check: Check, candidate: Candidate) -> step_evaluation.StepSettings:
-    """The usual step of speed, or what the axis may do."""
+    """Settings of the usual speed step, reduced to what the envelope allows."""
     size = min(threshold.USUAL_STEP_RPM, _largest_step(check, candidate))
     return step_evaluation.StepSettings(
         check.envelope, size=size, rated_torque_nm=check.rated_torque_nm

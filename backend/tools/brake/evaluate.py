@@ -1,4 +1,4 @@
-"""From recordings of a torque ramp to holding torque, windup and slip. Pure: also from files."""
+"""Holding torque, windup and slip from recordings of a torque ramp. Pure: also from stored data."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _POINTS = 200
 
 
 class Phase(IntEnum):
-    """Parts of the sequence."""
+    """Phases of the sequence."""
 
     LEAD = 0
     PRELOADING = 1
@@ -39,8 +39,10 @@ class Phase(IntEnum):
 
 @dataclass(frozen=True)
 class Trial:
-    """One direction, [n]: ``phase`` as it was planned; ``halted``: a limit of travel or speed
-    ended it, from when on ``sent_nm`` is zero."""
+    """One direction, [n]: ``phase`` is the planned phase of each sample.
+
+    ``halted``: a limit of travel or speed ended it; from then on ``sent_nm`` is zero.
+    """
 
     direction: Literal[1, -1]
     position_rad: FloatArray
@@ -53,7 +55,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Trials:
-    """Raw data of both directions and what is known next to them. ``test_percent`` of rated."""
+    """Raw data of both directions, and facts about them; ``test_percent`` of rated torque."""
 
     trials: tuple[Trial, ...]
     sample_rate_hz: float
@@ -63,7 +65,7 @@ class Trials:
     measured_at: str
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
-        """For storage."""
+        """The samples as arrays for storage."""
         names = ("position_rad", "torque_nm", "sent_nm", "phase", "valid")
         found: dict[str, npt.NDArray[np.generic]] = {
             name: np.concatenate([getattr(each, name) for each in self.trials]) for name in names
@@ -72,7 +74,7 @@ class Trials:
         return {**found, "way": np.concatenate(way)}
 
     def facts(self) -> dict[str, object]:
-        """For storage, with the arrays."""
+        """The scalar facts for storage, with the arrays."""
         return {
             "sample_rate_hz": self.sample_rate_hz,
             "torque_step_nm": self.torque_step_nm,
@@ -84,7 +86,7 @@ class Trials:
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> BrakeResult:
-    """The result again, from kept raw data.
+    """Evaluate stored raw data again.
 
     Raises:
         ValueError: not the raw data of a brake test.
@@ -126,7 +128,7 @@ def reevaluate(arrays: Arrays, meta: Meta) -> BrakeResult:
 
 
 def evaluate(test: Trials, settings: BrakeSettings, facts: AxisFacts) -> BrakeResult:
-    """The verdict of both directions."""
+    """Result of both directions."""
     limit = settings.envelope.travel_rev
     found = [_Way(trial, test, facts.rated_torque_nm, limit).judged() for trial in test.trials]
     ways = tuple(way for way, _ in found)
@@ -153,7 +155,7 @@ def _worst(verdicts: Sequence[Verdict]) -> Verdict:
 
 
 class _Way:
-    """One direction, turned so that the torque rises towards positive."""
+    """One direction, with signs such that its torque is positive."""
 
     def __init__(self, trial: Trial, test: Trials, rated_nm: float, limit_rev: float) -> None:
         self._trial, self._limit, self._rate = trial, limit_rev, test.sample_rate_hz
@@ -166,19 +168,19 @@ class _Way:
         self._end = self._halted_at()
 
     def _still(self, signal: FloatArray, phase: Phase) -> float:
-        """Median over the later half of a phase."""
+        """Median over the second half of a phase; 0 without valid samples."""
         at = np.flatnonzero((self._trial.phase == phase) & self._trial.valid)
         return float(np.median(signal[at[at.size // 2 :]])) if at.size else 0.0
 
     def _halted_at(self) -> int:
-        """First sample next to which no torque was sent any more; all of them where none."""
+        """Index of the first sample after the torque was removed; the sample count if none."""
         sent = np.abs(self._trial.sent_nm) > 0
         if not self._trial.halted or not np.any(sent):
             return sent.size
         return int(np.flatnonzero(sent)[-1]) + 1
 
     def judged(self) -> tuple[BrakeWay, float]:
-        """The direction, and the compliance in revolutions per %."""
+        """Result of the direction, and its compliance [revolutions per %]."""
         phase, valid = self._trial.phase, self._trial.valid
         before = np.arange(phase.size) < self._end
         loading = np.flatnonzero(((phase == Phase.RAMP) | (phase == Phase.TOP)) & valid & before)
@@ -210,20 +212,20 @@ class _Way:
         return self._made(verdict, carried, ends, way, compliance, slip, loading), compliance
 
     def _slip(self, travel_0: float, beyond: FloatArray) -> float:
-        """What did not come back at the same torque; of a halted test the most that was seen."""
+        """Travel left at the same torque; of a halted test, the largest travel seen [rev]."""
         if self._trial.halted:
             return max(float(np.max(beyond)), 0.0)
         return max(self._still(self._travel, Phase.UNLOADED) - travel_0, 0.0)
 
     def _onset(self, loading: npt.NDArray[np.int64], beyond: FloatArray, slips: float) -> int:
-        """Where the way last was on the elastic line before it left it for good."""
+        """Index of the last sample on the elastic line before the travel left it."""
         over = np.flatnonzero(beyond > slips)
         first = int(over[0]) if over.size else loading.size - 1
         line = np.flatnonzero(beyond[: first + 1] <= 0.2 * slips)
         return int(loading[line[-1]]) if line.size else int(loading[first])
 
     def _near(self, place: int) -> float:
-        """Mean torque of some milliseconds up to here."""
+        """Mean torque over the last `threshold.ONSET_S` before this sample [% of rated]."""
         begin = max(0, place - round(threshold.ONSET_S * self._rate))
         return float(np.mean(self._torque[begin : place + 1]))
 
@@ -252,7 +254,7 @@ class _Way:
         )
 
     def _abort_ms(self) -> float | None:
-        """From the first sample beyond the limit until the torque was gone."""
+        """Time from the first sample beyond the travel limit until the torque was gone [ms]."""
         out = np.flatnonzero((self._travel >= self._limit) & self._trial.valid)
         if not self._trial.halted or not out.size:
             return None
@@ -262,7 +264,7 @@ class _Way:
         return 1e3 * float(gone[0]) / self._rate if gone.size else None
 
     def _not_closed(self) -> BrakeWay:
-        """It moved before the preload was there: the brake is open, or holds next to nothing."""
+        """Result for motion before the preload was reached: the brake is open, or hardly holds."""
         valid = self._trial.valid & (np.arange(self._trial.valid.size) < self._end)
         most = float(np.max(self._torque[valid], initial=0.0))
         travel = float(np.max(self._travel[self._trial.valid], initial=0.0))
@@ -275,7 +277,7 @@ class _Way:
 
 
 def _compliance(way: FloatArray, torque: FloatArray) -> float:
-    """Revolutions per % of the stiffer parts of the ramp; the others may slip."""
+    """Slope of the stiffer parts of the ramp [revolutions per %]; elsewhere it may slip."""
     edges = np.linspace(float(torque[0]), float(np.max(torque)), threshold.PARTS + 1)
     slopes = []
     for low, high in itertools.pairwise(edges):

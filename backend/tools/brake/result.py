@@ -1,4 +1,4 @@
-"""What a brake test concludes; torques in % of the motor's rated torque, travel in revolutions."""
+"""Result of a brake test; torques in % of the motor's rated torque, travel in revolutions."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ Obstacle = Literal[
     "no_torque_mode",
     "windup_beyond_limit",
 ]
-"""Why a brake cannot be tested."""
+"""Reason why a brake cannot be tested."""
 Means = Literal["output", "supply"]
-"""What keeps the brake closed: its output has another function, or its supply is cut."""
+"""What keeps the brake closed: its output has another function, or its supply is disconnected."""
 
 
 class _Part(BaseModel):
@@ -30,11 +30,13 @@ class _Part(BaseModel):
 
 
 class BrakeWay(_Part):
-    """One direction. Travel counts from a preload of a tenth of the test torque, which takes up
-    play; ``windup_rev`` comes back when the torque goes, ``slip_rev`` does not.
+    """One direction.
 
-    ``torque_percent`` is what the shaft carried: at the test torque, or where the brake began to
-    slip. The friction of the motor's bearings is part of it, and the pull of a load.
+    Travel counts from a preload of a tenth of the test torque, which takes up backlash;
+    ``windup_rev`` is elastic and returns with the torque, ``slip_rev`` does not.
+
+    ``torque_percent`` is the torque at the shaft: at the test torque, or where the brake began to
+    slip. It includes the friction of the motor's bearings and the static torque of a load.
     """
 
     direction: Literal[1, -1]
@@ -52,7 +54,7 @@ class BrakeWay(_Part):
 
 
 class BrakeResult(ToolResult):
-    """The worse direction decides. ``measured_at`` is ISO 8601, UTC."""
+    """Result of both directions; the worse one decides. ``measured_at`` is ISO 8601, UTC."""
 
     tool: Literal["brake-test"] = "brake-test"
     verdict: Verdict

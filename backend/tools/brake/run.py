@@ -1,7 +1,8 @@
 """The brake test: torque against the closed brake in CST, both directions.
 
-What ends it at the slip limit is the exchange's own loop, in the cycle after the sample that shows
-it: the torque becomes zero and a quick stop follows (`drivers.motion.playback`).
+At the slip limit, the cyclic loop of the exchange itself ends the test, in the cycle after the
+sample that exceeds it: it sets the torque to zero, followed by a quick stop
+(`drivers.motion.playback`).
 """
 
 from __future__ import annotations
@@ -52,13 +53,13 @@ _DIRECTIONS: tuple[Literal[1, -1], ...] = (1, -1)
 
 @dataclass
 class _Catch:
-    """Rows of position, torque and setpoint by their cycle, from before to after the motion."""
+    """Rows of position, torque and setpoint by cycle, from before to after the motion."""
 
     names: tuple[str, str, str]
     blocks: list[bus.ScopeBlock] = field(default_factory=list)
 
     def rows(self) -> tuple[npt.NDArray[np.int64], FloatArray, npt.NDArray[np.bool_]]:
-        """Cycle [n], values [n, 3] and validity [n]; cycles that were lost are not there."""
+        """Cycle [n], values [n, 3] and validity [n]; lost cycles are missing."""
         cycles, values, valid = [], [], []
         for block in self.blocks:
             assert block.cycle is not None, "what a cyclic exchange delivers is numbered"
@@ -75,7 +76,7 @@ class _Catch:
 def sequence(
     peak: float, ramp_s: float, lead_s: float, rate: float
 ) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-    """Torque [n] of one direction, in the unit of ``peak``, and the phase of each sample."""
+    """Torque of one direction [n], in the unit of ``peak``, and the phase of each sample [n]."""
     low = PRELOAD * peak
     parts = [
         (Phase.LEAD, 0.0, 0.0, lead_s),
@@ -97,10 +98,11 @@ def sequence(
 
 
 async def run(run: Run, settings: BrakeSettings) -> BrakeResult:
-    """Test; the axis ends disabled, its brake closed, with its settings as they were.
+    """Test; afterwards the axis is disabled, its brake closed, and its settings are restored.
 
     Raises:
-        NotAllowed: nobody said what hangs at the axis, or something but slip ended the test.
+        NotAllowed: the settings do not state what hangs at the axis, or something other than slip
+            ended the test.
         OutOfRange: the permitted torque is less than the test torque needs.
     """
     axis, drive = run.axis, run.axis.drive
@@ -122,7 +124,7 @@ async def run(run: Run, settings: BrakeSettings) -> BrakeResult:
             trial = await _trial(run, settings, facts, units, direction, percent, number)
             trials.append(trial)
             if trial.halted and not np.any(trial.phase[_sent(trial)] >= Phase.RAMP):
-                break  # it is open: the other direction would only turn the axis as well
+                break  # the brake is open: the other direction would only turn the axis as well
     run.progress(0.95, text("brake.evaluating"))
     test = Trials(
         tuple(trials),
@@ -147,16 +149,17 @@ async def _obstacle(run: Run, settings: BrakeSettings) -> Obstacle | None:
         return "no_torque_mode"
     means = run.axis.drive.profile.functions.brake_test
     if settings.brake_supply_cut:
-        # Nobody can cut the supply of a brake that is inside the motor together with its drive.
+        # The supply of a brake built into a motor with an integrated drive cannot be cut
+        # separately.
         return "built_in" if means is not None and means.obstacle == "built_in" else None
     return await obstacle_of(run.axis.drive)
 
 
 def _test_percent(settings: BrakeSettings, facts: AxisFacts, name: str) -> float:
-    """The test torque in % of the motor's rated torque.
+    """Test torque in % of the motor's rated torque.
 
     Raises:
-        NotAllowed: it is given in Nm, and what 100 % is, is not known.
+        NotAllowed: it is given in Nm, and the rated torque is not known.
         OutOfRange: less torque is permitted.
     """
     wanted_nm = settings.test_torque_nm
@@ -198,7 +201,7 @@ def _cannot(
 
 @asynccontextmanager
 async def _closed(axis: Axis, settings: BrakeSettings) -> AsyncIterator[None]:
-    """The grant of the test, with nobody forcing outputs meanwhile, and the brake kept closed."""
+    """Hold the grant of the test, block forcing of outputs meanwhile, and keep the brake closed."""
     purpose = "brake test"
     with contextlib.ExitStack() as stack:
         if keys := forcing_keys(axis.drive):
@@ -215,10 +218,10 @@ async def _trial(
     run: Run, settings: BrakeSettings, facts: AxisFacts, units: AxisUnits,
     direction: Literal[1, -1], percent: float, number: int,
 ) -> Trial:  # fmt: skip
-    """One direction: a preload, which shows whether the brake is closed at all, then the ramp.
+    """Test one direction: a preload, which shows whether the brake is closed at all, then the ramp.
 
-    Beyond a limit the preload ends by a quick stop, as an open brake holds nothing. Later the
-    torque only becomes zero.
+    Beyond a limit, the preload ends with a quick stop, as an open brake does not hold. Later only
+    the torque becomes zero.
     """
     axis, session = run.axis, run.session
     rate = 1.0 / cycle_s(session)
@@ -245,7 +248,7 @@ async def _played(
     run: Run, facts: AxisFacts, raw: npt.NDArray[np.int64], limits: bus.Envelope,
     progress: Callable[[float], None],
 ) -> tuple[_Catch, bool]:  # fmt: skip
-    """What the bus saw, and whether a limit of travel or speed ended it."""
+    """Play the setpoints: what was received, and whether a limit of travel or speed ended it."""
     axis, session, drive = run.axis, run.session, run.axis.drive
     keys = [drive.require(role) for role in ("position_actual", "torque_actual", "torque_target")]
     first, second, third = (channel(drive, key) for key in keys)
@@ -277,9 +280,9 @@ def _placed(
     catch: _Catch, raw: npt.NDArray[np.int64], phases: npt.NDArray[np.int64], units: AxisUnits,
     facts: AxisFacts, direction: Literal[1, -1], halted: bool,
 ) -> Trial:  # fmt: skip
-    """Each sample with the part of the sequence that its cycle belongs to.
+    """Assign to each sample the phase of the sequence that its cycle belongs to.
 
-    The first setpoint that came back and is not the one before the motion shows where it began.
+    The sequence began at the first setpoint read back that differs from the one before the motion.
     """
     cycles, values, valid = catch.rows()
     went = np.flatnonzero(valid & (values[:, 2] != raw[0]))

@@ -1,4 +1,4 @@
-"""What a brake test may be asked for."""
+"""Settings of a brake test."""
 
 from __future__ import annotations
 

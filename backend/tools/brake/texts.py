@@ -1,4 +1,4 @@
-"""The words of a brake test, English and Chinese, and what a report shows of it.
+"""Texts of a brake test, English and Chinese, and its section of a report.
 
 Signal words as in ISO 3864-2: danger is death or serious injury if it is not avoided, warning is
 where either could result.
@@ -177,7 +177,7 @@ _TONES: dict[Verdict, Literal["good", "warn"]] = {
 
 
 def report(result: BrakeResult) -> Section:
-    """Verdict, what it rests on, and travel over torque."""
+    """Verdict, the figures it rests on, and travel over torque."""
     rated = result.rated_torque_nm
     torque, unit = (0.01 * rated, "N·m") if rated else (1.0, "%")
     rows = [Row("test_torque", torque * result.test_percent, unit)]
@@ -195,7 +195,7 @@ def report(result: BrakeResult) -> Section:
 
 
 def notes(result: BrakeResult) -> list[Note]:
-    """The verdict first."""
+    """Notes on the result, the verdict first."""
     value = result.torque_percent
     if result.verdict == "not_closed":
         value = max(way.torque_ci95_percent[1] for way in result.ways)

@@ -1,1 +1,1 @@
-"""Cycle load: what a machine's cycle asks of motor and drive, by reading alone."""
+"""Cycle load: the load of a machine's cycle on motor and drive, by reading alone."""

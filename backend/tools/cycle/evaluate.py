@@ -1,4 +1,4 @@
-"""From samples of torque and speed to the load of a cycle. Pure: also from kept raw data."""
+"""Load of a cycle from samples of torque and speed. Pure: also from stored raw data."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from backend.tools.tool import Arrays, Meta
 from drivers.errors import NotAllowed
 
 FloatArray = npt.NDArray[np.float64]
-#: Fewer samples show nothing.
+#: Minimum number of samples.
 _FEWEST = 20
-#: Below this the axis carried nothing: % of rated, rpm.
+#: Below both, the axis is idle: % of rated torque, rpm.
 _IDLE_PERCENT, _IDLE_RPM = 0.5, 1.0
-#: A peak within this share of the limit is one that the limit made; the speed may exceed the rated
-#: one so far.
+#: A peak within this share of the limit is limited by it; a speed up to this factor of the rated
+#: speed is accepted.
 _AT_LIMIT, _OVER_SPEED = 0.98, 1.02
-#: Slower sampling misses what accelerations last.
+#: Slower sampling misses short acceleration peaks.
 _SLOW_HZ = 50.0
-#: Cells of the cloud in each direction: one sample of each is shown.
+#: Cells of the cloud in each direction; one sample of each is shown.
 _CELLS = 40
 
 
 @dataclass(frozen=True)
 class CycleFacts:
-    """What is known of motor and drive; None where unknown."""
+    """Data of motor and drive; None where unknown."""
 
     rated_torque_nm: float | None
     rated_speed_rpm: float | None
@@ -46,14 +46,14 @@ class CycleFacts:
 
 @dataclass(frozen=True)
 class Samples:
-    """Raw data: signals [n], and what else was read meanwhile [m], in V and % of rated."""
+    """Raw data: signals [n], DC bus voltage [m] in V and drive load [m] in % of rated."""
 
     signals: Signals
     dc_voltage: FloatArray
     drive_load: FloatArray
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
-        """For storage."""
+        """The samples as arrays for storage."""
         return {
             "time_s": self.signals.time_s,
             "torque_percent": self.signals.torque_percent,
@@ -64,7 +64,7 @@ class Samples:
 
 
 def meta_of(settings: CycleSettings, facts: CycleFacts) -> dict[str, object]:
-    """For storage, with the arrays."""
+    """Settings and facts for storage, with the arrays."""
     return {
         "tool": "cycle",
         "settings": settings.model_dump(mode="json"),
@@ -73,7 +73,7 @@ def meta_of(settings: CycleSettings, facts: CycleFacts) -> dict[str, object]:
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> CycleResult:
-    """The result again, from kept raw data.
+    """Evaluate stored raw data again.
 
     Raises:
         ValueError: not the raw data of a cycle.
@@ -91,7 +91,7 @@ def reevaluate(arrays: Arrays, meta: Meta) -> CycleResult:
 
 
 def evaluate(samples: Samples, settings: CycleSettings, facts: CycleFacts) -> CycleResult:
-    """The load of the cycle, and the verdict.
+    """Load of the cycle, and the verdict.
 
     Raises:
         NotAllowed: too few samples arrived.
@@ -172,7 +172,7 @@ def _overload(signals: Signals, settings: CycleSettings) -> CycleOverload | None
 
 
 def _verdict(idle: bool, warm: CycleHeat | None, budget: CycleOverload | None) -> Verdict:
-    """Of the motor's heat, and of the overload that was stated."""
+    """Verdict from the motor's temperature rise and from the stated overload."""
     if idle:
         return "idle"
     if budget is not None and budget.trip_s is not None:
@@ -228,7 +228,7 @@ def _of_heat(result: CycleResult, settings: CycleSettings) -> list[Finding]:
 
 
 def _cloud(signals: Signals) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """One sample of each cell of speed and torque, the outermost ones included."""
+    """One sample of each cell of speed and torque, extremes included [n]."""
     speed, torque = signals.speed_rpm, signals.torque_percent
 
     def cells(values: FloatArray) -> npt.NDArray[np.int64]:
@@ -239,6 +239,6 @@ def _cloud(signals: Signals) -> tuple[tuple[float, ...], tuple[float, ...]]:
     ends = [int(f(each)) for each in (speed, torque) for f in (np.argmin, np.argmax)]
     chosen = np.unique(np.concatenate([places, ends]))
     chosen = chosen[np.lexsort((torque[chosen], speed[chosen]))]
-    # Plots take each speed once: equal ones are set apart by what nobody sees.
+    # Plots need distinct speeds: equal ones are separated by an invisible amount.
     apart = 1e-9 * max(float(np.ptp(speed)), 1.0) * np.arange(chosen.size)
     return tuple(map(float, speed[chosen] + apart)), tuple(map(float, torque[chosen]))

@@ -1,4 +1,4 @@
-"""What a cycle asks of motor and drive; torques in % of the motor's rated torque."""
+"""Load of a cycle on motor and drive; torques in % of the motor's rated torque."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from backend.tools.tool import Interval, ToolResult
 
 Verdict = Literal["endures", "overloads", "undecided", "idle"]
-"""``undecided``: motors that agree with all that is known would and would not endure it."""
+"""``undecided``: of the motors that match the known data, some would endure it and others not."""
 Code = Literal[
     "no_period",
     "few_periods",
@@ -33,7 +33,7 @@ class _Part(BaseModel):
 
 
 class Finding(_Part):
-    """What limits the answer, or what to do about it."""
+    """Something that limits the validity of the result, or a recommended action."""
 
     code: Code
     value: float | None = None
@@ -41,7 +41,7 @@ class Finding(_Part):
 
 
 class CyclePower(_Part):
-    """Mechanical, at the shaft: what comes back to the drive is less, by the losses of both."""
+    """Mechanical power at the shaft; less braking energy reaches the drive, by the losses."""
 
     highest_w: float
     mean_w: float
@@ -51,8 +51,10 @@ class CyclePower(_Part):
 
 
 class CycleHeat(_Part):
-    """Ends of a range over motors that agree with the catalogue. Seconds count from a motor as
-    cold as its surroundings; null: never, or (as the earlier end) not known."""
+    """Range over the motors that match the catalogue data.
+
+    Times count from a motor at ambient temperature; null: never, or (as the earlier end) not known.
+    """
 
     ambient_c: float
     time_constant_min: float | None
@@ -71,7 +73,7 @@ class CycleOverload(_Part):
 
 
 class CycleResult(ToolResult):
-    """``drive_load_percent`` is what the drive shows of its load, by a rule of its own."""
+    """Result; ``drive_load_percent`` is the load that the drive reports, by its own rule."""
 
     tool: Literal["cycle"] = "cycle"
     verdict: Verdict

@@ -1,7 +1,7 @@
-"""Read torque and speed while somebody else moves the axis, or take them from a recording.
+"""Read torque and speed while the axis is moved by others, or take them from a recording.
 
 Nothing is written: no mode, no mapping, no state. Where an exchange of process data runs, its
-samples are listened to; what it does not carry, and everything without one, is polled.
+samples are used; signals that it does not carry, and everything without one, are polled.
 """
 
 from __future__ import annotations
@@ -40,26 +40,26 @@ from drivers.texts.message import text
 FloatArray = npt.NDArray[np.float64]
 _NEEDED = ("torque_actual", "velocity_actual")
 _BESIDE = ("dc_voltage", "load_ratio")
-#: What changes slowly is read this far apart.
+#: Interval for reading slowly changing values [s].
 _SLOW_S = 1.0
 _STEP_S = 0.25
 
 
 @dataclass
 class _Course:
-    """Samples of some parameters as they come: times, and a row for each."""
+    """Samples of some parameters as they arrive: times, and a row for each."""
 
     times: list[FloatArray] = field(default_factory=list)
     rows: list[FloatArray] = field(default_factory=list)
 
     def take(self, block: ScopeBlock) -> None:
-        """A block of the hub; what was lost on the way is left out."""
+        """Add a block of the scope hub, without its invalid samples."""
         even: FloatArray = block.t0_s + block.dt_s * np.arange(len(block.samples), dtype=float)
         times = even if block.times_s is None else block.times_s
         self.add(times, block.samples, block.valid)
 
     def add(self, times: FloatArray, rows: FloatArray, valid: npt.NDArray[np.bool_] | None) -> None:
-        """Some rows."""
+        """Add rows at these times, without invalid or non-finite ones."""
         good = np.all(np.isfinite(rows), axis=1)
         if valid is not None:
             good &= valid
@@ -67,7 +67,7 @@ class _Course:
         self.rows.append(rows[good])
 
     def column(self, number: int) -> tuple[FloatArray, FloatArray]:
-        """Times (rising) and values of one parameter."""
+        """Times (rising) and values of one parameter [n]."""
         if not self.rows:
             return np.empty(0), np.empty(0)
         times, values = np.concatenate(self.times), np.concatenate(self.rows)[:, number]
@@ -76,16 +76,16 @@ class _Course:
 
 
 async def run(run: Run, settings: CycleSettings) -> CycleResult:
-    """Read, then evaluate.
+    """Read or load the samples, then evaluate them.
 
     Raises:
-        NotAllowed: the drive or the recording has no torque or no speed, or too few samples came.
+        NotAllowed: the drive or the recording lacks torque or speed, or too few samples arrived.
         ScaleUnknown: the unit of the speed is unknown.
-        LinkLost: the bus is gone.
+        LinkLost: the link to the bus is lost.
     """
     axis = run.axis
     units = await axis.units()
-    # Speeds in a unit that is unknown say nothing about power: this refuses them.
+    # Raises ScaleUnknown: without a known unit, the speed yields no power.
     units.velocity_raw(1.0)
     facts = await _facts(axis, units, settings)
     keys = {role: axis.drive.require(role) for role in _NEEDED}
@@ -118,7 +118,7 @@ async def _facts(axis: Axis, units: AxisUnits, settings: CycleSettings) -> Cycle
 
 
 async def _readable(axis: Axis, role: str) -> str | None:
-    """The key of what may be read in addition to torque and speed, where this drive has it."""
+    """Key of a signal read in addition to torque and speed; None where this drive lacks it."""
     key = axis.drive.key(role)
     if key is None or axis.drive.unreachable_why(axis.drive.parameter(key)):
         return None
@@ -126,7 +126,7 @@ async def _readable(axis: Axis, role: str) -> str | None:
 
 
 async def _read(run: Run, keys: dict[str, str], duration_s: float) -> dict[str, _Column]:
-    """Listen and poll for this long."""
+    """Read by subscription and polling for this long."""
     hub, drive = ScopeHub(lambda _drive: run.axis), run.axis.drive
     found: dict[str, tuple[_Course, int]] = {}
     groups = (
@@ -159,14 +159,14 @@ def _recorded(run: Run, keys: dict[str, str], name: str) -> dict[str, _Column]:
     """The channels of this drive in a recording.
 
     Raises:
-        NotAllowed: there is none of this name, or it lacks torque or speed of this drive.
+        NotAllowed: no recording has this name, or it lacks torque or speed of this drive.
     """
     path = Path(name) if run.recording is None else run.recording(name)
     with RecordingReader(path) as reader:
         drive = run.axis.drive
         own = [each for each in reader.channels if each.key in keys.values()]
         named = [each for each in own if drive.id == each.drive or drive.name == each.drive_name]
-        # A recording of one drive alone may be of a station that called it otherwise.
+        # A recording of a single drive may come from a station that uses another name for it.
         if not named and len({each.drive for each in reader.channels}) == 1:
             named = own
         where = {each.key: (each.stream, each.column) for each in named}
@@ -193,7 +193,7 @@ def _recorded(run: Run, keys: dict[str, str], name: str) -> dict[str, _Column]:
 def _samples(
     axis: Axis, units: AxisUnits, keys: dict[str, str], columns: dict[str, _Column]
 ) -> Samples:
-    """On the times of the torque; values of parameters become % of rated and rpm."""
+    """Samples at the times of the torque, converted to % of rated torque and rpm."""
     torque_s, torque = columns["torque_actual"]
     speed_s, speed = columns["velocity_actual"]
     if torque_s.size and speed_s.size:

@@ -1,4 +1,4 @@
-"""What the load of a cycle may be asked with. Nothing moves: there is no envelope."""
+"""Settings of a cycle load evaluation. Nothing moves: there is no envelope."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 
 class CycleSettings(BaseModel):
-    """How long to read, or which recording; and what catalogues state of motor and drive."""
+    """How long to read, or which recording to use; and catalogue data of motor and drive."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -1,4 +1,4 @@
-"""The words of a cycle's load, English and Chinese, and what a report shows of it."""
+"""Texts of a cycle load, English and Chinese, and its section of a report."""
 
 from __future__ import annotations
 
@@ -213,12 +213,12 @@ _BINS = 24
 
 
 def report(result: CycleResult) -> Section:
-    """Verdict, when it trips, what is not known, figures, and torque over speed."""
+    """Verdict, time until it trips, what is unknown, figures, and torque over speed."""
     return Section(tuple(notes(result)), tuple(_rows(result)), (_cloud(result),))
 
 
 def notes(result: CycleResult) -> list[Note]:
-    """The verdict first; then the time until it trips, what is assumed, and the findings."""
+    """Notes on the result: the verdict, the time until it trips, assumptions, and findings."""
     warm = result.heat
     places = _places(warm)
     found = [Note(f"verdict.{result.verdict}", _TONES[result.verdict], places)]
@@ -296,7 +296,7 @@ def _rows(result: CycleResult) -> list[Row]:
 
 
 def _cloud(result: CycleResult) -> Chart:
-    """Highest and lowest torque by speed, and the limits: paper shows no cloud of points."""
+    """Highest and lowest torque by speed, and the limits: a printed report has no scatter plot."""
     lines: list[Line] = []
     if result.cloud_speed_rpm:
         first, last = result.cloud_speed_rpm[0], result.cloud_speed_rpm[-1]

@@ -1,1 +1,1 @@
-"""Dwell: the axis vibrates at one frequency, for a person who looks for what rattles."""
+"""Dwell: vibration at one frequency, for a person who searches for rattling parts."""

@@ -1,4 +1,4 @@
-"""From the recording of a dwell to what followed the excitation. Pure."""
+"""Response to the excitation of a dwell, from its recording. Pure."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _RPM = 60.0 / _TURN
 
 @dataclass(frozen=True)
 class Dwelt:
-    """What was played [n]: the sine in rpm or in % of rated torque, and which samples count."""
+    """Played signals [n]: the sine in rpm or % of rated torque, and which samples are evaluated."""
 
     recording: Recording
     sine: FloatArray
@@ -32,11 +32,11 @@ class Dwelt:
     torque_step_percent: float
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
-        """For storage."""
+        """The samples as arrays for storage."""
         return {**self.recording.arrays(), "sine": self.sine, "counts": self.counts}
 
     def meta(self, settings: DwellSettings) -> dict[str, object]:
-        """For storage, beside the arrays."""
+        """Settings and facts for storage, with the arrays."""
         return {
             "tool": "dwell",
             "settings": settings.model_dump(mode="json"),
@@ -48,7 +48,7 @@ class Dwelt:
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> DwellResult:
-    """The result again, from kept raw data.
+    """Evaluate stored raw data again.
 
     Raises:
         ValueError: not the raw data of this tool.
@@ -76,10 +76,10 @@ def reevaluate(arrays: Arrays, meta: Meta) -> DwellResult:
 
 
 def evaluate(dwelt: Dwelt, settings: DwellSettings) -> DwellResult:
-    """Amplitudes, phase and harmonics over the samples that count.
+    """Amplitudes, phase and harmonics over the samples to be evaluated.
 
     Raises:
-        NotAllowed: too few samples came.
+        NotAllowed: too few samples arrived.
     """
     rate, frequency = dwelt.recording.sample_rate_hz, settings.frequency_hz
     within = np.flatnonzero(dwelt.counts)
@@ -97,7 +97,7 @@ def evaluate(dwelt: Dwelt, settings: DwellSettings) -> DwellResult:
     )
     if len(turned.blocks) < threshold.FEWEST:
         raise NotAllowed("dwell.few-samples")
-    # The position's own amplitude times the frequency: a difference of samples would be filtered.
+    # Speed amplitude from the position's: a difference of samples would act as a filter.
     multiples = np.arange(1, count + 1)
     turning = np.asarray(2j * np.pi * frequency * multiples * _RPM)
     speed = Followed(np.asarray(turned.blocks * turning), turned.middle_s)
@@ -171,7 +171,7 @@ def _findings(
 
 
 def _linear(speed: Followed, level: float, step_rpm: float) -> list[DwellFinding]:
-    """Whether multiples of the frequency show; nothing where neither can be stated."""
+    """Finding whether harmonics exceed the limit; empty where neither can be stated."""
     harmonics = range(1, speed.blocks.shape[1])
     if not harmonics:
         return []
@@ -188,7 +188,7 @@ def _linear(speed: Followed, level: float, step_rpm: float) -> list[DwellFinding
 
 
 def _changed(speed: Followed) -> list[DwellFinding]:
-    """Whether the level at the end differs from that at the beginning by more than its scatter."""
+    """Finding that the amplitude changed from begin to end by more than its scatter."""
     level = np.abs(speed.blocks[:, 0])
     third = level.size // 3
     if third < 2:

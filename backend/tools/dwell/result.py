@@ -1,4 +1,4 @@
-"""What a dwell excited, as the motor shows it."""
+"""Result of a dwell: the excited vibration as measured at the motor."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class _Part(BaseModel):
 
 
 class DwellFinding(_Part):
-    """What the dwell showed, as a code with the figure that it rests on."""
+    """A finding of the dwell: a code and the figure that it rests on."""
 
     code: Code
     value: float | None = None
@@ -35,14 +35,14 @@ class DwellFinding(_Part):
 
 
 class DwellEstimate(_Part):
-    """A value with its 95 % interval, in the unit that the field's name says."""
+    """A value with its 95 % interval, in the unit of the field's name."""
 
     value: float
     ci95: Interval
 
 
 class DwellHarmonic(_Part):
-    """A multiple of the frequency, which only what is not linear makes."""
+    """Amplitude at a multiple of the frequency; only a non-linearity causes one."""
 
     multiple: int
     speed_rpm: float
@@ -50,10 +50,10 @@ class DwellHarmonic(_Part):
 
 
 class DwellResult(ToolResult):
-    """Amplitudes at the frequency, at full amplitude of the excitation.
+    """Amplitudes at the excitation frequency, at full amplitude of the excitation.
 
-    The phase is that of the speed over the excitation as the bus shows both: the time that
-    setpoints and samples take on the bus is part of it.
+    The phase is that of the speed relative to the excitation, both as seen on the bus: it includes
+    the delay of setpoints and samples on the bus.
     """
 
     tool: Literal["dwell"] = "dwell"

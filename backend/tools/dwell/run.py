@@ -1,4 +1,4 @@
-"""The vibration at one frequency: a sine that is faded in, held and faded out."""
+"""Vibration at one frequency: a sine that is faded in, held and faded out."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class Sequence:
-    """What is played [n]: base speed in rpm, sine in rpm or %, and which samples count."""
+    """Signals to play [n]: base speed in rpm, sine in rpm or %, and which samples are evaluated."""
 
     base_rpm: FloatArray
     sine: FloatArray
@@ -40,7 +40,7 @@ class Sequence:
 
 
 def sequence(settings: DwellSettings, rate: float) -> Sequence:
-    """Faded in, held for the time that was asked for, faded out; the base turns to and fro."""
+    """Sine faded in, held for the set time and faded out, on a base speed that reciprocates."""
     lead, fade = (round(s * rate) for s in (threshold.LEAD_S, threshold.FADE_S))
     held = round(settings.duration_s * rate)
     rise = 0.5 * (1.0 - np.cos(np.pi * (np.arange(fade) + 0.5) / fade))
@@ -49,14 +49,14 @@ def sequence(settings: DwellSettings, rate: float) -> Sequence:
     amplitude = settings.amplitude_rpm if by_speed else settings.amplitude_percent
     phase = _TURN * settings.frequency_hz / rate * np.arange(shape.size)
     base = _to_and_fro(settings, shape.size, rate)
-    # Where the slow speed reverses, friction does, too.
+    # Where the slow speed reverses, the friction reverses, too.
     counts = np.abs(base) >= threshold.TURNING * settings.turn_rpm
     counts[: lead + fade] = counts[lead + fade + held :] = False
     return Sequence(base, amplitude * shape * np.sin(phase), counts)
 
 
 def _to_and_fro(settings: DwellSettings, size: int, rate: float) -> FloatArray:
-    """Speed [size] in rpm of strokes about the beginning, from and to standstill."""
+    """Speed [size] in rpm of reciprocating strokes from the start, from and to standstill."""
     if settings.turn_rpm == 0.0:
         return np.zeros(size)
     rps, total_s = settings.turn_rpm / 60.0, size / rate
@@ -67,16 +67,16 @@ def _to_and_fro(settings: DwellSettings, size: int, rate: float) -> FloatArray:
     ramp, stroke = round(threshold.RAMP_S * rate), size // (2 * pairs)
     rise = 0.5 * (1.0 - np.cos(np.pi * (np.arange(ramp) + 0.5) / ramp))
     one = np.concatenate([rise, np.ones(max(stroke - 2 * ramp, 0)), rise[::-1]])
-    # To one side and back: whole pairs, so that the axis ends where it began.
+    # Whole pairs of strokes, so that the axis ends where it began.
     base = np.tile(np.concatenate([one, -one]), pairs)[:size] * settings.turn_rpm
     return np.asarray(np.concatenate([base, np.zeros(size - base.size)]))
 
 
 def require_inside(settings: DwellSettings, rate: float, units: AxisUnits) -> None:
-    """The vibration fits into the envelope, and the setpoints can carry it.
+    """Check that the vibration fits into the envelope and is resolved by the setpoints.
 
     Raises:
-        OutOfRange: naming what is needed and what is permitted; nothing has moved.
+        OutOfRange: states what is needed and what is permitted; nothing has moved.
     """
     envelope, highest_hz = settings.envelope, threshold.HIGHEST * rate
     if settings.frequency_hz > highest_hz:
@@ -89,7 +89,7 @@ def require_inside(settings: DwellSettings, rate: float, units: AxisUnits) -> No
     by_speed = settings.by == "speed"
     needed_rpm = settings.turn_rpm + (settings.amplitude_rpm if by_speed else 0.0)
     swing_rev = settings.amplitude_rpm / 60.0 / (_TURN * settings.frequency_hz) if by_speed else 0.0
-    # A stroke of the slow speed is no shorter than its two ramps.
+    # The shortest stroke of the slow speed consists of its two ramps.
     way_rev = 2.0 * swing_rev + settings.turn_rpm / 60.0 * threshold.RAMP_S
     permitted_rpm = threshold.FAST * envelope.speed_rpm
     if needed_rpm > permitted_rpm or way_rev > threshold.USED * envelope.travel_rev:
@@ -133,7 +133,7 @@ def require_inside(settings: DwellSettings, rate: float, units: AxisUnits) -> No
 
 @dataclass
 class Live:
-    """The amplitude of the speed as it is now, from the newest rows of raw samples."""
+    """Present amplitude of the speed, from the newest raw samples."""
 
     frequency_hz: float
     rate_hz: float
@@ -142,7 +142,7 @@ class Live:
     _newest: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def take(self, rows: FloatArray) -> bool:
-        """Rows [n, 3] of position, velocity and torque; False: the motion goes on."""
+        """Add rows [n, 3] of position, velocity and torque; always False: the motion continues."""
         whole = max(1, round(threshold.LIVE_S * self.frequency_hz))
         size = round(whole / self.frequency_hz * self.rate_hz)
         self._newest = np.concatenate([self._newest, rows[:, 1]])[-size:]
@@ -155,12 +155,12 @@ class Live:
 
 
 async def run(run: Run, settings: DwellSettings) -> DwellResult:
-    """Vibrate; the axis ends where it began, with its settings as they were.
+    """Vibrate; the axis ends where it began, with its settings restored.
 
     Raises:
         OutOfRange: the vibration does not fit into the envelope; nothing has moved.
-        NotAllowed: the drive takes no torque ahead of the loop, or the envelope or a fault ended
-            the motion.
+        NotAllowed: the drive accepts no torque offset (60B2h) in every cycle, or the envelope or a
+            fault ended the motion.
     """
     axis, session, envelope = run.axis, run.session, settings.envelope
     by_speed = settings.by == "speed"
@@ -192,13 +192,13 @@ async def run(run: Run, settings: DwellSettings) -> DwellResult:
 
 @dataclass(frozen=True)
 class Shown:
-    """Progress whose step names what the axis does now, and how much of it the motor shows."""
+    """Progress whose step states the frequency and the amplitude measured at the motor."""
 
     progress: Progress
     live: Live
 
     def __call__(self, fraction: float) -> None:
-        """So much of the motion is over."""
+        """Report the completed fraction of the motion, 0 to 1."""
         step = text(
             "dwell.vibrating",
             frequency_hz=self.live.frequency_hz,
@@ -208,10 +208,10 @@ class Shown:
 
 
 def _require_torque(axis: Axis, session: CyclicSession, *, by_speed: bool) -> None:
-    """Speeds, and torque ahead of the loop where it is asked for, go with every cycle.
+    """Check that the exchange carries speed, and a torque offset where needed, in every cycle.
 
     Raises:
-        NotAllowed: naming what does not.
+        NotAllowed: states the missing signal.
     """
     require_signals(axis, session, Mode.CSV, False)
     key = axis.drive.key("torque_offset")

@@ -1,4 +1,4 @@
-"""The vibration at one frequency that is asked for."""
+"""Settings of a vibration at one frequency."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ By = Literal["speed", "torque"]
 
 
 class DwellSettings(ToolSettings):
-    """A sine of the speed setpoint, or of torque ahead of the speed loop, faded in and out."""
+    """A sine of the speed setpoint, or of the torque offset, faded in and out."""
 
     time_limit_s: float = Field(
         default=70.0, gt=0, le=120, description="longest time of the motion, in s"

@@ -1,4 +1,4 @@
-"""The words of a dwell at one frequency, English and Chinese, and what a report shows of it."""
+"""Texts of a dwell at one frequency, English and Chinese, and its section of a report."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ _TONES: dict[Code, Literal["good", "warn"]] = {
 
 
 def report(result: DwellResult) -> Section:
-    """Findings, amplitudes with their intervals, and the amplitude over the time."""
+    """Findings, amplitudes with their intervals, and the amplitude over time."""
     unit = "rpm" if result.by == "speed" else "%"
     rows = [
         Row("excitation", result.excitation, unit),

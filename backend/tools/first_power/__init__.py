@@ -1,1 +1,1 @@
-"""First power: what must be known before a loop is closed over a motor for the first time."""
+"""First power: the checks before a loop is closed over a motor for the first time."""

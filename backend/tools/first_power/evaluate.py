@@ -1,4 +1,4 @@
-"""From what was seen to the checklist. Pure: also from files."""
+"""Checklist of the first power from what was observed. Pure: also from stored data."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ _WAYS: tuple[Literal[1, -1], ...] = (1, -1)
 
 @dataclass(frozen=True)
 class Seen:
-    """What was read and seen by hand; None where it was not looked at or is not reported.
+    """What was read and observed by hand; None where it was not checked or is not reported.
 
-    ``turned_rev`` by the drive's counts. ``switches``: negative and positive, each whether it was
-    seen on and off. ``obstacle``: why nothing was energised.
+    ``turned_rev`` is by the drive's counts. ``switches``: negative and positive, each whether it
+    was seen both on and off. ``obstacle``: why the motor was not energised.
     """
 
     measured_at: str
@@ -51,12 +51,12 @@ class Seen:
 
 
 def facts_of(seen: Seen) -> dict[str, object]:
-    """For storage, with the arrays."""
+    """The observations for storage, with the arrays."""
     return asdict(seen)
 
 
 def arrays_of(pulses: Sequence[Pulse]) -> dict[str, npt.NDArray[np.generic]]:
-    """For storage, [n] each."""
+    """The pulses as arrays for storage, [n] each."""
     return {
         "direction": np.array([each.direction for each in pulses], np.int64),
         "pulse_percent": np.array([each.torque_percent for each in pulses], np.float64),
@@ -66,7 +66,7 @@ def arrays_of(pulses: Sequence[Pulse]) -> dict[str, npt.NDArray[np.generic]]:
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> FirstPowerResult:
-    """The result again, from kept raw data.
+    """Evaluate stored raw data again.
 
     Raises:
         ValueError: not the raw data of a first power.
@@ -96,7 +96,7 @@ def reevaluate(arrays: Arrays, meta: Meta) -> FirstPowerResult:
 
 
 def evaluate(seen: Seen, pulses: Sequence[Pulse], settings: FirstPowerSettings) -> FirstPowerResult:
-    """The checklist and its verdict."""
+    """Evaluate the observations: the checklist and its verdict."""
     backwards = None if seen.turned_rev is None else seen.turned_rev < 0
     covers = covered_pole_pairs(settings.travel_limit)
     phases = seen.obstacle or ("not_done" if not pulses else None)
@@ -125,15 +125,16 @@ def evaluate(seen: Seen, pulses: Sequence[Pulse], settings: FirstPowerSettings) 
 
 
 def covered_pole_pairs(travel_rev: float) -> int:
-    """The least pole pairs p with which exchanged phases cannot pass for right ones.
+    """Smallest number of pole pairs p for which two exchanged phases are certain to be detected.
 
-    Their torque is -cos(2pθ): it has one sign over a quarter of 1/p of a revolution at most.
+    With exchanged phases the torque is -cos(2pθ): it keeps its sign over at most a quarter of 1/p
+    of a revolution.
     """
     return math.ceil(1.0 / (4.0 * GOAL * travel_rev))
 
 
 def way_of(pulses: Sequence[Pulse], goal_rev: float, cap_percent: float) -> Way:
-    """Where the shaft went for one sign of the torque; ``cap_percent`` was the strongest pulse."""
+    """Motion of the shaft for one sign of the torque; ``cap_percent`` is the highest pulse."""
     if not pulses:
         return "short"
     went = pulses[0].direction * (pulses[-1].to_rev - pulses[0].from_rev)
@@ -155,7 +156,7 @@ def _way_of(pulses: Sequence[Pulse], settings: FirstPowerSettings) -> tuple[Way,
 
 
 def strongest(settings: FirstPowerSettings) -> float:
-    """Highest torque of a pulse in %: the actual torque swings above it."""
+    """Highest torque of a pulse [%]; the rest is reserved for overshoot of the actual torque."""
     return 0.9 * settings.torque_limit
 
 
@@ -199,7 +200,7 @@ _OPEN = frozenset(
 
 
 def supply_sound(seen: Seen) -> bool:
-    """Nothing about the supply forbids to energise."""
+    """Whether nothing about the supply forbids energising the motor."""
     return not seen.faults and (seen.supply_v is None or seen.supply_v >= threshold.LEAST_V)
 
 
@@ -216,7 +217,7 @@ def _resolution(seen: Seen) -> Check:
 
 
 def counts_sound(seen: Seen, revolutions: int) -> bool | None:
-    """Whether the drive counted what a person turned; None where nobody turned."""
+    """Whether the drive counted the revolutions turned by hand; None where nobody turned."""
     if seen.turned_rev is None:
         return None
     return abs(abs(seen.turned_rev) - revolutions) <= threshold.HAND

@@ -1,4 +1,4 @@
-"""The checklist of the first power; positions in revolutions, torques in % of rated."""
+"""Checklist of the first power; positions in revolutions, torques in % of rated torque."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ Phases = Literal[
     "blocked", "pulled", "no_motion", "short", "no_torque_mode", "counts_first", "supply_first",
     "resolution_first", "not_done",
 ]  # fmt: skip
-"""What the torque did: see docs/first-power.md."""
+"""Finding on the motor phases: see docs/first-power.md."""
 Way = Literal["with", "against", "locked", "none", "short"]
-"""Where the shaft went for one sign of the torque; short: on its way when the test ended."""
+"""Motion of the shaft for one sign of the torque; short: still moving when the test ended."""
 Guide = Literal["pole_identification", "identification"]
 
 
@@ -27,7 +27,7 @@ class _Part(BaseModel):
 
 
 class Check(_Part):
-    """One line of the checklist. ``finding`` is a text of the tool under the check's name."""
+    """One line of the checklist. ``finding`` names a text of the tool under the check's name."""
 
     name: CheckName
     status: Status
@@ -36,7 +36,7 @@ class Check(_Part):
 
 
 class Pulse(_Part):
-    """One pulse of torque and where the shaft stood before and after it, from the start."""
+    """One torque pulse and the position before and after it, from the start."""
 
     direction: Literal[1, -1]
     torque_percent: float
@@ -45,8 +45,10 @@ class Pulse(_Part):
 
 
 class FirstPowerResult(ToolResult):
-    """``measured_at`` is ISO 8601, UTC. ``covers_pole_pairs``: fewer could hide two exchanged
-    phases within this travel. ``guide`` is the drive's own procedure for the commutation angle.
+    """Result; ``measured_at`` is ISO 8601, UTC.
+
+    ``covers_pole_pairs``: with fewer pole pairs, two exchanged phases could stay undetected within
+    this travel. ``guide`` is the drive's own procedure for the commutation angle.
     """
 
     tool: Literal["first-power"] = "first-power"

@@ -1,8 +1,8 @@
-"""The first power: what is read, what a person turns by hand, then pulses of torque in CST.
+"""The first power: readings, turning by hand, then torque pulses in CST.
 
-No loop is closed at any time: torques are small, each pulse moves the shaft by some degrees, and
-a quick stop or STOP takes the power off meanwhile (605Ah = 0), as a speed loop over a wrongly
-phased motor or an inverted encoder would accelerate it.
+No loop is closed at any time: a speed loop over a wrongly phased motor or an inverted encoder would
+accelerate it. Torques are small, each pulse moves the shaft by some degrees, and during the test a
+quick stop or STOP removes the power (605Ah = 0).
 """
 
 from __future__ import annotations
@@ -56,17 +56,18 @@ from drivers.errors import EnvelopeExceeded, NotAllowed
 from drivers.halt import HaltCause
 from drivers.texts.message import text
 
-#: Power off on quick stop, shutdown and "disable operation": no loop is closed for a ramp.
+#: Quick stop, shutdown and disable operation remove the power: a ramp would need a loop.
 _COASTING = ("605A:00", "605B:00", "605C:00")
 _WAYS: tuple[Literal[1, -1], ...] = (1, -1)
 
 
 async def run(run: Run, settings: FirstPowerSettings) -> FirstPowerResult:
-    """Go through the checklist; the axis ends disabled, with its settings as they were.
+    """Carry out the checklist; afterwards the axis is disabled and its settings are restored.
 
     Raises:
-        NotAllowed: the axis is enabled, or nobody stated what hangs at it although it is to be
-            energised.
+        NotAllowed: the axis is enabled, or the settings do not state what hangs at the axis
+            although
+            it is to be energised.
     """
     axis, drive = run.axis, run.axis.drive
     if await axis.state() is State.OPERATION_ENABLED:
@@ -123,7 +124,7 @@ def _certain(units: AxisUnits) -> bool:
 
 
 def _guide(drive: Drive) -> Guide | None:
-    """The drive's own procedure that finds phase order or commutation angle, where it has one."""
+    """The drive's own procedure for phase order or commutation angle; None where it has none."""
     functions = drive.profile.functions
     if any(each.name == "pole_identification" for each in functions.guides):
         return "pole_identification"
@@ -131,9 +132,9 @@ def _guide(drive: Drive) -> Guide | None:
 
 
 async def _limit_inputs(drive: Drive) -> tuple[bool | None, bool | None] | None:
-    """Negative and positive limit switch as they are; None where no input has both functions.
+    """State of the negative and positive limit switch; None where an input for either is missing.
 
-    A drive whose inputs have no selectable functions reports them by 60FDh (CiA 402-2: bit 0
+    A drive whose inputs have no selectable functions reports them in 60FDh (CiA 402-2: bit 0
     negative, bit 1 positive).
     """
     terminals = [each for each in await read_terminals(drive) if each.terminal.direction == "in"]
@@ -153,7 +154,7 @@ async def _limit_inputs(drive: Drive) -> tuple[bool | None, bool | None] | None:
 
 
 async def _by_hand(run: Run, settings: FirstPowerSettings, seen: Seen) -> Seen:
-    """Watch a disabled axis while a person turns it and operates its switches."""
+    """Observe the disabled axis while a person turns it and operates its limit switches."""
     axis, units = run.axis, await run.axis.units()
     begun = time.monotonic()
     start = last = await axis.position_raw()
@@ -184,7 +185,7 @@ async def _by_hand(run: Run, settings: FirstPowerSettings, seen: Seen) -> Seen:
 
 
 def _obstacle(run: Run, settings: FirstPowerSettings, seen: Seen) -> Phases | None:
-    """Why nothing is energised."""
+    """Why the motor is not energised; None where it may be."""
     if not settings.powered:
         return "not_done"
     if not seen.certain:
@@ -192,17 +193,17 @@ def _obstacle(run: Run, settings: FirstPowerSettings, seen: Seen) -> Phases | No
     if not supply_sound(seen):
         return "supply_first"
     if counts_sound(seen, settings.hand_revolutions) is False:
-        # Travel would not be what the counts say.
+        # With wrong counts, the travel limit would not hold.
         return "counts_first"
     return None if takes_torque(run.axis, run.session) else "no_torque_mode"
 
 
 @asynccontextmanager
 async def _without_loops(axis: Axis, settings: FirstPowerSettings) -> AsyncIterator[None]:
-    """Stops take the power off, and the drive itself limits its torque.
+    """Make stops remove the power, and set the drive's own torque limit.
 
     Raises:
-        RestoreFailed: on leaving, naming what could not be restored.
+        RestoreFailed: on leaving, states what could not be restored.
     """
     drive = axis.drive
     options = [key for key in _COASTING if key in drive.profile.by_key]
@@ -230,7 +231,7 @@ async def _energised(run: Run, settings: FirstPowerSettings, pulses: list[Pulse]
 
 
 class _Test:
-    """Pulses of torque; ``pulses`` are added to as they are made."""
+    """Torque pulses of one test; each one made is appended to ``pulses``."""
 
     def __init__(
         self, run: Run, settings: FirstPowerSettings, units: AxisUnits, start: int,
@@ -244,10 +245,10 @@ class _Test:
         self._percent, self._still, self._made = threshold.FIRST_PERCENT, 0, 0
 
     async def direction(self, direction: Literal[1, -1]) -> None:
-        """Pulses of one sign until the shaft has gone its way or the strongest moves nothing.
+        """Make pulses of one sign until the shaft has moved far enough or the strongest fails.
 
-        A pulse that moves the shaft by more than `threshold.CUT_REV` is cut off by the loop, which
-        takes the power off: the next one enables the axis again.
+        A pulse that moves the shaft by more than `threshold.CUT_REV` is cut off by the cyclic loop,
+        which removes the power: the axis is enabled again for the next pulse.
         """
         self._percent, self._still, self._made = threshold.FIRST_PERCENT, 0, 0
         begin = await self._place()
@@ -258,7 +259,7 @@ class _Test:
                 return
 
     async def _until_cut(self, direction: Literal[1, -1], begin: float) -> bool:
-        """Whether pulses are to go on after one that was cut off."""
+        """Make pulses until one is cut off; True where further pulses are needed after it."""
         while self._made < threshold.MOST_PULSES:
             low = 0.5 if direction > 0 else 0.75
             done = low + 0.24 * self._made / threshold.MOST_PULSES
@@ -284,14 +285,14 @@ class _Test:
             self._percent = max(self._percent / threshold.WEAKER, threshold.FIRST_PERCENT)
 
     def _far(self, begin: float) -> float:
-        """A place from where no further pulse fits into the permitted travel."""
+        """Distance from the start beyond which no further pulse fits into the travel [rev]."""
         return max(self._settings.travel_limit - threshold.LARGE_REV / 2, abs(begin) + STILL_REV)
 
     async def _place(self) -> float:
         return float(self._units.position(await self._run.axis.position_raw() - self._start))
 
     async def _pulse(self, direction: Literal[1, -1]) -> tuple[Pulse, bool]:
-        """One pulse, and whether a limit of travel or speed cut it off."""
+        """Make one pulse; the pulse, and whether a limit of travel or speed cut it off."""
         axis, session, percent = self._run.axis, self._run.session, self._percent
         before, cut = await self._place(), False
         raw = self._sequence(direction * percent)
@@ -315,7 +316,7 @@ class _Test:
         return pulse, cut
 
     def _around(self, place_rev: float) -> bus.Envelope:
-        """Bounds of one pulse: some degrees, within those of the whole test."""
+        """Limits of one pulse: some degrees, within those of the whole test."""
         limits, here = self._limits, self._start + self._units.position_raw(place_rev)
         way = abs(self._units.position_raw(threshold.CUT_REV))
         assert limits.position_min is not None and limits.position_max is not None  # noqa: PT018
@@ -340,7 +341,7 @@ class _Test:
         return np.array([self._units.torque_raw(percent * each) for each in shape], np.int64)
 
     async def _settled(self) -> None:
-        """Wait, without torque, until the shaft is at standstill: little friction lets it coast."""
+        """Wait without torque until standstill: with little friction the shaft coasts."""
         deadline, last = time.monotonic() + threshold.SETTLES_S, await self._place()
         while time.monotonic() < deadline:
             await dwell(self._run.axis, self._run.session, threshold.SETTLE_LOOK_S)

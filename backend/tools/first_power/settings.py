@@ -1,4 +1,4 @@
-"""What the first power is asked for, and what a person states about the axis."""
+"""Settings of the first power, with the statements of a person about the axis."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from backend.tools.tool import Option, ToolSettings
 
 
 class FirstPowerSettings(ToolSettings):
-    """Limits of the motion, and which parts of the checklist are made.
+    """Limits of the motion, the parts of the checklist to carry out, and statements on the load.
 
-    Nothing is energised without one of the two statements about what hangs at the axis.
+    The motor is energised only with one of the two statements about what hangs at the axis.
     """
 
     speed_limit: Annotated[float, Option(("--speed-rpm",), 200.0)] = Field(

@@ -1,4 +1,4 @@
-"""The words of the first power, English and Chinese, and what a report shows of it.
+"""Texts of the first power, English and Chinese, and its section of a report.
 
 Signal words as in ISO 3864-2: danger is death or serious injury if it is not avoided, warning is
 where either could result.
@@ -276,7 +276,7 @@ _VERDICTS: dict[Verdict, Literal["good", "warn", "plain"]] = {
 
 
 def report(result: FirstPowerResult) -> Section:
-    """Verdict, the checklist, and where the pulses turned the shaft."""
+    """Verdict, the checklist, and the shaft positions of the pulses."""
     rows = []
     charts: tuple[Chart, ...] = ()
     if result.pulses:
@@ -289,7 +289,7 @@ def report(result: FirstPowerResult) -> Section:
 
 
 def notes(result: FirstPowerResult) -> list[Note]:
-    """The verdict first, then one line for each check."""
+    """Notes on the result: the verdict first, then one line for each check."""
     found = [Note(f"verdict.{result.verdict}", _VERDICTS[result.verdict])]
     found += [
         Note(f"{each.name}.{each.finding}", _TONES[each.status], {"value": shown(each)})
@@ -304,7 +304,7 @@ def notes(result: FirstPowerResult) -> list[Note]:
 
 
 def shown(check: Check) -> str:
-    """The figure of a check, whole numbers in full."""
+    """Value of a check as text, whole numbers in full."""
     value = check.value
     if value is None:
         return ""

@@ -1,4 +1,4 @@
-"""From recordings of constant speeds to a friction map. Pure: also works on kept raw data."""
+"""Friction map from recordings of constant speeds. Pure: also works on stored raw data."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _RPM = 60.0 / _TURN
 
 @dataclass(frozen=True)
 class Map:
-    """Raw data [n]: ``plateau`` numbers constant speeds, negative backwards, 0 is between them."""
+    """Raw data [n]: ``plateau`` numbers the constant speeds, negative backwards; 0 between them."""
 
     sample_rate_hz: float
     position_rad: FloatArray
@@ -50,7 +50,7 @@ class Map:
         torque_step_nm: float, inertia_kgm2: float, ripple_rpm: float | None, by_travel: bool,
         by_time: bool,
     ) -> Map:  # fmt: skip
-        """One recording for each speed, with the signed number of each sample's plateau."""
+        """Join the recordings, one for each speed, with each sample's signed plateau number."""
         plateau = [
             np.sign(n) * (100 * index * (n != 0) + np.abs(n)) for index, n in enumerate(numbers)
         ]
@@ -68,7 +68,7 @@ class Map:
         )
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
-        """For storage."""
+        """The samples as arrays for storage."""
         return {
             "position_rad": self.position_rad,
             "torque_nm": self.torque_nm,
@@ -77,7 +77,7 @@ class Map:
         }
 
     def facts(self) -> dict[str, object]:
-        """For storage, with the arrays."""
+        """The scalar facts for storage, with the arrays."""
         return {
             "sample_rate_hz": self.sample_rate_hz,
             "torque_step_nm": self.torque_step_nm,
@@ -90,10 +90,10 @@ class Map:
 
 @dataclass(frozen=True)
 class _Plateau:
-    """One constant speed: rad [n], % of rated [n], signed rpm; ``even`` where it was held.
+    """One constant speed: rad [n], % of rated [n], signed rpm; ``even`` where it was held constant.
 
     ``valid`` [n] is False where a sample was lost; there the arrays hold a straight line, which
-    says nothing about the ripple in between.
+    contains no ripple.
     """
 
     speed: int
@@ -110,7 +110,7 @@ class _Plateau:
 
 @dataclass(frozen=True)
 class _Ripple:
-    """Complex amplitudes of orders 1…K in % (torque = Re(c·exp(jkθ))), and their deviation."""
+    """Complex amplitudes of orders 1…K in %, torque = Re(c·exp(jkθ)), and their deviations."""
 
     orders: npt.NDArray[np.int64]
     amplitude: npt.NDArray[np.complex128]
@@ -118,7 +118,7 @@ class _Ripple:
     stands_out: npt.NDArray[np.bool_]
 
     def at(self, angle: FloatArray, rpm: float) -> FloatArray:
-        """What the torque shows of it at this speed, [n] in %."""
+        """Ripple that the measured torque shows at this speed, [n] in %."""
         shown = self.stands_out & (self.orders * abs(rpm) / 60.0 <= threshold.FOLLOWED_HZ)
         total = np.zeros(angle.size)
         for order, amplitude in zip(self.orders[shown], self.amplitude[shown], strict=True):
@@ -127,7 +127,7 @@ class _Ripple:
 
 
 def evaluate(data: Map, settings: FrictionSettings, facts: AxisFacts) -> FrictionResult:
-    """The map of what was recorded.
+    """Evaluate the recordings.
 
     Raises:
         NotAllowed: no speed was held in both directions.
@@ -149,7 +149,8 @@ def evaluate(data: Map, settings: FrictionSettings, facts: AxisFacts) -> Frictio
     if not any(p.speed_rpm > 0 for p in points) or not any(p.speed_rpm < 0 for p in points):
         raise NotAllowed("friction.no-speed-held-evenly", value=round(max(uneven, default=0.0), 4))
     model = _model(points, step)
-    # Friction rises and falls with the speed's own ripple: known now, it is removed.
+    # Friction varies with the ripple of the speed itself; now that the model is known, that part is
+    # removed.
     own = ripple and _ripple(slow, settings.orders, rate, inertia, step, model)
     if not settings.ripple:
         findings.append(Finding(code="ripple_not_asked"))
@@ -195,7 +196,7 @@ def evaluate(data: Map, settings: FrictionSettings, facts: AxisFacts) -> Frictio
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> FrictionResult:
-    """The map again, from kept raw data.
+    """Evaluate stored raw data again.
 
     Raises:
         ValueError: not the raw data of a friction map.
@@ -243,7 +244,7 @@ def _plateaus(data: Map, rated_nm: float) -> list[_Plateau]:
 def _points(
     plateaus: Sequence[_Plateau], ripple: _Ripple | None, rate: float, inertia: float, step: float
 ) -> list[FrictionPoint]:
-    """Mean torque of every speed and direction, slowest backwards first to fastest forwards."""
+    """Mean torque of each speed and direction, from fastest backwards to fastest forwards."""
     points = []
     for speed, sign in sorted({(each.speed, np.sign(each.rpm)) for each in plateaus}):
         same = [e for e in plateaus if e.speed == speed and np.sign(e.rpm) == sign]
@@ -271,8 +272,10 @@ def _points(
 def _level(
     plateau: _Plateau, ripple: _Ripple | None, rate: float, inertia: float
 ) -> tuple[float, FloatArray, float]:
-    """Mean torque over whole revolutions where there is one, the means of its blocks, and over
-    how many revolutions; without what goes into acceleration."""
+    """Mean torque, the means of its blocks, and the number of revolutions that they cover.
+
+    Whole revolutions are used where there is at least one; the torque for acceleration is removed.
+    """
     angle, torque, valid = plateau.angle, plateau.torque, plateau.valid
     whole = np.floor(plateau.revolutions + threshold.NEARLY)
     revolutions = plateau.revolutions
@@ -290,9 +293,10 @@ def _level(
 
 
 def _acceleration(angle: FloatArray, whole: int, rate: float) -> float:
-    """Mean in rad/s², from the times of the first and the last revolution; 0 with fewer than two.
+    """Mean acceleration [rad/s²] from the times of the first and the last revolution.
 
-    Within one revolution the ripple of the speed cannot be distinguished from an acceleration.
+    It is 0 with fewer than two revolutions: within one, the ripple of the speed cannot be
+    distinguished from an acceleration.
     """
     if whole < 2:
         return 0.0
@@ -313,7 +317,7 @@ def _ripple(
     plateaus: Sequence[_Plateau], orders: int, rate: float, inertia: float, step: float,
     friction: SpeedModel | None = None,
 ) -> _Ripple | None:  # fmt: skip
-    """Orders of the torque over a slow revolution each way; None without one."""
+    """Orders of the torque over a slow revolution in each direction; None without both."""
     ways = [
         next((e for e in plateaus if np.sign(e.rpm) == sign and e.revolutions >= 1.0), None)
         for sign in (1.0, -1.0)
@@ -328,17 +332,17 @@ def _ripple(
         for amplitude in [_orders(way, k, rate)]
     ])  # fmt: skip
     forward, backward = both[:, 0]
-    # What the loop's delay shifts, it shifts to the other side in the other direction.
+    # The phase shift by the loop's delay has the opposite sign in the other direction.
     mean, half_difference = 0.5 * (forward + backward), 0.5 * np.abs(forward - backward)
     chance = float(np.median(np.abs(mean))) / np.sqrt(2.0 * np.log(2.0))
     stands_out = (np.abs(mean) > threshold.STANDS_OUT * chance) & (
         np.abs(mean) > threshold.OF_STEP * step
     )
     stands_out &= half_difference < np.abs(mean)
-    # Two revolutions leave two degrees of freedom; `_harmonics` takes 1.96 deviations.
+    # Two revolutions leave two degrees of freedom; `_harmonics` multiplies by 1.96 deviations.
     few = float(scipy.special.stdtrit(2, 0.975)) / 1.96
     deviation = np.hypot(chance, few * half_difference / np.sqrt(2.0))
-    # Curves of friction that are as good differ in their slopes.
+    # Friction curves that fit equally well differ in their slopes.
     deviation = np.hypot(deviation, np.max(np.abs(np.mean(both, axis=0) - mean), axis=0) / 1.96)
     return _Ripple(k, mean, np.where(stands_out, deviation, chance), stands_out)
 
@@ -359,7 +363,7 @@ def _orders(plateau: _Plateau, k: npt.NDArray[np.int64], rate: float) -> npt.NDA
 def _acting(
     amplitude: npt.NDArray[np.complex128], rpm: float, inertia: float, slope: float
 ) -> npt.NDArray[np.complex128]:
-    """What acts on the motor [k]: the torque of its orders without what its own swinging takes.
+    """Torque acting on the motor [k]: the measured orders less inertia and friction of the ripple.
 
     ``slope`` is that of friction over speed, in % per rpm.
     """
@@ -373,11 +377,11 @@ def _acting(
 def _pursued(
     trend: FloatArray, turning: FloatArray, wanted: FloatArray
 ) -> npt.NDArray[np.complex128]:
-    """Complex amplitudes [k] of ``wanted`` [n] where samples are missing, by matching pursuit.
+    """Complex amplitudes [k] of ``wanted`` [n] with missing samples, by matching pursuit.
 
-    Over a gap longer than a period all orders together are nearly dependent, and a fit of all
-    would let them cancel one another. The largest is fitted first, then with it the largest of
-    what is left, for as long as one stands out.
+    With a gap longer than a period, all orders together are nearly linearly dependent, and a fit of
+    all of them would let them cancel one another. The largest is fitted first, then jointly with
+    the largest of the residual, as long as one is significant.
     """
     chosen: list[int] = []
     while True:
@@ -417,7 +421,7 @@ def _harmonics(ripple: _Ripple | None) -> tuple[Harmonic, ...]:
 
 
 def _compensation(harmonics: Sequence[Harmonic], angle_deg: Sequence[float]) -> tuple[float, ...]:
-    """The sum of the harmonics at these angles [n] in %; nothing without a harmonic."""
+    """Sum of the harmonics at these angles [n] in %; empty without a harmonic."""
     if not harmonics:
         return ()
     angle = np.radians(np.asarray(angle_deg))
@@ -431,7 +435,7 @@ def _compensation(harmonics: Sequence[Harmonic], angle_deg: Sequence[float]) -> 
 def _by_angle(
     plateaus: Sequence[_Plateau],
 ) -> tuple[tuple[float, ...], tuple[float | None, ...], tuple[float | None, ...]]:
-    """Torque about its mean over one revolution, forwards and backwards; None where none is."""
+    """Torque about its mean over one revolution, forwards and backwards; None without samples."""
     if not plateaus:
         return (), (), ()
     curves = []
@@ -462,7 +466,7 @@ def _estimate(found: tuple[float, float, float]) -> Estimate:
 
 
 def _findings(model: SpeedModel) -> list[Finding]:
-    """What the speeds cannot say."""
+    """Findings on what the measured speeds do not determine."""
     least = float(np.min(np.abs(model.speed)))
     if not model.enough:
         return [Finding(code="few_speeds", value=float(model.speeds))]

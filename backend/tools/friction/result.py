@@ -1,4 +1,4 @@
-"""What a friction map concludes; torques in % of rated torque, speeds in rpm at the motor."""
+"""Result of a friction map; torques in % of rated torque, speeds in rpm at the motor."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Code = Literal[
     "model_misfit",
     "compensation_in_controller",
 ]
-#: Of the table for a controller.
+#: Columns of the compensation table for a controller.
 COMPENSATION_COLUMNS = ("position_rev", "torque_percent", "forward_percent", "backward_percent")
 
 
@@ -32,14 +32,14 @@ class _Part(BaseModel):
 
 
 class Estimate(_Part):
-    """A value with its 95 % interval, in the unit that the field's name says."""
+    """A value with its 95 % interval, in the unit of the field's name."""
 
     value: float
     ci95: Interval
 
 
 class FrictionPoint(_Part):
-    """Torque at one constant speed; negative speeds turn backwards. A load's pull is part of it."""
+    """Torque at one constant speed, negative backwards; it includes the static torque of a load."""
 
     speed_rpm: float
     torque_percent: float
@@ -61,7 +61,7 @@ class Harmonic(_Part):
 
 
 class Finding(_Part):
-    """What the map says, or cannot say, as a code with the figure that it rests on."""
+    """A result or limitation of the map: a code and the figure that it rests on."""
 
     code: Code
     value: float | None = None
@@ -69,10 +69,10 @@ class Finding(_Part):
 
 
 class FrictionResult(ToolResult):
-    """The map. ``curve_*`` is the model through the points, over the speeds measured only.
+    """The map. ``curve_*`` is the model through the points, over the measured speeds only.
 
     The model: torque = load + sign(v) · (Coulomb + Stribeck · exp(-(|v|/v_s)^δ)) + viscous · v.
-    Parameters are None where the data cannot say them; ``findings`` say why.
+    Parameters are None where the data do not determine them; ``findings`` state why.
     """
 
     tool: Literal["friction"] = "friction"
@@ -102,10 +102,10 @@ class FrictionResult(ToolResult):
     motion_s: float
 
     def compensation_csv(self) -> str | None:
-        """The table over one motor revolution: place in rev, then torques in % of rated torque.
+        """Compensation table over one motor revolution: position in rev, torques in % of rated.
 
-        Both directions are about their mean, as measured; a field is empty where no sample is.
-        None without a ripple.
+        Both directions are about their mean, as measured; a field is empty where there is no
+        sample. None without a ripple.
         """
         if not self.compensation_percent:
             return None

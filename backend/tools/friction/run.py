@@ -1,4 +1,4 @@
-"""The moves of a friction map: constant speeds both ways, to and fro about one place."""
+"""Moves of a friction map: reciprocating strokes of constant speed about one position."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 def _stroke_of(room: Room, speed_rps: float, slow_s: float) -> Stroke | None:
-    """Plateaus of this speed; None where the travel has no room for them."""
+    """Stroke of this speed; None where the travel does not suffice for its plateaus."""
     ramp_s, left_rev = room.ramp_s(speed_rps), room.plateau_rev(speed_rps)
     wanted = max(1.0, np.ceil(threshold.LEAST_S * speed_rps))
     whole = min(wanted, np.floor(left_rev))
@@ -39,7 +39,8 @@ def _stroke_of(room: Room, speed_rps: float, slow_s: float) -> Stroke | None:
         plateau_s = slow_s
     else:
         plateau_s = min(left_rev / speed_rps, slow_s)
-        # With room for a whole revolution, less would be a worse mean: not so fast then.
+        # If the travel allows a whole revolution, a shorter plateau would give a worse mean: use a
+        # lower speed.
         if plateau_s < threshold.SHORT_S or (2 * room.travel_rev >= 1.5 and speed_rps > 0.5):
             return None
     return Stroke(speed_rps, ramp_s, float(plateau_s), 2 if plateau_s >= threshold.LEAST_S else 4)
@@ -47,9 +48,9 @@ def _stroke_of(room: Room, speed_rps: float, slow_s: float) -> Stroke | None:
 
 @dataclass(frozen=True)
 class Plan:
-    """Strokes, slowest first. ``ripple_rps`` is the speed of the slow revolution, if any.
+    """Strokes, slowest first. ``ripple_rps`` is the speed of the slow revolution, None without one.
 
-    ``by_travel`` and ``by_time``: what limited the fastest and the slowest speed.
+    ``by_travel`` and ``by_time``: whether they limited the fastest and the slowest speed.
     """
 
     strokes: tuple[Stroke, ...]
@@ -59,7 +60,7 @@ class Plan:
 
 
 def planned(settings: FrictionSettings, room: Room, units: AxisUnits) -> Plan:
-    """Speeds spread evenly on a logarithmic scale, as slow as the time allows.
+    """Plan speeds spaced evenly on a logarithmic scale, as slow as the time allows.
 
     Raises:
         OutOfRange: the limits leave no speed to measure.
@@ -106,7 +107,7 @@ def planned(settings: FrictionSettings, room: Room, units: AxisUnits) -> Plan:
 
 
 def _ripple_stroke(settings: FrictionSettings, room: Room, slowest_rps: float) -> Stroke | None:
-    """One slow revolution each way; None where it is not asked for or there is no room."""
+    """One slow revolution in each direction; None where not requested or beyond the travel."""
     if not settings.ripple or 2 * room.travel_rev < threshold.RIPPLE_REV + 0.1:
         return None
     speed = 2 * threshold.RIPPLE_REV / (threshold.RIPPLE_SHARE * room.time_s)
@@ -115,10 +116,10 @@ def _ripple_stroke(settings: FrictionSettings, room: Room, slowest_rps: float) -
 
 
 async def run(run: Run, settings: FrictionSettings) -> FrictionResult:
-    """Measure; the axis ends where it began, with its settings as they were.
+    """Measure; the axis ends where it began, with its settings restored.
 
     Raises:
-        OutOfRange: the limits leave nothing to measure; nothing has moved but a short first move.
+        OutOfRange: the limits leave nothing to measure; only a short first move was made.
         NotAllowed: 6077h does not come with every cycle or does not change, or the envelope or a
             fault ended a motion; states the reason.
     """
@@ -167,7 +168,7 @@ async def _stroke(
     stroke: Stroke,
     where: tuple[float, float, Text],
 ) -> tuple[Recording, FloatArray]:
-    """The recording of one speed, and the number of the plateau that each sample counts for."""
+    """Recording of one speed, and the plateau number of each sample."""
     slow_rps = 0.25 * settings.speed_limit / 60.0
     speed_rpm, numbers = speeds_of(stroke, 1.0 / cycle_s(run.session), slow_rps)
     recording = await speed_move(
@@ -177,7 +178,7 @@ async def _stroke(
 
 
 def _require_torque(run: Run, first: Recording, facts: AxisFacts, units: AxisUnits) -> None:
-    """A motion forth and back takes torques of both signs, however little friction there is.
+    """Check that the reported torque changes: a reciprocating move needs torques of both signs.
 
     Raises:
         NotAllowed: the torque that the drive reports does not change.

@@ -1,4 +1,4 @@
-"""What a friction map may be asked for."""
+"""Settings of a friction map."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from backend.tools.tool import ToolSettings
 class FrictionSettings(ToolSettings):
     """Speeds of the map; its limits are those of every measurement.
 
-    The time limit is that of all moves together: slow speeds are left out where it ends them.
+    The time limit applies to all moves together: slow speeds are left out where it is too short.
     """
 
     time_limit_s: float = Field(

@@ -1,4 +1,4 @@
-"""The words of a friction map, English and Chinese, and what a report shows of it."""
+"""Texts of a friction map, English and Chinese, and its section of a report."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "save_table": ("Save the compensation table (CSV)", "保存补偿表 (CSV)"),
 }
 _TURN_RPM = 9.549296585513721
-"""rpm per rad/s."""
+"""Factor from rad/s to rpm."""
 _SHOWN = 8
 _TONES: dict[Code, Literal["good", "warn"]] = {
     "mapped": "good",

@@ -1,1 +1,1 @@
-"""Gantry: the 2×2 response of two coupled axes, their skew at rest, and the margins of the pair."""
+"""Gantry: 2×2 response of two coupled axes, their skew at standstill, and the pair's margins."""

@@ -1,4 +1,4 @@
-"""From recordings of both axes to the figures. Pure: also works on kept raw data."""
+"""Results of a gantry from recordings of both axes. Pure: also works on stored raw data."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _KINDS: tuple[Literal["common", "skew"], ...] = ("common", "skew")
 
 @dataclass(frozen=True)
 class Shape:
-    """Where the periods of every experiment lie; the excited bins are apart."""
+    """Position of the periods in every experiment; the excited bins are stored separately."""
 
     sample_rate_hz: float
     period_samples: int
@@ -58,13 +58,14 @@ class Shape:
 
 @dataclass(frozen=True)
 class Experiments:
-    """Raw data of e experiments, pairs of common phases one behind the other.
+    """Raw data of e experiments, ordered as pairs of common phases.
 
-    ``sent``, ``torque``, ``speed`` [e, 2, n] in rad/s and Nm, turning alike counted alike;
-    ``valid`` [e, n]; ``direction`` [e] of the steady motion; ``skew_rad`` [e, n]. ``controllers``
-    [lines, 2] from the error of the reported speed to torque, ``at_image`` the same at fs - f;
-    both are empty where they are not known. ``filters`` [lines, 2] is what the reported speeds have
-    passed, 1 where that is not known. ``interpolates``: setpoints are reached in straight lines.
+    ``sent``, ``torque``, ``speed`` [e, 2, n] in rad/s and Nm, with equal signs for equal motion of
+    the beam; ``valid`` [e, n]; ``direction`` [e] of the steady motion; ``skew_rad`` [e, n].
+    ``controllers`` [lines, 2] are the responses from the error of the reported speed to torque,
+    ``at_image`` the same at fs - f; both are empty where unknown. ``filters`` [lines, 2] are the
+    responses of the speed filters, 1 where unknown. ``interpolates``: the drives interpolate
+    linearly between setpoints.
     """
 
     shape: Shape
@@ -84,7 +85,7 @@ class Experiments:
     partner: str
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
-        """For storage, which holds no complex numbers: pairs of real and imaginary part."""
+        """The samples as arrays for storage; complex numbers as real and imaginary parts."""
         return {
             "lines": self.lines, "sent": self.sent, "torque": self.torque, "speed": self.speed,
             "valid": self.valid, "direction": self.direction, "skew_rad": self.skew_rad,
@@ -93,7 +94,7 @@ class Experiments:
         }  # fmt: skip
 
     def records(self) -> tuple[PairRecord, ...]:
-        """As the estimate takes them."""
+        """Records in the form that the estimate takes."""
         s = self.shape
         found = []
         for number in range(self.direction.size):
@@ -115,8 +116,10 @@ class Experiments:
 
 @dataclass(frozen=True)
 class _Steady:
-    """Torque that each axis needs on the mean of both directions, and its friction; ``fight`` is
-    half the difference. Percent of rated, each with half of its interval.
+    """Mean torque of both directions that each axis needs, and its friction.
+
+    ``fight`` is half the difference of the two holding torques. All in % of rated torque, with
+    intervals.
     """
 
     holding: tuple[GantryValue, GantryValue]
@@ -125,7 +128,7 @@ class _Steady:
 
 
 def evaluate(data: Experiments, settings: GantrySettings) -> GantryResult:
-    """The figures of what was recorded.
+    """Evaluate the recordings.
 
     Raises:
         NotAllowed: too many samples were lost.
@@ -136,18 +139,18 @@ def evaluate(data: Experiments, settings: GantrySettings) -> GantryResult:
         modes = find_modes(response)
     except ValueError as error:
         raise NotAllowed("gantry.few-samples") from error
-    # The modes have such limits of their own.
+    # The modes are limited in this way by themselves.
     response = response.not_better_than_known()
     steady = _steady(data, records, _stiffness(modes))
     margins, best = None, None
     if data.controllers.size > 0:
-        # The loops see the filters, wherever they stand in the loop.
+        # The loops contain the filters, wherever they are placed in the loop.
         loops = data.controllers * data.filters
         goals = {"ms": threshold.MS, "phase_margin_deg": threshold.PHASE_MARGIN_DEG}
         margins, best = joint_margins(response, loops), design(response, loops, **goals)
     ratio, deviation = coupling(response)
     half = response.spread * deviation
-    # Of two machines nothing is square, skews, or presses against the other.
+    # Two uncoupled machines have neither squareness nor skew modes nor opposing torques.
     joined = shows_coupling(ratio, half)
     square = _square_rev(data, steady, modes) if joined else None
     lead = settings.lead_mm
@@ -193,7 +196,7 @@ def evaluate(data: Experiments, settings: GantrySettings) -> GantryResult:
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> GantryResult:
-    """The same again, from kept raw data.
+    """Evaluate stored raw data again.
 
     Raises:
         ValueError: not the raw data of a gantry.
@@ -225,16 +228,17 @@ def _complex(pairs: npt.NDArray[np.generic]) -> npt.NDArray[np.complex128]:
 
 
 def _response(data: Experiments, records: tuple[PairRecord, ...]) -> CoupledResponse:
-    """From torque to the speed of the motor, without images and filters of speed."""
+    """Response from torque to motor speed, corrected for setpoint images and speed filters."""
     found = estimate(records)
     rate, f = data.shape.sample_rate_hz, found.frequency_hz
-    # Of a straight line between setpoints; one that is held for a cycle is late by half of it.
+    # With linear interpolation between setpoints; a setpoint held for a cycle has half a cycle of
+    # delay.
     if data.interpolates:
         share, x = (f / (rate - f)) ** 2, np.pi * f / rate
-        # All images of a straight line together are 1/sinc² - 1 of what is at f.
+        # All images of linear interpolation together are 1/sinc² - 1 of the amplitude at f.
         beyond = (x / np.sin(x)) ** 2 - 1.0 - share
     else:
-        # Those of a held setpoint change their sign from one to the next: less than the second.
+        # The images of held setpoints alternate in sign: their sum is less than the second one.
         share, beyond = -f / (rate - f), f / (rate + f)
     known = data.controllers.size > 0
     controllers = Controllers(data.controllers, data.at_image) if known else None
@@ -244,10 +248,10 @@ def _response(data: Experiments, records: tuple[PairRecord, ...]) -> CoupledResp
 def _steady(
     data: Experiments, records: tuple[PairRecord, ...], stiffness: GantryValue | None
 ) -> _Steady:
-    """Friction changes its sign with the direction, the torque that holds the beam does not.
+    """Holding torque and friction: only friction changes its sign with the direction.
 
-    The axes are let go between experiments, where the beam may come to rest somewhere else: with
-    the stiffness between them, every torque is taken to the skew that they stood at.
+    The axes are disabled between experiments, and the beam may then settle at another skew: with
+    the stiffness between the axes, every torque is corrected for the skew that it was measured at.
     """
     n = data.shape.period_samples
     rated = np.array(data.rated_torque_nm)
@@ -291,11 +295,11 @@ def _steady(
 
 
 def _square_rev(data: Experiments, steady: _Steady, modes: CoupledModes) -> GantryValue | None:
-    """Fighting torque over the stiffness between the axes; None where there is none."""
+    """Skew at which no torques oppose each other [rev]; None where the stiffness is unknown."""
     stiffness = _stiffness(modes)
     if stiffness is None or not data.torque_known:
         return None
-    # The same share of both rated torques is half the difference of two torques in Nm.
+    # The same share of both rated torques equals half the difference of the two torques in Nm.
     rated = 0.5 * sum(data.rated_torque_nm)
     value = steady.fight.value / 100.0 * rated / stiffness.value / _TURN
     low, high = _ends(steady.fight)
@@ -325,7 +329,7 @@ def _machine_findings(
 
 
 def _apart(response: CoupledResponse, most: float) -> list[GantryFinding]:
-    """No coupling shows; ``most`` is the highest far end of its intervals."""
+    """Finding that no coupling is visible; ``most`` is the highest upper limit of its intervals."""
     low, top = response.frequency_hz[[0, -1]]
     values = {"most": f"{most:.2g}", "low": f"{low:.3g}", "top": f"{top:.3g}"}
     return [GantryFinding(code="not_coupled", values=values)]
@@ -406,7 +410,7 @@ def _entries(response: CoupledResponse) -> tuple[GantryEntry, ...]:
 
 
 def _motions(response: CoupledResponse) -> tuple[GantryMotion, GantryMotion]:
-    # A share of the motion itself is not known better, whatever the four entries average.
+    # The motions are no better known than the entries that they are computed from.
     found = common_and_differential(response).not_better_than_known()
     both = np.einsum("kii->ki", found.response)
     half = found.spread * np.einsum("kii->ki", found.std) / np.maximum(np.abs(both), 1e-300)

@@ -1,4 +1,4 @@
-"""What is known of a gantry."""
+"""Result of a gantry measurement."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ class GantryValue(_Part):
 
 
 class GantryFinding(_Part):
-    """A verdict; ``values`` are figures with their units for the places in its text."""
+    """A finding; ``values`` are the figures with units for the placeholders of its text."""
 
     code: Code
     values: dict[str, str] = {}
 
 
 class GantryMode(_Part):
-    """A resonance of both axes; ``skew_share`` is how much of it is differential, 0 to 1."""
+    """A resonance of both axes; ``skew_share`` is the differential share of its motion, 0 to 1."""
 
     kind: Literal["common", "skew"]
     frequency_hz: float
@@ -45,7 +45,7 @@ class GantryMode(_Part):
 
 
 class GantryEntry(_Part):
-    """Response from the torque of axis ``torque`` to the speed of axis ``speed``, line by line."""
+    """Response from the torque of axis ``torque`` to the speed of axis ``speed`` [lines]."""
 
     speed: Literal[1, 2]
     torque: Literal[1, 2]
@@ -56,8 +56,10 @@ class GantryEntry(_Part):
 
 
 class GantryMotion(_Part):
-    """Response of the motion alike (mean speed by the sum of both torques), or of the skew
-    (difference of the speeds by half the difference of the torques), line by line.
+    """Response of the common motion or of the skew [lines].
+
+    Common: mean speed over the sum of both torques; skew: difference of the speeds over half the
+    difference of the torques.
     """
 
     kind: Literal["common", "skew"]
@@ -67,8 +69,10 @@ class GantryMotion(_Part):
 
 
 class GantryMargins(_Part):
-    """Of both speed loops together, on the measured lines; ``stable`` None where they do not show
-    it. ``ms_alone`` is the peak of each axis by itself.
+    """Margins of both speed loops together, on the measured lines.
+
+    ``stable`` is None where the lines do not determine it. ``ms_alone`` is the peak sensitivity of
+    each axis by itself.
     """
 
     stable: bool | None
@@ -81,14 +85,14 @@ class GantryMargins(_Part):
 
 
 class GantryResult(ToolResult):
-    """Axis 1 is the one that the measurement was started on, axis 2 is ``partner``.
+    """Result; axis 1 is the one that the measurement was started on, axis 2 is ``partner``.
 
-    ``holding_percent`` is the torque that each axis needs on the mean of both directions, without
-    friction, and ``fight_percent`` half their difference: what both sides press against each other
-    with. ``out_of_square_rev`` is by how much axis 1 is ahead of where the beam would rest.
-    Where no coupling shows, neither is stated, nor are modes, inertia and stiffness of the machine.
-    ``coupling`` is √|G12·G21/(G11·G22)|, 0 without coupling, 1 for one rigid body;
-    ``relative_gain`` that of axis 1, 1 without coupling.
+    ``holding_percent`` is the mean torque of both directions that each axis needs, without
+    friction, and ``fight_percent`` half their difference: the torque with which the two sides
+    oppose each other. ``out_of_square_rev`` is how far axis 1 is ahead of the position where the
+    beam would be free of it. Where no coupling is visible, neither is stated, nor are modes,
+    inertia and stiffness of the machine. ``coupling`` is √|G12·G21/(G11·G22)|, 0 without coupling,
+    1 for one rigid body; ``relative_gain`` that of axis 1, 1 without coupling.
     """
 
     tool: Literal["gantry"] = "gantry"

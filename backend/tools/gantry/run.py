@@ -1,7 +1,7 @@
-"""The motions of a gantry measurement: both axes at one steady speed, with a multisine on top.
+"""Motions of a gantry measurement: both axes at one steady speed, with a multisine added.
 
-The steady speed is above what the multisine adds, so that no motor reverses while it is measured:
-dry friction is then a constant torque and none of the response.
+The steady speed is higher than the amplitude of the multisine, so that no motor reverses during the
+measurement: dry friction is then a constant torque and not part of the response.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ from drivers.texts.message import text
 
 FloatArray = npt.NDArray[np.float64]
 _TURN = 2 * np.pi
-#: Direction of each experiment: both directions of every realisation, and of every sign.
+#: Direction of each experiment: every realisation and every sign is measured in both directions.
 DIRECTIONS = (1, -1, -1, 1)
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Experiments about a steady speed; ``ramp`` are the samples in and out of it."""
+    """Experiments about a steady speed; ``ramp`` is the number of samples of each ramp."""
 
     experiments: tuple[Experiment, ...]
     shape: Shape
@@ -56,7 +56,7 @@ class Plan:
     ramp: int
 
     def speeds_rpm(self, number: int, share: float) -> FloatArray:
-        """Setpoints [2, n] of an experiment with this share of the excitation."""
+        """Setpoints [2, n] of an experiment with this share of the excitation, in rpm."""
         made = self.experiments[number]
         excited = share * self.peak_rad_s * made.excitation.samples
         rise = 0.5 * (1.0 - np.cos(np.pi * (np.arange(self.ramp) + 0.5) / self.ramp))
@@ -69,10 +69,10 @@ class Plan:
 
 
 def planned(settings: GantrySettings, rate: float) -> Plan:
-    """Experiments that fit into travel, speed and time.
+    """Plan experiments that fit into travel, speed and time.
 
     Raises:
-        OutOfRange: they do not.
+        OutOfRange: the limits are too small.
     """
     n = round(rate / settings.resolution_hz)
     top = min(settings.highest_hz or threshold.TOP * rate, threshold.TOP * rate)
@@ -108,12 +108,12 @@ def planned(settings: GantrySettings, rate: float) -> Plan:
 
 
 async def run(run: Run, settings: GantrySettings) -> GantryResult:
-    """Measure; both axes end where they began, with their settings as they were.
+    """Measure; both axes end where they began, with their settings restored.
 
     Raises:
-        NotAllowed: there is no second axis, the bus moves each axis by itself, or the envelope, the
-            skew limit or a fault ended a motion; states why.
-        OutOfRange: the limits leave no room; nothing has moved.
+        NotAllowed: there is no second axis, the bus can only move single axes, or the envelope, the
+            skew limit or a fault ended a motion; states which.
+        OutOfRange: the limits are too small; nothing has moved.
     """
     axis, session, partner = run.axis, run.session, run.partner
     if partner is None:
@@ -152,9 +152,9 @@ async def run(run: Run, settings: GantrySettings) -> GantryResult:
 async def _experiments(
     run: Run, pair: Pair, plan: Plan, settings: GantrySettings
 ) -> tuple[list[tuple[Recording, Recording]], float]:
-    """All recordings, and the share of the excitation; a smaller one where torque ended a motion.
+    """All recordings, and the share of the excitation used: reduced where torque ended a motion.
 
-    How much torque the loops make of it depends on their gains, which nobody knows before.
+    The torque that the excitation causes depends on the gains of the loops, which are unknown.
     """
     used = 1.0
     for attempt in range(threshold.ATTEMPTS):
@@ -184,7 +184,7 @@ async def _one(
     used: float,
     reported: Callable[[float], None],
 ) -> tuple[Recording, Recording]:
-    """One experiment, from near home where it begins there."""
+    """Carry out one experiment; every second one starts from home."""
     if number % 2 == 0:
         await _go_back(pair, settings)
     speeds = plan.speeds_rpm(number, used)
@@ -192,10 +192,10 @@ async def _one(
 
 
 async def _go_back(pair: Pair, settings: GantrySettings) -> None:
-    """Both axes home at once, each by its own way, so that they end as square as they began.
+    """Move both axes home together, each by its own distance, so that the skew ends as it began.
 
     Raises:
-        NotAllowed: the motion was ended by the envelope, the skew limit or a fault.
+        NotAllowed: the envelope, the skew limit or a fault ended the motion.
     """
     rate = 1.0 / cycle_s(pair.session)
     highest_rps = threshold.BACK * settings.speed_limit / 60.0
@@ -203,7 +203,7 @@ async def _go_back(pair: Pair, settings: GantrySettings) -> None:
         ways = await pair.ways_rev()
         if max(abs(way) for way in ways) < threshold.NEAR_REV:
             return
-        # Peak speed of a raised cosine is twice its mean.
+        # The peak speed of a raised cosine is twice its mean.
         duration_s = max(2.0 * max(abs(way) for way in ways) / highest_rps, threshold.BACK_S)
         still = np.zeros(round(0.1 * rate))
         speeds = np.array(
@@ -221,7 +221,7 @@ async def _data(
     used: float,
     facts: list[AxisFacts],
 ) -> Experiments:
-    """The recordings as turning alike, and the controllers of both axes on the lines."""
+    """Raw data with equal signs for equal motion, and the controllers of both axes on the lines."""
     sense = np.array([1.0, pair.sense])[None, :, None]
     lines = plan.experiments[0].excitation.lines
     f = lines * (plan.shape.sample_rate_hz / plan.shape.period_samples)
@@ -254,9 +254,10 @@ async def _data(
 async def _controller(
     axis: Axis, facts: AxisFacts, f: npt.NDArray[np.floating]
 ) -> npt.NDArray[np.complexfloating] | None:
-    """From speed error to torque on these lines; None where gains or notches have no known meaning.
+    """Response from speed error to torque on these lines; None where a part of it is unknown.
 
-    The speed filter is none of it: the reported speed has passed it.
+    Gains or notches without a known meaning, or an unknown rated torque, make it unknown. The speed
+    filter is not included: the reported speed has already passed it.
     """
     drive = axis.drive
     notches = []

@@ -1,4 +1,4 @@
-"""What a measurement of a gantry may be asked with."""
+"""Settings of a gantry measurement."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from backend.tools.tool import Option, ToolSettings
 
 
 class GantrySettings(ToolSettings):
-    """The limits of every measurement, for both axes, and what couples them."""
+    """The limits of every measurement, for both axes, and the data of the pair."""
 
     partner: Annotated[str, Option(("--partner",))] = Field(
         default="",

@@ -1,4 +1,4 @@
-"""The words of the gantry, English and Chinese, and what a report shows of it."""
+"""Texts of a gantry measurement, English and Chinese, and its section of a report."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The measurements of an axis by which its condition is followed, one after another in rounds."""
+"""Health check: repeated rounds of measurements that monitor the condition of an axis."""

@@ -1,4 +1,4 @@
-"""From results of the measurements to quantities, and to arrays that are stored. Pure."""
+"""Quantities of a health check from measured results, and their arrays for storage. Pure."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ def resonances(found: Iterable[Resonance]) -> list[HealthValue]:
 def friction(points: Sequence[FrictionPoint]) -> HealthValue | None:
     """Mean friction over the speeds measured in both directions, in % of rated torque.
 
-    Half the difference of both directions has no share of the load's pull. None without a pair.
+    Half the difference of both directions is free of the load's static torque. None where no speed
+    was measured in both directions.
     """
     halves, variances = [], []
     for ahead in (each for each in points if each.speed_rpm > 0):
@@ -68,7 +69,7 @@ def friction(points: Sequence[FrictionPoint]) -> HealthValue | None:
 
 
 def arrays_of(rounds: Sequence[HealthRound]) -> dict[str, npt.NDArray[np.generic]]:
-    """For storage: one row for each value; a missing quantity is a row without a value."""
+    """Arrays for storage: one row per value; a missing quantity is a row without a value."""
     rows = [
         (index, QUANTITIES.index(each.quantity), each.number, each.value, each.low, each.high)
         for index, one in enumerate(rounds)
@@ -85,10 +86,10 @@ def arrays_of(rounds: Sequence[HealthRound]) -> dict[str, npt.NDArray[np.generic
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> HealthResult:
-    """The result again from what was stored.
+    """Restore the result from stored arrays.
 
     Raises:
-        ValueError: the arrays are not of a health check.
+        ValueError: the arrays are not those of a health check.
     """
     if meta.get("tool") != "health" or "rows" not in arrays:
         raise ValueError("no health check")

@@ -1,4 +1,4 @@
-"""What a health check measured: quantities of the axis, by round, with their intervals."""
+"""Result of a health check: quantities of the axis by round, with their intervals."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ UNITS: dict[Quantity, Unit] = {
 
 
 class HealthValue(BaseModel):
-    """One quantity of one round; ``low`` and ``high`` are its 95 % interval where one is known.
+    """One quantity of one round; ``low`` and ``high`` are its 95 % interval where known.
 
-    ``number`` counts quantities of a name from 1, by rising frequency. Friction is in % of rated
-    torque, half the difference of both directions, as the mean over the speeds.
+    ``number`` counts quantities of the same name from 1, by rising frequency. Friction is in % of
+    rated torque: half the difference of both directions, averaged over the speeds.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -45,7 +45,7 @@ class HealthValue(BaseModel):
 
 
 class HealthRound(BaseModel):
-    """All quantities of one round. ``missing``: measured, but without an answer."""
+    """All quantities of one round. ``missing``: measured, but without a result."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -1,4 +1,4 @@
-"""The measurements of a health check, one after another. Each keeps its own raw data, too."""
+"""Measurements of a health check, in sequence. Each also stores its own raw data."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from drivers.texts.message import text
 
 
 async def run(run: Run, settings: HealthSettings) -> HealthResult:
-    """Measure; every measurement brings the axis back to where it began.
+    """Measure; every measurement returns the axis to where it began.
 
     Raises:
-        OutOfRange, NotAllowed, LinkLost: of the measurement that could not be made; those before
-            it have kept their raw data, and no health check is stored.
+        OutOfRange, NotAllowed, LinkLost: from the measurement that failed; the earlier ones have
+            stored their raw data, and no health check is stored.
     """
     rounds = []
     for index in range(settings.rounds):
@@ -39,7 +39,7 @@ async def run(run: Run, settings: HealthSettings) -> HealthResult:
 
 
 class _Part:
-    """A round's share of the job's progress, cut into that of each measurement."""
+    """A round's part of the job's progress, divided among its measurements."""
 
     def __init__(self, run: Run, start: float, width: float) -> None:
         self._run, self._start, self._width = run, start, width
@@ -128,7 +128,7 @@ async def _step(
 
 
 def _envelope(settings: HealthSettings) -> dict[str, float | None]:
-    """What every tool's settings have in common, as numbers."""
+    """Limits and options that the settings of all tools share."""
     return {
         "travel_limit": settings.travel_limit,
         "speed_limit": settings.speed_limit,
@@ -148,6 +148,6 @@ TOOL = Tool(
     reevaluate=reevaluate,
     report=report,
     texts=TEXTS,
-    # What was concluded from its measurements is not the conclusion of the whole.
+    # The results of the single measurements are not results of the health check.
     parts=lambda result: {"health": result},
 )

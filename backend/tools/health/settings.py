@@ -1,4 +1,4 @@
-"""Which measurements a health check makes, and how often."""
+"""Settings of a health check: which measurements, and how often."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from backend.tools.tool import ToolSettings
 
 
 class HealthSettings(ToolSettings):
-    """One envelope for all measurements; two results compare only with equal settings.
+    """One envelope for all measurements; results are comparable only with equal settings.
 
-    The time limit is that of each measurement.
+    The time limit applies to each measurement.
     """
 
     rounds: int = Field(default=2, ge=1, le=10, description="how often everything is measured")

@@ -1,4 +1,4 @@
-"""The words of a health check, English and Chinese, and what a report shows of it."""
+"""Texts of a health check, English and Chinese, and its section of a report."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ TEXTS: dict[str, tuple[str, str]] = {
 
 
 def report(result: HealthResult) -> Section:
-    """Every quantity of every round, and what had no answer."""
+    """Every quantity of every round, and the missing ones."""
     notes = [Note("measured", values={"rounds": str(len(result.rounds))})]
     rows = []
     for index, one in enumerate(result.rounds, 1):

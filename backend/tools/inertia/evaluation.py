@@ -1,4 +1,4 @@
-"""What recorded moves say of inertia and friction; works on recordings that were kept, too."""
+"""Inertia and friction from recorded moves; also works on stored recordings."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class InertiaSettings:
     """Scheme and limits.
 
     ``envelope`` bounds every move; its travel counts from the start (free), or is the longest
-    way that the search for an end may go (limited). ``ends_rev`` are taught ends in the axis'
-    own position. ``search_torque_percent`` and ``search_speed_rpm`` are for the search.
+    distance that the search for an end may move (limited). ``ends_rev`` are taught ends in the
+    axis' own position. ``search_torque_percent`` and ``search_speed_rpm`` apply to the search.
     """
 
     envelope: Envelope
@@ -46,7 +46,7 @@ class InertiaSettings:
 
 @dataclass(frozen=True)
 class InertiaOutcome:
-    """The regression's answer, how it was made, and where the ends are, if any (rev)."""
+    """Result of the regression, its method, and the ends of the travel, if any [rev]."""
 
     result: InertiaResult
     method: str
@@ -54,11 +54,15 @@ class InertiaOutcome:
     ends_rev: tuple[float, float] | None
     motion_s: float
     ratio_against: RatioReference | None
-    """What the inertia ratio compares with, as text; empty where there is no ratio."""
+    """Reference of the inertia ratio; None where there is no ratio."""
 
 
 def evaluate(recording: Recording, settings: InertiaSettings, facts: AxisFacts) -> InertiaResult:
-    """The regression; also works on a recording that was kept."""
+    """Evaluate a recording by regression; also a stored one.
+
+    Raises:
+        NotAllowed: the moves are too short to be evaluated.
+    """
     try:
         found = estimate_inertia(
             recording.torque_nm,
@@ -83,7 +87,7 @@ def evaluate(recording: Recording, settings: InertiaSettings, facts: AxisFacts) 
 
 
 def uncertainty_of(result: InertiaResult) -> float:
-    """Half the interval of the inertia as a share of it; infinite where it is not identified."""
+    """Half the relative interval of the inertia; infinite where it is not identified."""
     inertia = result.inertia_kgm2
     if not result.identifiable:
         return float("inf")
@@ -91,11 +95,10 @@ def uncertainty_of(result: InertiaResult) -> float:
 
 
 def oscillation_hz(recording: Recording, result: InertiaResult) -> float | None:
-    """Where the torque swings compared with what inertia and friction explain; None where it hardly
-    does.
+    """Frequency of a torque oscillation that inertia and friction do not explain; else None [Hz].
 
-    Under its speed loop the motor follows and the load swings behind the coupling, at the
-    mechanics' antiresonance.
+    Under the speed loop the motor follows its setpoint, and the load oscillates behind the coupling
+    at the antiresonance of the mechanics.
     """
     if not np.isfinite(result.inertia_kgm2.value) or result.r2 > threshold.EXPLAINED:
         return None
@@ -117,12 +120,12 @@ def oscillation_hz(recording: Recording, result: InertiaResult) -> float | None:
 
 
 def _reference_inertia(facts: AxisFacts) -> float | None:
-    """The motor's inertia, or in its place what the drive holds as inertia."""
+    """The motor's inertia, or if unknown the inertia stored in the drive."""
     return facts.motor_inertia_kgm2 or facts.drive_inertia_kgm2
 
 
 def ratio_against(facts: AxisFacts, settings: InertiaSettings) -> RatioReference | None:
-    """What the inertia ratio compares with; None where there is no ratio."""
+    """Reference of the inertia ratio; None where there is no ratio."""
     if settings.motor_inertia_kgm2:
         return "given"
     if facts.motor_inertia_kgm2:
@@ -135,7 +138,7 @@ def ratio_against(facts: AxisFacts, settings: InertiaSettings) -> RatioReference
 def raw_of(
     recording: Recording, settings: InertiaSettings, facts: AxisFacts
 ) -> tuple[dict[str, npt.NDArray[np.generic]], dict[str, object]]:
-    """Arrays and facts from which `reevaluate` makes the same answer again."""
+    """Arrays and facts from which `reevaluate` reproduces the result."""
     return recording.arrays(), {
         "tool": "inertia",
         "sample_rate_hz": recording.sample_rate_hz,
@@ -145,7 +148,7 @@ def raw_of(
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> InertiaAnswer:
-    """The answer again, from kept raw data.
+    """Evaluate stored raw data again.
 
     Raises:
         ValueError: not the raw data of an inertia measurement.
@@ -179,7 +182,7 @@ def reevaluate(arrays: Arrays, meta: Meta) -> InertiaAnswer:
 
 
 def answer_of(outcome: InertiaOutcome) -> InertiaAnswer:
-    """The result as page, report, files and command line have it."""
+    """The result in the form that page, report, files and command line use."""
     r = outcome.result
     parts: dict[str, Interval] = {
         "inertia_kgm2": r.inertia_kgm2,

@@ -1,4 +1,4 @@
-"""The moves from which inertia and friction are found, made by the speed loop of the axis."""
+"""Moves for the identification of inertia and friction, made under the speed loop."""
 
 from __future__ import annotations
 
@@ -40,23 +40,23 @@ BRAKE_WAIT_S = threshold.BRAKE_WAIT_S
 
 @dataclass(frozen=True)
 class Shape:
-    """How gently the moves begin and end."""
+    """Duration of the ramps and of the smoothing of the moves."""
 
     ramp_s: float = threshold.RAMP_S
     smoothing_s: float = threshold.SMOOTHING_S
 
     @staticmethod
     def against(swing_hz: float) -> Shape:
-        """A mean over one whole swing does not excite it (a finite-impulse input shaper)."""
+        """Shape with a mean over one period of the oscillation, which does not excite it."""
         period_s = 1.0 / swing_hz
         return Shape(max(threshold.RAMP_S, 3.0 * period_s), max(threshold.SMOOTHING_S, period_s))
 
 
 @dataclass(frozen=True)
 class FirstLook:
-    """About how heavy the axis is, and what share of a short way its speed loop followed.
+    """Rough mechanics of the axis, and the share of a short move that its speed loop followed.
 
-    ``loop``: its gains, where they explain the torque of that move.
+    ``loop``: the gains of the loop, where they explain the torque of that move.
     """
 
     rough: RoughFit
@@ -75,9 +75,9 @@ async def speed_move(
     torque_nm: npt.NDArray[np.float64] | None = None,
     also: Sequence[str] = (),
 ) -> Recording:
-    """Enable, play a speed profile, brake, disable; ``torque_nm`` [n] is sent ahead of the loop.
+    """Enable, play a speed profile, brake, disable; ``torque_nm`` [n] is added as torque offset.
 
-    ``also`` are keys of further signals that are recorded.
+    ``also`` are the keys of further signals to record.
     """
     units = await axis.units()
     values = np.round(speed_rpm * (units.velocity_raw(1e6) / 1e6)).astype(np.int64)
@@ -107,7 +107,7 @@ async def first_look(
     home_raw: int,
     ends: tuple[float, float] | None,
 ) -> FirstLook:
-    """A short move forth and back: does it move at all, and how heavy is it about?
+    """Make a short reciprocating move: checks that the axis moves, and estimates its inertia.
 
     Raises:
         NotAllowed: it hardly moves, it moves the wrong way, or it takes too much torque.
@@ -129,7 +129,8 @@ async def first_look(
         peak = float(np.max(np.abs(recording.torque_nm))) / facts.rated_torque_nm
         if moved >= threshold.FOLLOWED * aim:
             break
-        # Should it follow all at once, twice the way must still be permitted, and twice the torque.
+        # Should the loop follow fully next time, twice the travel and torque must still be
+        # permitted.
         way_rev = 2.0 * float(np.sum(np.abs(speed))) / rate / 60.0
         cramped = (
             way_rev > 0.8 * envelope.travel_rev or 2.0 * float(np.max(np.abs(speed))) > highest_rpm
@@ -165,9 +166,10 @@ async def _first_move(
     facts: AxisFacts,
     speed_rpm: npt.NDArray[np.float64],
 ) -> Recording:
-    """The move; once more after a wait where the axis stood at its beginning.
+    """Make the move; repeat it after a wait where the axis did not move at its beginning.
 
-    A brake that opens some 100 ms after Operation enabled holds it meanwhile, and no bit shows.
+    A holding brake that opens some 100 ms after Operation enabled blocks the axis until then, and
+    no status bit shows it.
     """
     start = await axis.position_raw()
 
@@ -199,16 +201,16 @@ async def _first_move(
             raise
         raise _too_heavy(axis, error) from error
     if stood:
-        # It stands for another reason, such as friction: no later motion has to wait.
+        # Another cause, such as friction, holds it: no later motion needs to wait.
         axis.brake_wait_s = 0.0
     return recording
 
 
 def _stood(recording: Recording, speed_rpm: npt.NDArray[np.float64]) -> bool:
-    """Whether the axis had not begun to move when a tenth of its way was demanded.
+    """Whether the axis had not begun to move when a tenth of its travel was demanded.
 
-    A loop that is too soft to follow may look like it: the move is made again after a wait then,
-    shows the same, and no later motion waits.
+    A loop that is too soft to follow may look the same: the repeated move after a wait then shows
+    it again, and no later motion waits.
     """
     demanded = np.abs(np.cumsum(speed_rpm)) / 60.0 / recording.sample_rate_hz
     begun = int(np.argmax(demanded >= threshold.BEGUN * np.max(demanded)))
@@ -232,9 +234,9 @@ async def identification_moves(
     shape: Shape,
     reported: Callable[[float], None],
 ) -> Recording:
-    """The identification moves; weaker ones where the loop answers with too much torque.
+    """Make the identification moves; weaker ones where the loop takes too much torque.
 
-    What a soft loop will take is expected from the first look, so that this is seldom seen.
+    The torque of a soft loop is predicted from the first look, so that this is rarely needed.
     """
     envelope = settings.envelope
     room = replace(envelope, travel_rev=min(envelope.travel_rev, travel_rev * 1.15))
@@ -270,7 +272,7 @@ async def identification_moves(
 def _bearable(
     planned: Callable[[float], _Moves], look: FirstLook, permitted_nm: float, can: bool
 ) -> tuple[float, bool]:
-    """How strong the moves may be for this loop, and whether torque is to be sent ahead of it."""
+    """Strength of the moves that this loop permits, and whether to add a torque offset."""
     ahead = can and look.followed < threshold.FOLLOWS_WELL
     if look.loop is None:
         return 1.0, ahead
@@ -294,7 +296,7 @@ def _takes_torque_ahead(axis: Axis, session: CyclicSession) -> bool:
 
 @dataclass(frozen=True)
 class _Moves:
-    """What is played, and the torque [n] that a rigid axis needs for it, but for a pull."""
+    """Setpoints, and the torque [n] that a rigid axis needs for them, without static torque."""
 
     speed_rad_s: npt.NDArray[np.float64]
     torque_nm: npt.NDArray[np.float64]
@@ -311,16 +313,16 @@ def _moves(
     shape: Shape,
     share: float,
 ) -> _Moves:
-    """The moves with this share of the torque that goes into acceleration.
+    """Plan the moves with this share of the torque that is available for acceleration.
 
     Raises:
-        OutOfRange: the envelope does not allow it.
+        OutOfRange: the envelope does not allow them.
     """
     envelope, rate = settings.envelope, 1.0 / cycle_s(session)
     friction = rough.coulomb_nm + abs(rough.gravity_nm)
     torque = envelope.torque_percent / 100.0 * facts.rated_torque_nm
     speed = 0.8 * envelope.speed_rpm * _TURN / 60.0
-    # As gentle as ramps of this length are, but well above friction.
+    # As gentle as ramps of this length allow, but well above friction.
     gentle = max(rough.inertia_kgm2 * speed / shape.ramp_s, 4.0 * rough.coulomb_nm)
     wanted = friction + share * (min(0.7 * torque, friction + gentle / 0.7) - friction)
     try:

@@ -1,7 +1,7 @@
-"""A first careful look at an axis: does it move, which way, and how heavy is it about?
+"""First careful test of an axis: whether and which way it moves, and its rough inertia.
 
-A small torque doublet, doubled until the axis moves well, gives inertia and friction to within
-some ten per cent: enough to scale an excitation, not a result.
+A small torque doublet, doubled until the axis moves well, yields inertia and friction to within
+some ten per cent: enough to scale an excitation, but not a result.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ PULLED = threshold.PULLED
 
 @dataclass(frozen=True)
 class Probed:
-    """Rough values: kg·m² and Nm."""
+    """Rough values [kg·m², Nm]."""
 
     inertia_kgm2: float
     coulomb_nm: float
@@ -48,13 +48,13 @@ class Probed:
 
 
 async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -> float:
-    """Mean torque in Nm that the speed loop needs to hold the axis; nothing is commanded.
+    """Mean torque [Nm] with which the speed loop holds the axis at standstill.
 
-    A load that this shows would fall as soon as the loop is open.
+    A load with a static torque would fall as soon as the loop is opened.
 
     Raises:
-        NotAllowed: the axis does not stand still under its speed loop.
-        Interrupted: it is not held by it.
+        NotAllowed: the axis oscillates under its speed loop.
+        Interrupted: the speed loop does not hold it.
     """
     units, drive = await axis.units(), axis.drive
     key, speed = drive.require("torque_actual"), drive.require("velocity_actual")
@@ -64,7 +64,8 @@ async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -
         readings = [await drive.read_many([key, speed]) for _ in range(threshold.READINGS)]
         passed_s = time.monotonic() - began_s
         moved_rev = units.position(await axis.position_raw() - began_raw)
-        # A disabled drive has no torque: a load that it held would seem to pull nothing, and fall.
+        # A disabled drive reports no torque: a load on its brake would seem to need none, and would
+        # fall.
         await require_enabled(axis)
     raws = [(_integer(r[key].raw), _integer(r[speed].raw)) for r in readings]
     torque = np.array([units.torque(t) for t, _ in raws])
@@ -81,7 +82,7 @@ async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -
         )
     if abs(float(np.mean(turning))) > threshold.FALLING_RPM:
         if abs(moved_rev) * 60.0 < threshold.FALLING_RPM * passed_s:
-            # It turns and stays where it is: an oscillation whose readings meet one phase of it.
+            # Speed without travel: an oscillation that the readings sample at one phase.
             raise NotAllowed(
                 "inertia.not-stand-still-under",
                 drive=drive.name,
@@ -105,16 +106,15 @@ async def probe_axis(
     axis: Axis, session: CyclicSession, envelope: Envelope, facts: AxisFacts, home_raw: int,
     inertia_kgm2: float | None = None, *, moved_before: bool = False,
 ) -> Probed:  # fmt: skip
-    """Feel the axis in CST, from 2 % of rated torque upwards.
+    """Test the axis in CST, from 2 % of rated torque upwards.
 
-    ``moved_before``: moves have shown whether a brake opens late (`Axis.brake_wait_s`).
-
-    Where its inertia is known, from half of the torque that moves it well without any friction,
-    but of a quarter of the permitted one at most.
+    ``moved_before``: earlier moves have shown whether a brake opens late (`Axis.brake_wait_s`).
+    With a known inertia, the test begins at half of the torque that would move it well without
+    friction, but at no more than a quarter of the permitted torque.
 
     Raises:
-        NotAllowed: it does not move with the permitted torque, or it moves the wrong way, or it
-            left the envelope.
+        NotAllowed: it does not move with the permitted torque, it moves the wrong way, or it left
+            the envelope.
     """
     units, drive = await axis.units(), axis.drive
     rated, rate = facts.rated_torque_nm, 1.0 / cycle_s(session)
@@ -124,13 +124,13 @@ async def probe_axis(
     enough = min(threshold.ENOUGH_RAD_S, 0.4 * envelope.speed_rpm * _TURN / 60.0)
     first = threshold.FIRST_SHARE * rated
     if inertia_kgm2 is not None:
-        # A quarter of the doublet is half a sine: its torque lasts 2/π of its time.
+        # A quarter of the doublet is half a sine: its mean torque is 2/π of its peak.
         needed = enough * inertia_kgm2 / (2.0 / np.pi * threshold.DURATION_S / 4.0)
         first = max(first, min(0.5 * needed, 0.25 * highest))
     peak = min(first, highest)
     waited = moved_before
     async with enabled(axis, session, Mode.CST):
-        # Of the time that a brake may take, the first sequence is a part.
+        # The first sequence counts towards the time that a brake may take to open.
         open_s = time.monotonic() + threshold.BRAKE_S
         while True:
             values = excite.probe(rate, peak, threshold.DURATION_S, step)
@@ -142,14 +142,15 @@ async def probe_axis(
             if moved >= enough or peak >= highest:
                 break
             if moved < threshold.STOOD * enough and not waited:
-                # A brake that opens late must not let go of an axis under ever more torque.
+                # A brake that opens late must not release an axis under ever more torque.
                 waited = True
-                # The last setpoint, no torque, is renewed: unrenewed it would expire and disable.
+                # Repeat the last setpoint, zero torque: otherwise it would expire and disable the
+                # axis.
                 await dwell(axis, session, max(open_s - time.monotonic(), 0.0))
                 continue
-            # Doubling brings a free axis to the wanted speed without ever jumping past it.
+            # Doubling brings a free axis to the wanted speed without overshooting it far.
             peak = min(2.0 * peak, highest)
-    # An encoder shows a twisting shaft or play in a brake; a turning axis is another matter.
+    # A twisting shaft or backlash in a brake moves the encoder a little; a turning axis moves more.
     if moved < threshold.STOOD * enough:
         raise NotAllowed(
             "inertia.not-move-rated-torque",
@@ -171,10 +172,10 @@ def _judged(name: str, recording: Recording, rated_nm: float) -> Probed:
 
 
 def require_right_sign(name: str, recording: Recording) -> None:
-    """From rest to rest and back to where it began a motor can only lose energy, to friction.
+    """Check the signs: between two standstills at one position, a motor can only lose energy.
 
     Raises:
-        NotAllowed: torque and speed say that it gained some: one of them has the wrong sign.
+        NotAllowed: torque times speed shows a gain: one of them has the wrong sign.
     """
     power = (recording.torque_nm * recording.velocity_rad_s)[recording.valid]
     if float(np.sum(power)) < -threshold.GAINED * float(np.sum(np.abs(power))):
@@ -187,7 +188,7 @@ def _wrong_sign(name: str) -> NotAllowed:
 
 @dataclass(frozen=True)
 class RoughFit:
-    """Least squares of T = J·a + Tc·sign(v) + Tg."""
+    """Least-squares fit of T = J·a + Tc·sign(v) + Tg [kg·m², Nm, Nm]."""
 
     inertia_kgm2: float
     coulomb_nm: float
@@ -197,10 +198,10 @@ class RoughFit:
 def smoothed(
     signal: npt.NDArray[np.float64], valid: npt.NDArray[np.bool_], rate: float
 ) -> npt.NDArray[np.float64]:
-    """Mean [n] over 20 ms around each sample, of those that arrived.
+    """Mean [n] over 20 ms around each sample, of the valid samples.
 
-    Signals that are smoothed alike still fit each other; the steps of a coarse encoder, which are
-    no acceleration, mostly go.
+    Signals smoothed in the same way stay consistent; the steps of a coarse encoder, which are no
+    acceleration, mostly vanish.
     """
     window = np.ones(2 * round(0.5 * threshold.SMOOTHED_S * rate) + 1)
     taken = np.convolve(np.where(valid, signal, 0.0), window, "same")
@@ -213,7 +214,7 @@ def rough_fit(
     rate: float,
     valid: npt.NDArray[np.bool_],
 ) -> RoughFit:
-    """Momentum instead of acceleration: ∫T = J·Δv + Tc·∫sign(v) + Tg·t, over each moving stretch.
+    """Fit momentum instead of acceleration: ∫T = J·Δv + Tc·∫sign(v) + Tg·t, per moving stretch.
 
     Integrals need no derivative of a quantised speed.
     """
@@ -225,7 +226,7 @@ def rough_fit(
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
         if end - begin < 6:
             continue
-        # Several intervals within a stretch: a whole stretch begins and ends at the same speed.
+        # Several intervals within a stretch: over a whole stretch, the speed change is zero.
         points = np.unique(np.linspace(begin, end - 1, 7).astype(int))
         for a, b in itertools.pairwise(points):
             between = slice(a, b)

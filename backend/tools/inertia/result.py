@@ -1,4 +1,4 @@
-"""What an inertia measurement concludes; SI units at the motor shaft, where ``unit`` says so."""
+"""Result of an inertia measurement; in SI units at the motor shaft, where ``unit`` is SI."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ Reason = Literal[
     "at-limit", "one-direction", "too-little-acceleration", "torque-opposes-acceleration",
     "negative-friction", "does-not-follow", "backlash", "below-motor-inertia", "too-few-samples",
 ]  # fmt: skip
-"""Why data do not support an answer."""
+"""Why the data do not support a result."""
 RatioReference = Literal["given", "drive", "stored"]
-"""A motor inertia that was given, that the drive reports, or the inertia stored in the drive."""
+"""Motor inertia that was given, that the drive reports, or the inertia stored in the drive."""
 
 _REASONS: dict[Reason, Text] = {
     "at-limit": text("inertia.at-limit"),
@@ -37,7 +37,7 @@ _REFERENCES: dict[RatioReference, Text] = {
 
 
 def verdict_of(reasons: Iterable[Reason]) -> Text:
-    """Why an inertia is not identified."""
+    """Text of the reasons why an inertia is not identified."""
     return joined([_REASONS[each] for each in reasons], "\n")
 
 
@@ -54,7 +54,7 @@ class InertiaIntervals(BaseModel):
 
 
 class InertiaAnswer(ToolResult):
-    """Values are None where they are not finite; they count only where ``identifiable``."""
+    """Result; values are None where not finite, and valid only where ``identifiable``."""
 
     tool: Literal["inertia"] = "inertia"
     method: str
@@ -88,7 +88,7 @@ class InertiaAnswer(ToolResult):
     def in_language(self, language: Language) -> Self:
         """With `verdict` and `load_ratio_against` in this language.
 
-        A result of an older version has the words alone, and keeps them.
+        A result of an older version contains only the texts, and keeps them.
         """
         changed: dict[str, str] = {}
         if self.reasons:

@@ -1,8 +1,8 @@
 """Inertia and friction from moves made by the host over cyclic process data.
 
-The axis is moved forth and back by its speed loop (CSV, which even a badly tuned axis follows),
-torque and speed are recorded with every cycle, and a regression finds J, friction and gravity.
-Three schemes: *free*, *limited* with the ends found at limited torque, and *taught* ends.
+The speed loop makes reciprocating moves (in CSV, which even a badly tuned axis follows), torque and
+speed are recorded in every cycle, and a regression yields J, friction and gravity. Three schemes:
+*free*, *limited* with the ends found at limited torque, and *taught* ends.
 """
 
 from __future__ import annotations
@@ -52,12 +52,13 @@ async def inertia(
     keep: Keep | None = None,
     repeats: Repeats | None = None,
 ) -> InertiaOutcome:
-    """Measure; the axis ends where it began, with its settings as they were.
+    """Measure; the axis ends where it began, with its settings restored.
 
-    ``repeats`` bounds when a load that swings may be moved a second time; without it always.
+    ``repeats`` limits the time for a second move with an oscillating load; without it, that move is
+    always made.
 
     Raises:
-        OutOfRange: settings that make no sense; nothing has moved.
+        OutOfRange: invalid settings; nothing has moved.
         NotAllowed: the envelope, an end or a fault ended it, or it cannot move; states the reason.
     """
     _check(settings)
@@ -100,8 +101,7 @@ async def inertia(
     if swing_hz is not None and (repeats or Repeats()).allow(
         threshold.GENTLY * played_s + threshold.AROUND_S
     ):
-        # A load that swings in another way than couplings let it is moved again so that it does
-        # not.
+        # Repeat with a shape that does not excite the oscillation of the load.
         gentle = Shape.against(swing_hz)
         reported = share(progress, 0.66, 0.9, text("inertia.once-more-gently", swing_hz=swing_hz))
         rough = look.rough
@@ -111,7 +111,8 @@ async def inertia(
         again = await identification_moves(
             axis, session, settings, facts, better, travel, gentle, reported
         )
-        # Too short a travel leaves too little of a gentle move: the first answer stays.
+        # With short travel, a gentle move may contain too little to evaluate: the first result
+        # stays.
         with contextlib.suppress(NotAllowed):
             calm = await asyncio.to_thread(evaluate, again, settings, facts)
             if uncertainty_of(calm) < uncertainty_of(result):
@@ -141,7 +142,7 @@ def _check(settings: InertiaSettings) -> None:
 def _where(
     settings: InertiaSettings, ends: tuple[float, float] | None, home_rev: float
 ) -> tuple[float, float]:
-    """Travel of the moves and where they begin, in rev."""
+    """Travel of the moves and their start [rev]."""
     if ends is None:
         return settings.envelope.travel_rev, home_rev
     margin = min(threshold.END_MARGIN_REV, 0.15 * (ends[1] - ends[0]))
@@ -150,14 +151,14 @@ def _where(
 
 
 def _wide(settings: InertiaSettings, ends: tuple[float, float] | None) -> Envelope:
-    """For positioning between the ends: the whole span is known to be free."""
+    """Envelope for positioning between the ends: the whole span is known to be free."""
     if ends is None:
         return settings.envelope
     return replace(settings.envelope, travel_rev=ends[1] - ends[0])
 
 
 async def run(run: Run, request: InertiaRequest) -> InertiaAnswer:
-    """As `inertia`, for the descriptor."""
+    """Run `inertia` for the descriptor."""
     return answer_of(
         await inertia(run.axis, run.session, request.inner, run.progress, run.keep, run.repeats)
     )

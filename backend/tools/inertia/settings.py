@@ -1,4 +1,4 @@
-"""What an inertia measurement may be asked for."""
+"""Settings of an inertia measurement."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from backend.tools.tool import Option, ToolSettings
 
 
 class InertiaRequest(ToolSettings):
-    """Inertia and friction."""
+    """Settings of an inertia and friction measurement."""
 
     scheme: Scheme = Field(default="free", description="how the axis may travel")
     ends_rev: Annotated[tuple[float, float] | None, Option(("--end-low-rev", "--end-high-rev"))] = (
@@ -28,7 +28,7 @@ class InertiaRequest(ToolSettings):
 
     @property
     def inner(self) -> InertiaSettings:
-        """The same for the tool's own layers."""
+        """The same settings for the tool's inner layers."""
         return InertiaSettings(
             self.envelope, self.scheme, self.ends_rev, self.search_torque, self.search_speed,
             self.repetitions, self.rated_torque_nm, self.motor_inertia_kgm2,

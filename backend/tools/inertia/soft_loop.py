@@ -1,8 +1,8 @@
-"""What a speed loop does with a load that it was never tuned for: how much torque a move takes.
+"""Torque that a move takes under a speed loop that was not tuned for the load.
 
-A loop that is soft for its load lags, then swings and asks for far more torque than the move
-itself. Its two gains are read from a first short move (torque over error of speed and its
-integral), and a move is tried on them before it is made.
+A loop that is soft for its load lags, then oscillates and takes far more torque than the move
+itself. Its two gains are identified from a first short move (torque over speed error and its
+integral), and a move is simulated with them before it is made.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class SoftLoop:
-    """Proportional gain Nm·s/rad and integral gain Nm/rad of a speed loop."""
+    """Proportional gain [Nm·s/rad] and integral gain [Nm/rad] of a speed loop."""
 
     proportional: float
     integral: float
@@ -28,9 +28,9 @@ class SoftLoop:
     def peak_nm(
         self, needed_nm: FloatArray, ahead_nm: FloatArray, inertia_kgm2: float, rate_hz: float
     ) -> float:
-        """Highest torque of a move that needs ``needed_nm`` [n] to be followed exactly.
+        """Highest torque of a move that needs ``needed_nm`` [n] to be followed exactly [Nm].
 
-        ``ahead_nm`` [n] is what is sent ahead of the loop; the axis is assumed to be rigid.
+        ``ahead_nm`` [n] is sent as torque offset; the axis is assumed to be rigid.
         """
         above = [self.proportional, self.integral]
         below = [inertia_kgm2, self.proportional, self.integral]
@@ -46,7 +46,7 @@ def soft_loop_of(
     valid: npt.NDArray[np.bool_],
     rate_hz: float,
 ) -> SoftLoop | None:
-    """The gains that explain the torque of a move best; None where none do, as of a stiff loop."""
+    """Gains that best explain the torque of a move; None where none do, as with a stiff loop."""
     error = wanted_rad_s - velocity_rad_s
     best, found = threshold.EXPLAINED, None
     for late in range(threshold.LATEST):

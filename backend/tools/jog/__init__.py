@@ -1,1 +1,1 @@
-"""Hold-to-run jog, on cyclic buses and by a moving profile-position target."""
+"""Hold-to-run jog: on cyclic buses, and by a moving target in profile position mode."""

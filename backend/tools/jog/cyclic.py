@@ -1,7 +1,7 @@
 """Motion with one setpoint per cycle: jog, and the signal generator for CSP, CSV and CST.
 
-A trajectory is computed beforehand and checked against the envelope; the loop plays it, watches
-the envelope every cycle, and brakes by itself when the renewals stop.
+A trajectory is computed beforehand and checked against the envelope; the cyclic loop plays it,
+monitors the envelope in every cycle, and brakes by itself when the renewals stop.
 """
 
 from __future__ import annotations
@@ -57,10 +57,10 @@ class GeneratorSettings:
 
 
 def signal(settings: GeneratorSettings, cycle_s: float) -> Signal:
-    """The test signal, shape [n], in the unit of the amplitude; begins and ends at zero.
+    """The test signal [n] in the unit of the amplitude; it begins and ends at zero.
 
     Raises:
-        OutOfRange: duration or frequencies that make no sense at this cycle time.
+        OutOfRange: the duration or a frequency is not possible at this cycle time.
     """
     if not 0 < settings.duration_s <= threshold.MAX_S:
         raise OutOfRange(
@@ -97,13 +97,13 @@ def signal(settings: GeneratorSettings, cycle_s: float) -> Signal:
 
 
 def _trapezoid(settings: GeneratorSettings, t: Signal) -> Signal:
-    """Up to the amplitude and back: a linear ramp, or a move with limited speed change."""
+    """Up to the amplitude and back: a linear ramp, or a move with limited acceleration."""
     size, half = abs(settings.amplitude), settings.duration_s / 2
     sign = math.copysign(1.0, settings.amplitude)
     mirrored = np.where(t <= half, t, settings.duration_s - t)
     if settings.shape == "ramp":
         return sign * np.minimum(settings.acceleration * mirrored, size)
-    # Fastest move of this size: accelerate, then brake (CSP); for CSV and CST a limited slope.
+    # In CSP the fastest move of this size: accelerate, then brake. In CSV and CST a limited slope.
     if settings.mode != "CSP":
         return sign * np.minimum(settings.acceleration * mirrored, size)
     turn = math.sqrt(size / settings.acceleration)
@@ -121,7 +121,7 @@ def _fade(t: Signal, duration_s: float) -> Signal:
 
 
 def _chirp_phase(settings: GeneratorSettings, t: Signal) -> Signal:
-    """Logarithmic chirp (constant time per octave)."""
+    """Phase [rad] of a logarithmic chirp (constant time per octave)."""
     ratio = settings.frequency_end_hz / settings.frequency_hz
     if ratio == 1.0:
         return 2 * math.pi * settings.frequency_hz * t
@@ -135,8 +135,8 @@ async def generate(
     """Play a test signal once.
 
     Raises:
-        OutOfRange: the signal leaves the envelope; nothing has moved.
-        NotAllowed: the loop ended the motion; the reason is as text.
+        OutOfRange: the signal exceeds the envelope; nothing has moved.
+        NotAllowed: the loop ended the motion; states the reason.
     """
     units, drive = await axis.require_certain_scales(), axis.drive
     cycle_s = _cycle(session)
@@ -187,10 +187,11 @@ def _require_inside(drive: Drive, settings: GeneratorSettings) -> None:
 async def jog_cyclic(
     axis: Axis, session: CyclicSession, settings: JogSettings, hold: Hold, progress: Progress
 ) -> JobResult:
-    """Hold-to-run jog in CSP: a trapezoid to the travel limit, left early on release.
+    """Hold-to-run jog in CSP: a trapezoid up to the travel limit, ended early on release.
 
     Raises:
         NotAllowed: as `generate`.
+        LinkTimeout: no standstill after the jog.
     """
     units, drive = await axis.require_certain_scales(), axis.drive
     cycle_s = _cycle(session)
@@ -205,7 +206,8 @@ async def jog_cyclic(
         station = session.station(drive)
         target = address_of(drive.profile.by_role["position_target"])
         limits = await _limits(axis, envelope, start)
-        # Enabling takes longer than a button may be held: released meanwhile, nothing moves.
+        # Enabling may take longer than the button is held: if it was released meanwhile, nothing
+        # moves.
         if reason := await _alive(axis, session, hold):
             return end_of(reason, 0.0)
         progress(0.0, text("jog.moving"))
@@ -222,7 +224,7 @@ async def jog_cyclic(
             await session.cyclic.pause(station)
             if reason := await _alive(axis, session, hold):
                 break
-            # Where its setpoint stands now, which its position is near.
+            # Continue from the present setpoint, which the actual position is close to.
             begin = await drive.raw(drive.require("position_target"))
         await session.cyclic.halt(station)
         if not await axis.standstill(2.0):
@@ -234,7 +236,7 @@ async def jog_cyclic(
 def _run_up_from(
     begin: int, travel_rev: float, settings: JogSettings, units: AxisUnits, cycle_s: float
 ) -> npt.NDArray[np.int64]:
-    """Raw positions of a jog over ``travel_rev`` from the setpoint ``begin``."""
+    """Setpoint positions (raw) of a jog over ``travel_rev`` from the setpoint ``begin``."""
     speed, slope = settings.speed_rpm / 60.0, settings.acceleration_rpm_s / 60.0
     travel = settings.direction * run_up(travel_rev, speed, slope, cycle_s)
     return begin + np.round(travel * units.position_raw(1.0)).astype(np.int64)
@@ -254,7 +256,7 @@ def run_up(travel: float, speed: float, slope: float, cycle_s: float) -> Signal:
 
 
 async def _while_held(axis: Axis, session: CyclicSession, hold: Hold) -> Text | None:
-    """Renew until the hold ends, with the reason, or a gap begins, with none."""
+    """Renew until the hold ends, returning the reason, or until a gap begins, returning None."""
     station = session.station(axis.drive)
     while not (reason := hold.ended()) and not hold.braking():
         await session.cyclic.renew(station)
@@ -264,7 +266,7 @@ async def _while_held(axis: Axis, session: CyclicSession, hold: Hold) -> Text | 
 
 
 async def _alive(axis: Axis, session: CyclicSession, hold: Hold) -> Text | None:
-    """Wait for the end of a gap and for an axis that stands; the reason if the hold ends."""
+    """Wait for the end of a gap and for standstill; the reason if the hold ends meanwhile."""
     station = session.station(axis.drive)
     while not (reason := hold.ended()) and (hold.braking() or _brakes(session, station)):
         _raise_if_ended(axis, session)
@@ -298,10 +300,11 @@ async def play_through(
     duration_s: float,
     progress: Progress,
 ) -> None:
-    """Until the last value is out, which a computer that misses cycles plays later.
+    """Play until the last value is sent, which takes longer where this computer misses cycles.
 
     Raises:
-        NotAllowed: the loop ended it. LinkTimeout: it takes many times as long as it should.
+        NotAllowed: the loop ended it.
+        LinkTimeout: it takes many times as long as it should.
     """
     station = trajectory.station
     await loop.play(session, axis.drive, trajectory, axis.grant())
@@ -323,12 +326,12 @@ async def play_through(
 
 
 def _plays(session: CyclicSession, station: int) -> bool:
-    """Whether values are still to come, where the loop shows."""
+    """Whether values are still to be sent; False where the loop shows no state."""
     return _phase(session, station) is Phase.PLAYING
 
 
 def _brakes(session: CyclicSession, station: int) -> bool:
-    """Whether the loop still ramps down, where it shows."""
+    """Whether the loop is still ramping down; False where it shows no state."""
     return _phase(session, station) is Phase.BRAKING
 
 

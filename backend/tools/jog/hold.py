@@ -1,10 +1,10 @@
 """The held button of a jog: its signs of life, their gaps, and its release.
 
-A sign of life that is missing for `GAP_S` brakes the axis. Where the hold is alive again within
-`RESUME_S` of the gap's begin, and was never released, the axis goes on; later a new press is
-needed. Signs may come late, in bunches or in another order than they were sent: each says when it
-was sent and how long its page had been silent then, so that an old one counts as old, and after a
-gap one sign alone moves nothing: what was sent next to it, a release above all, is read first.
+If no sign of life arrives for `GAP_S`, the axis brakes. If signs arrive again within `RESUME_S` of
+the begin of the gap, and the button was never released, the motion continues; later a new press is
+needed. Signs may arrive late, in bunches or out of order: each contains its time of sending and how
+long its page had been silent by then, so that an old sign counts as old. After a gap, a single sign
+moves nothing: what was sent together with it, above all a release, is processed first.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ _EXPIRED = text("jog.end-no-sign-of-life", silent_ms=1e3 * RESUME_S)
 
 
 class Hold:
-    """The button of the person who jogs. ``clock`` gives monotonic seconds.
+    """Hold state of the button of the person who jogs. ``clock`` returns monotonic seconds.
 
-    ``number`` is the press's, to distinguish its signs from those of an earlier press; signs
-    without one (0) count for any. ``paused`` is called with True when a gap begins and with False
-    when the axis goes on, with the gap's length in s so far.
+    ``number`` is the number of the press, to distinguish its signs from those of an earlier press;
+    signs without one (0) count for any press. ``paused`` is called with True when a gap begins and
+    with False when the motion continues, with the present length of the gap in s.
     """
 
     def __init__(
@@ -38,16 +38,17 @@ class Hold:
         paused: Callable[[bool, float], None] = lambda _braked, _s: None,
     ) -> None:
         self.number = number
-        #: Why it is released; None while the button is held or may still be held.
+        #: Reason of the release; None while the button is held or may still be held.
         self.released: Text | None = None
         self._clock = clock
         self._paused = paused
-        #: When the page was alive last, by this computer's clock.
+        #: Last time at which the page is known to have been alive, by this computer's clock.
         self._alive = clock()
         self._last_number = -1
-        #: Smallest difference of arrival and sending: the way without any delay.
+        #: Smallest difference between arrival and sending: transmission without delay, plus clock
+        #: offset.
         self._way: float | None = None
-        #: The gap that is open: when it began, and the arrival of the first sign that may end it.
+        #: The open gap: its begin, and the arrival of the first sign that may end it.
         self._gap_began: float | None = None
         self._back: float | None = None
 
@@ -60,11 +61,11 @@ class Hold:
         silent_s: float = 0.0,
         pressed: bool = True,
     ) -> None:
-        """A sign of life of press ``number``.
+        """Process a sign of life of press ``number``.
 
-        ``sign`` counts them, ``sent_s`` is when it was sent by the page's own clock, ``silent_s``
-        how long the page itself had given none then. One that says that the button is not
-        ``pressed`` is a release, in whatever order it comes.
+        ``sign`` is its running number, ``sent_s`` its time of sending by the page's own clock,
+        ``silent_s`` how long the page had sent none by then. A sign with ``pressed`` False is a
+        release, in whatever order it arrives.
         """
         if number and number != self.number:
             return
@@ -86,7 +87,7 @@ class Hold:
         if self.released is not None or alive <= self._alive:
             return
         if now - alive > GAP_S:
-            # It proves that the page lived some time ago, and no more.
+            # It proves only that the page was alive some time ago.
             return
         if self._gap_began is not None and self._back is None:
             if alive - self._gap_began > RESUME_S:
@@ -96,20 +97,20 @@ class Hold:
         self._alive = alive
 
     def release(self, reason: Text, number: int = 0) -> None:
-        """The button was let go, or what amounts to it; nothing revives this hold.
+        """Release the button, or end the hold for another reason; it cannot be resumed.
 
-        One of an earlier press (``number``) that comes late is no matter of this one.
+        A late release of an earlier press (``number``) is ignored.
         """
         if not number or not self.number or number >= self.number:
             self.released = self.released or reason
 
     def ended(self) -> Text | None:
-        """Why to stop, or None while the button is held or may still be held."""
+        """Reason to stop; None while the button is held or may still be held."""
         self._look(self._clock())
         return self.released
 
     def braking(self) -> bool:
-        """Whether the axis has to brake and to wait, as a gap is open. Ends a gap that is over."""
+        """Whether the axis must brake and wait because a gap is open; ends a gap that is over."""
         now = self._clock()
         self._look(now)
         if self.released is not None or self._gap_began is None:
@@ -122,7 +123,7 @@ class Hold:
         return True
 
     def _look(self, now: float) -> None:
-        """Open a gap where a sign is missing; end the hold where a gap is too long."""
+        """Open a gap where a sign is overdue; end the hold where the gap is too long."""
         if self.released is not None:
             return
         silent = now - self._alive
@@ -132,7 +133,7 @@ class Hold:
             self._gap_began, self._back = self._alive, None
             self._paused(True, silent)
         elif silent > GAP_S:
-            # What had come back is gone again: the same gap goes on.
+            # Signs that had resumed are missing again: the same gap continues.
             self._back = None
         if self._back is None and now - self._gap_began > RESUME_S:
             self.release(_EXPIRED)

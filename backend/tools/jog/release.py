@@ -1,4 +1,4 @@
-"""Why a button that is held by a person is released, as the page reports it."""
+"""Reasons for the release of a held button, as the page reports them."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ def _known(given: object) -> object:
     return given if isinstance(given, str) and given in _KNOWN else "released"
 
 
-#: A release counts whatever reason comes with it: one that is not known is "released".
+#: A release counts with any reason: an unknown one is treated as "released".
 ReleaseOfPage = Annotated[Release, BeforeValidator(_known)]
 
-#: What a jog shows as its end.
+#: Texts for the end of a jog.
 END_OF_JOG: dict[Release, Text] = {
     "released": text("jog.end-released"),
     "pointer-cancelled": text("jog.end-pointer-cancelled"),
@@ -39,7 +39,7 @@ END_OF_JOG: dict[Release, Text] = {
     "connection-lost": text("jog.end-connection-lost"),
     "stop": text("motion.stop-was-pressed"),
 }
-#: The same of the enabling button, which the person on site holds for a guest.
+#: The same for the enabling button that the person on site holds for a guest.
 END_OF_ENABLING: dict[Release, Text] = {
     **END_OF_JOG,
     "released": text("people.end-enabling-released"),
@@ -49,10 +49,10 @@ END_OF_ENABLING: dict[Release, Text] = {
 
 
 def end_of_jog(release: Release) -> Text:
-    """Why a jog ended whose button was released like this."""
+    """Text for the end of a jog by this release."""
     return END_OF_JOG[release]
 
 
 def end_of_enabling(release: Release) -> Text:
-    """Why a guest may move nothing any more, as the enabling button was released like this."""
+    """Text for the end of a guest's permission to move by this release of the enabling button."""
     return END_OF_ENABLING[release]

@@ -1,8 +1,8 @@
 """Hold-to-run jog as a moving profile-position target.
 
-The links that need it have no watchdog in the drive (architecture: "No open-ended command
-without a watchdog in the drive"). So the target is only ever ``v·T + v²/2a`` ahead of the axis:
-with no renewal, whoever died, the drive's own profile generator brakes and stops there.
+The links that need it have no watchdog in the drive (architecture: "No open-ended command without a
+watchdog in the drive"). Therefore the target is never more than ``v·T + v²/2a`` ahead of the axis:
+without renewal, whichever side fails, the drive's own profile generator brakes and stops there.
 """
 
 from __future__ import annotations
@@ -44,16 +44,16 @@ class JogSettings:
 
     @property
     def lead_rev(self) -> float:
-        """Distance between axis and target: ``v·T + v²/2a`` in revolutions."""
+        """Largest distance from axis to target: ``v·T + v²/2a`` [rev]."""
         speed = self.speed_rpm / 60.0
         return speed * GAP_S + speed**2 / (2.0 * self.acceleration_rpm_s / 60.0)
 
 
 async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress) -> JobResult:
-    """Move while ``hold`` is held; returns why it ended and the distance moved in rev.
+    """Move while ``hold`` is held; returns the reason of the end and the distance moved in rev.
 
     Raises:
-        OutOfRange: a setting that the drive cannot do, before anything moves.
+        OutOfRange: a setting that is not possible on this drive; nothing has moved.
         NotAllowed: the axis cannot be enabled, or left the envelope.
         DriveError: the link failed; the drive stops by itself as described above.
     """
@@ -75,7 +75,7 @@ async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress)
             return end_of(reason, 0.0)
         async with axis.enabled(Mode.PP, envelope):
             start = await axis.position_raw()
-            # Enabling takes longer than the renewal time-out; the page has renewed meanwhile.
+            # Enabling takes longer than the renewal timeout; the page has sent renewals meanwhile.
             progress(0.0, text("jog.moving"))
             reason = await _follow(axis, settings, hold, start)
             stop_time = 1.0 + 2.0 * settings.speed_rpm / settings.acceleration_rpm_s
@@ -85,15 +85,15 @@ async def jog(axis: Axis, settings: JogSettings, hold: Hold, progress: Progress)
 
 
 def end_of(reason: Text, moved_rev: float) -> JobResult:
-    """The result of a jog: why it ended, as a message with its words, and how far it went."""
+    """Result of a jog: why it ended, as code and text, and the distance moved [rev]."""
     return {**sentence("reason", reason), "moved_rev": moved_rev}
 
 
 def require_scale(axis: Axis, units: AxisUnits, settings: JogSettings) -> None:
-    """A jog must know how far a revolution is, and its speed must be one the drive can have.
+    """Check that the scales are known and that the drive can resolve the speed of the jog.
 
     Raises:
-        ScaleUnknown: what a revolution or a speed is, is not certain.
+        ScaleUnknown: the scale of position or speed is not certain.
         OutOfRange: the speed is below the drive's resolution.
     """
     drive = axis.drive
@@ -133,7 +133,7 @@ async def _follow(axis: Axis, settings: JogSettings, hold: Hold, start: int) -> 
         ahead = start + settings.direction * travel
         target = position + settings.direction * lead
         target = min(target, ahead) if settings.direction > 0 else max(target, ahead)
-        # At the end of the drive's number range the axis stops like at a travel limit.
+        # The axis stops at the end of the drive's number range as at a travel limit.
         target = int(
             min(max(target, target if low is None else low), target if high is None else high)
         )
@@ -147,7 +147,7 @@ async def _follow(axis: Axis, settings: JogSettings, hold: Hold, start: int) -> 
             await asyncio.sleep(PERIOD_S)
             continue
         if paused:
-            # Where it halted is a new place to start from: the target of before is old.
+            # Continue from the position where it halted: the previous target is obsolete.
             paused, last_target = False, None
         if target != last_target:
             await drive.command(target_key, target, axis.grant(target_key))

@@ -1,4 +1,4 @@
-"""From recordings of both encoders to the figures. Pure: also works on kept raw data."""
+"""Results for the load side from recordings of both encoders. Pure: also from stored data."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class Sides:
-    """Raw data [n]; ``part`` as `backend.analysis.mechanics.load_side.TwoSides` has it."""
+    """Raw data [n]; ``part`` as in `backend.analysis.mechanics.load_side.TwoSides`."""
 
     sample_rate_hz: float
     position_rad: FloatArray
@@ -33,7 +33,7 @@ class Sides:
     part: npt.NDArray[np.int64]
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
-        """For storage."""
+        """The samples as arrays for storage."""
         return {
             "position_rad": self.position_rad,
             "load_counts": self.load_counts,
@@ -44,13 +44,13 @@ class Sides:
 
 
 def evaluate(data: Sides, settings: LoadSideSettings, facts: AxisFacts) -> LoadSideResult:
-    """The figures of what was recorded.
+    """Evaluate the recordings.
 
     Raises:
-        NotAllowed: the load's position does not follow the motor, or too few samples came.
+        NotAllowed: the load's position does not follow the motor, or too few samples arrived.
     """
     inertia = settings.motor_inertia_kgm2 or facts.motor_inertia_kgm2
-    # A loop answers each setpoint that is held within its cycle, between the samples of the torque.
+    # With held setpoints the loop reacts within each cycle, between the samples of the torque.
     usable = inertia if facts.torque_known and facts.interpolates else None
     sides = TwoSides(
         data.sample_rate_hz,
@@ -95,7 +95,7 @@ def evaluate(data: Sides, settings: LoadSideSettings, facts: AxisFacts) -> LoadS
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> LoadSideResult:
-    """The same again, from kept raw data.
+    """Evaluate stored raw data again.
 
     Raises:
         ValueError: not the raw data of a load side.
@@ -121,7 +121,7 @@ def _estimate(found: Value, factor: float) -> Estimate:
 
 
 def _positive(found: Estimate) -> Estimate:
-    """A figure that cannot lie below 0."""
+    """An estimate of a quantity that cannot be negative."""
     low, high = found.ci95
     return Estimate(value=max(found.value, 0.0), ci95=(max(low or 0.0, 0.0), max(high or 0.0, 0.0)))
 
@@ -132,13 +132,13 @@ def _times(found: Estimate, factor: float) -> Estimate:
 
 
 def _inertia(found: Value, motor_kgm2: float) -> Estimate:
-    """What a catalogue's inertia of the motor may be off by, the load's is off by, too."""
+    """Load inertia; an error of the motor's catalogue inertia adds to its interval."""
     half = math.hypot(found.half, threshold.CATALOGUE * motor_kgm2)
     return _estimate(Value(found.value, half), 1.0)
 
 
 def _stiffness(found: LoadSide, motor_kgm2: float) -> tuple[Estimate | None, float | None]:
-    """J over J/k in Nm/rad of the motor shaft, or what it is at least."""
+    """Stiffness J / (J/k) in Nm/rad at the motor shaft, or its lower bound."""
     if found.load_inertia_kgm2 is None or found.pulled:
         return None, None
     inertia = _inertia(found.load_inertia_kgm2, motor_kgm2)
@@ -160,7 +160,7 @@ def _frequency(twist: Value) -> Estimate:
 
 
 def _orders(found: LoadSide, degrees: float) -> tuple[ErrorOrder, ...]:
-    """Those that are larger than their uncertainty, largest first."""
+    """Orders that are larger than their uncertainty, largest first."""
     shown = [(order, size) for order, size in found.orders if size.value > size.half]
     shown.sort(key=lambda each: -each[1].value)
     return tuple(
@@ -183,7 +183,7 @@ def _findings(
     facts: AxisFacts,
     degrees: float,
 ) -> list[Finding]:
-    """The verdict first, then what cannot be known, and why."""
+    """Findings: the verdict first, then what the data do not show, and why."""
     gap, lost = found.backlash_rad, found.lost_motion_rad
     if gap is None:
         most = max(lost.value + lost.half, 0.0) * degrees

@@ -1,4 +1,4 @@
-"""What both encoders show; angles in degrees at the load, stiffness at the load."""
+"""Result from both encoders; angles in degrees at the load, stiffness at the load."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class _Part(BaseModel):
 
 
 class Estimate(_Part):
-    """A value with its 95 % interval, in the unit that the field's name says."""
+    """A value with its 95 % interval, in the unit of the field's name."""
 
     value: float
     ci95: Interval
@@ -42,7 +42,7 @@ class ErrorOrder(_Part):
 
 
 class Finding(_Part):
-    """What the measurement shows, or cannot show, as a code with the figure that it rests on."""
+    """A result or limitation of the measurement: a code and the figure that it rests on."""
 
     code: Code
     value: float | None = None
@@ -50,8 +50,10 @@ class Finding(_Part):
 
 
 class LoadSideResult(ToolResult):
-    """``lost_motion_deg`` is between slow passes in both directions: backlash and what friction
-    twists. ``backlash_deg`` is the gap alone. Values are None where the data do not show them;
+    """Result of a load-side measurement.
+
+    ``lost_motion_deg`` is the difference of slow passes in both directions: backlash plus the twist
+    by friction. ``backlash_deg`` is the gap alone. Values are None where the data do not show them;
     ``findings`` state why.
     """
 

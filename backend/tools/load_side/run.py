@@ -1,4 +1,4 @@
-"""The moves that show the load side: slow passes, then reciprocating moves."""
+"""Moves of a load-side measurement: slow passes, then reciprocating moves."""
 
 from __future__ import annotations
 
@@ -37,8 +37,10 @@ _TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class Room:
-    """What the moves may use: rev to each side, rev/s, s, and rad/s² beyond friction; and what
-    friction and a pull alone would accelerate, in rad/s²."""
+    """Limits of the moves: rev to each side, rev/s, s, and rad/s² beyond friction.
+
+    ``friction_rad_s2`` is the acceleration that corresponds to friction and static torque.
+    """
 
     travel_rev: float
     speed_rps: float
@@ -49,7 +51,7 @@ class Room:
 
 @dataclass(frozen=True)
 class Plan:
-    """Two sequences: speeds [n] in rpm, and what each sample counts for (see `Sides`)."""
+    """Two sequences: speeds [n] in rpm, and the part that each sample belongs to (see `Sides`)."""
 
     slow_rpm: FloatArray
     slow_part: IntArray
@@ -58,10 +60,10 @@ class Plan:
 
 
 def planned(settings: LoadSideSettings, room: Room, rate: float) -> Plan:
-    """Passes over a load revolution where the travel has room for it, and moves inside them.
+    """Passes over a load revolution where the travel allows it, and moves inside their range.
 
     Raises:
-        OutOfRange: the limits leave no room, or no time, for them.
+        OutOfRange: travel or time does not suffice for them.
     """
     quarter_s, peak_rps = _triangle(room)
     stroke_rev = peak_rps * quarter_s
@@ -92,8 +94,10 @@ def planned(settings: LoadSideSettings, room: Room, rate: float) -> Plan:
 
 
 def _triangle(room: Room) -> tuple[float, float]:
-    """Quarter of a triangle of speed in s, and its peak in rev/s: as long as its acceleration
-    changes the flank against friction."""
+    """Quarter period [s] and peak [rev/s] of a triangle of speed.
+
+    Its acceleration must change the flank of the gear against friction.
+    """
     quarter_s, peak_rps = threshold.QUARTERS_S[-1], 0.0
     for quarter_s in threshold.QUARTERS_S:
         most_rps = min(room.speed_rps, 2.0 * room.travel_rev / quarter_s)
@@ -106,7 +110,7 @@ def _triangle(room: Room) -> tuple[float, float]:
 def _passes(
     range_rev: float, slow_rps: float, fastest_rps: float, rate: float
 ) -> tuple[FloatArray, IntArray]:
-    """Forwards and backwards over the range, about where the axis stands."""
+    """Passes forwards and backwards over the range, centred on the present position."""
     half = _positioning(-0.5 * range_rev, fastest_rps, rate)
     still = np.zeros(round(threshold.DWELL_S * rate))
     n = round(threshold.RAMP_S * rate)
@@ -127,7 +131,7 @@ def _passes(
 
 
 def _moves(peak_rps: float, quarter_s: float, rate: float) -> tuple[FloatArray, IntArray]:
-    """Groups of triangles of speed: ±α while the axis turns forwards, and while backwards."""
+    """Groups of triangles of speed: acceleration ±α while turning forwards, then backwards."""
     n = round(quarter_s * rate)
     ramp = (np.arange(n) + 0.5) / n
     triangle = np.concatenate([ramp, ramp[::-1], -ramp, -ramp[::-1]])
@@ -160,12 +164,12 @@ def _positioning(distance_rev: float, peak_rps: float, rate: float) -> FloatArra
 
 
 async def run(run: Run, settings: LoadSideSettings) -> LoadSideResult:
-    """Measure; the axis ends where it began, with its settings as they were.
+    """Measure; the axis ends where it began, with its settings restored.
 
     Raises:
         NotAllowed: the drive has no second position, it does not come with every cycle or does not
             follow the motor, or the envelope or a fault ended a motion; states why.
-        OutOfRange: the limits leave nothing to measure; nothing has moved but a short first move.
+        OutOfRange: the limits leave nothing to measure; only a short first move was made.
     """
     axis, session, envelope = run.axis, run.session, settings.envelope
     key = await load_position(axis, session)
@@ -194,10 +198,10 @@ async def run(run: Run, settings: LoadSideSettings) -> LoadSideResult:
 
 
 async def load_position(axis: Axis, session: CyclicSession) -> str:
-    """Key of the second position, which must come with every cycle.
+    """Key of the second encoder's position, which must come with every cycle.
 
     Raises:
-        NotAllowed: the drive has none, or it does not fit into the process data.
+        NotAllowed: the drive has none, or it is not in the process data.
     """
     drive = axis.drive
     key = drive.key("load_position")
@@ -214,7 +218,7 @@ async def load_position(axis: Axis, session: CyclicSession) -> str:
 
 
 def _sides(recordings: Sequence[Recording], parts: Sequence[IntArray]) -> Sides:
-    """Both recordings, one behind the other; the load's counter goes on between them."""
+    """Join both recordings; the load encoder's counter continues between them."""
     counts = [recording.also for recording in recordings]
     assert all(each is not None for each in counts), "asked for with the move"
     shown = np.concatenate([each[:, 0] for each in counts if each is not None])

@@ -1,4 +1,4 @@
-"""What a measurement of the load side may be asked with."""
+"""Settings of a load-side measurement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The words of the load side, English and Chinese, and what a report shows of it."""
+"""Texts of the load side, English and Chinese, and its section of a report."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ _TONES: dict[Code, Literal["good", "warn"]] = {
 
 
 def report(result: LoadSideResult) -> Section:
-    """Findings, figures and the error over the angle."""
+    """Findings, figures and the transmission error over the angle."""
     rows = [
         _row("backlash", result.backlash_deg, "°"),
         _row("backlash_motor", result.backlash_motor_rev, "rev"),

@@ -1,1 +1,1 @@
-"""What measuring tools share: waveforms, recording, alignment, repeats."""
+"""Parts that measuring tools share: waveforms, recording, alignment, repeats."""

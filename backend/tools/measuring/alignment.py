@@ -1,8 +1,9 @@
-"""Which row of a sequence each recorded sample belongs to, whatever was lost on the way.
+"""Alignment: the row of a sequence that each recorded sample belongs to, despite losses.
 
-A sample repeats the setpoint that went out next to it. Where cycles are missing between two runs
-of samples, the loop skipped them (the sequence then went on later), or the samples were lost (it
-went on meanwhile), or some of each; and what is lost may be the beginning. The setpoints show.
+Each sample contains a read-back of the setpoint sent in its cycle. Where cycles are missing between
+two runs of samples, the loop skipped them (the sequence then continued later), or the samples were
+lost (it continued meanwhile), or some of each; the losses may be at the beginning. The read-back
+setpoints decide.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from drivers.errors import LinkLost
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 Run: TypeAlias = tuple[int, FloatArray, BoolArray]
-"""Cycles missing before it, samples [n, k], validity [n]."""
+"""Number of missing cycles before it, samples [n, k], validity [n]."""
 
 _IntArray = npt.NDArray[np.int64]
 
@@ -26,13 +27,12 @@ _IntArray = npt.NDArray[np.int64]
 def aligned(
     sent: FloatArray, runs: list[Run], drive: str, *, ended_early: bool = False
 ) -> tuple[FloatArray, BoolArray]:
-    """Rows [n, k] of the recording, row i belonging to row i of ``sent`` [n, m].
+    """Align the runs to the sequence: rows [n, k], row i belonging to row i of ``sent`` [n, m].
 
-    The last m columns of each run repeat the setpoints that went out. Rows next to a gap, rows
-    that were lost and rows whose setpoints differ are not valid. Where the setpoints stand
-    still over a gap and cannot show, the loop is assumed to have skipped the cycles, which is what
-    happens on a computer that is busy. With ``ended_early`` the rows end where the sequence was
-    broken off.
+    The last m columns of each run are the setpoints read back. Rows after a gap, lost rows and rows
+    whose setpoints differ are not valid. Where the setpoints are constant over a gap and cannot
+    decide, the loop is assumed to have skipped the cycles, which is what happens on a busy
+    computer. With ``ended_early`` the rows end where the sequence was aborted.
 
     Raises:
         LinkLost: the sequence cannot be found.
@@ -49,7 +49,7 @@ def aligned(
         high += missing
         if low != high:
             low, high, hits = _places(of_sent, echo, low, high)
-            if not moves:  # nothing shows; it began with the recording
+            if not moves:  # no setpoint changes: assume that the sequence began with the recording
                 low = high
             found = found or hits >= needed
         rows = np.arange(low, low + len(samples))
@@ -68,17 +68,17 @@ def aligned(
 
 
 def _keys(parts: list[FloatArray]) -> list[_IntArray]:
-    """A number for each row [n, m] of each part; equal rows have equal numbers."""
+    """Number for each row [n, m] of each part; equal rows have equal numbers."""
     _, keys = np.unique(np.concatenate(parts), axis=0, return_inverse=True)
     return np.split(keys.reshape(-1), np.cumsum([len(part) for part in parts])[:-1])
 
 
 def _places(sent: _IntArray, echo: _IntArray, low: int, high: int) -> tuple[int, int, int]:
-    """First and last row from ``low`` to ``high`` that the first of ``echo`` may belong to, and
-    how many moved setpoints agree there.
+    """First and last row from ``low`` to ``high`` that the first of ``echo`` may belong to.
 
-    Every setpoint that moved and agrees speaks for a place; every one that differs, and every
-    one that moved before the sequence began or after it ended, speaks against it.
+    The third value is the number of changed setpoints that agree there. Every changed setpoint that
+    agrees counts for a place; every one that differs, and every change before the sequence began or
+    after it ended, counts against it.
     """
     moved = np.diff(echo, prepend=echo[:1]) != 0
     begin = max(0, int(np.argmax(moved)) - 1)
@@ -92,7 +92,7 @@ def _places(sent: _IntArray, echo: _IntArray, low: int, high: int) -> tuple[int,
 def _score(
     sent: _IntArray, echo: _IntArray, moved: BoolArray, places: _IntArray
 ) -> tuple[_IntArray, _IntArray]:
-    """Moved setpoints that agree at each place, and those less what speaks against it."""
+    """Changed setpoints that agree at each place, and their number less the contradictions."""
     hits = np.zeros(len(places), dtype=np.int64)
     against = np.zeros(len(places), dtype=np.int64)
     for offset, (value, moves) in enumerate(zip(echo, moved, strict=True)):

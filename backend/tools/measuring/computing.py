@@ -1,4 +1,4 @@
-"""Computing while an axis moves to where it must be anyway."""
+"""Computing during a motion that is necessary anyway."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ _T = TypeVar("_T")
 
 
 async def meanwhile(compute: Callable[[], _T], motion: Coroutine[Any, Any, None]) -> _T:
-    """What ``compute`` returns, computed in a thread during ``motion``, which always ends first.
+    """Run ``compute`` in a thread during ``motion``; return its result once both are done.
 
     Raises:
-        Exception: of the motion, whatever was computed; else of the computing.
+        Exception: that of the motion, else that of ``compute``.
     """
     computing = asyncio.ensure_future(asyncio.to_thread(compute))
     try:

@@ -1,8 +1,8 @@
-"""Excitations for one axis, scaled to what it may do. Pure: nothing here knows a drive.
+"""Excitations for one axis, scaled to its limits. Pure: independent of the drive.
 
-Every plan is a list of sequences in SI units at the motor, with the excitation that an estimator
-must be given. Torque falls on the axis directly or as an offset added to a closed loop, whose
-reference then makes the slow base motion that defeats stiction.
+Every plan is a list of sequences in SI units at the motor, with the excitation for the estimator.
+The torque acts on the axis directly, or as an offset added to a closed loop, whose reference then
+makes the slow base motion that overcomes stiction.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ TURN = 2.0 * np.pi
 
 @dataclass(frozen=True)
 class Rigid:
-    """What is known of the axis before the measurement: kg·m² and Nm."""
+    """Rough data of the axis before the measurement [kg·m², Nm, Nm]."""
 
     inertia_kgm2: float
     coulomb_nm: float = 0.0
@@ -33,7 +33,7 @@ class Rigid:
 
 @dataclass(frozen=True)
 class Room:
-    """What the axis may do: torque peak Nm, speed rad/s, travel to each side rad."""
+    """Limits of the motion: peak torque [Nm], speed [rad/s], travel to each side [rad]."""
 
     torque_nm: float
     speed_rad_s: float
@@ -51,14 +51,14 @@ class Sequence:
 def band_for(
     sample_rate_hz: float, f_min_hz: float, f_max_hz: float | None, *, odd_only: bool = False
 ) -> Band:
-    """Lines up to 0.4 of the sample rate, and never above 1200 Hz unless asked for."""
+    """Band up to 0.4 of the sample rate; above 1200 Hz only with an explicit ``f_max_hz``."""
     top = min(0.4 * sample_rate_hz, 1200.0) if f_max_hz is None else f_max_hz
     count = 200 if sample_rate_hz < 2000 else 300
     return Band(f_min_hz, min(top, 0.4 * sample_rate_hz), count, odd_only)
 
 
 def _speed_of(samples: npt.NDArray[np.floating], rate: float, inertia: float) -> FloatArray:
-    """Speed that a periodic torque gives a rigid axis."""
+    """Speed of a rigid axis under a periodic torque [rad/s]."""
     spectrum = np.fft.rfft(samples)
     f = np.fft.rfftfreq(samples.size, 1 / rate)
     spectrum[0] = 0.0
@@ -67,7 +67,7 @@ def _speed_of(samples: npt.NDArray[np.floating], rate: float, inertia: float) ->
 
 
 def base_torque_nm(inertia_kgm2: float, speed_rpm: float) -> float:
-    """Torque that the base motion's acceleration takes at most in `torque_mode`."""
+    """Highest torque for the acceleration of the base motion in `torque_mode` [Nm]."""
     return inertia_kgm2 * TURN / threshold.PERIOD_S * threshold.BASE_SHARE * speed_rpm * TURN / 60.0
 
 
@@ -85,18 +85,18 @@ def torque_mode(
 ) -> tuple[Sequence, ...]:
     """Pairs of opposite sign on a freely turning axis without any loop.
 
-    ``share`` of the permitted torque goes to the excitation, unless that is faster than the axis
-    may be; the base motion gets what speed, travel and torque leave.
+    ``share`` of the permitted torque is used for the excitation, reduced where the speed would
+    exceed its limit; the base motion uses what speed, travel and torque leave.
 
     Raises:
-        ValueError: the room does not suffice; the message says what is too small.
+        ValueError: the limits do not suffice; states which one.
     """
     if waveform == "stepped":
         raise Unsuitable(text("measuring.stepped-sine-needs-loop"))
     of = grid(waveform, rate, band)
     slow = TURN * of.slow_hz
 
-    # Inertia takes the answer down as frequency rises, but friction needs its share below.
+    # Inertia reduces the response at high frequency; friction needs its share at low frequency.
     shape = np.minimum(np.hypot(1.0, of.line_hz / threshold.RISE_HZ), threshold.RISE_MOST)
 
     def one(number: int, motion: BaseMotion | None) -> Excitation:
@@ -108,7 +108,7 @@ def torque_mode(
     wanted = max(threshold.BASE_OVER_RMS * own_rms * peak_nm, threshold.BASE_LEAST_RAD_S)
     affordable = share * room.torque_nm / (rigid.inertia_kgm2 * slow)
     gladly = max(wanted, min(affordable, threshold.BASE_GLADLY * room.speed_rad_s))
-    # The way in overshoots the steady base motion by about its amplitude.
+    # The run-in overshoots the steady base motion by about its amplitude.
     travelled = 2.2 / slow
     base_speed = (
         min(gladly, threshold.BASE_SHARE * room.speed_rad_s, room.travel_rad / travelled)
@@ -117,7 +117,7 @@ def torque_mode(
     )
     if base and base_speed < 1.0:
         raise Unsuitable(text("measuring.travel-too-little", travel_rev=room.travel_rad / TURN))
-    # What the base motion cannot cover, the excitation must not ask for.
+    # The excitation must not be faster than the base motion can cover.
     if base and base_speed < 2.0 * own_rms * peak_nm:
         peak_nm = base_speed / (2.0 * own_rms)
     base_nm = rigid.inertia_kgm2 * slow * base_speed + 4 / np.pi * rigid.coulomb_nm
@@ -130,7 +130,7 @@ def torque_mode(
         raise Unsuitable(text("measuring.torque-too-little", torque_nm=room.torque_nm))
     motion = BaseMotion(base_nm / peak_nm, of.slow_hz) if base_nm > 0 else None
     shapes = [one(i, motion) for i in range(2 * realisations)]
-    # The ramps carry the axis into its steady motion and may ask for more than a period does.
+    # The ramps lead into the steady motion and may need more torque than a period does.
     highest = max(float(np.max(np.abs(e.samples))) for e in shapes)
     peak_nm = min(peak_nm, 0.98 * room.torque_nm / highest)
     return tuple(Sequence(scaled(e, peak_nm, step_nm)) for e in shapes)
@@ -151,7 +151,7 @@ def torque_injection(
     """Torque offsets with a closed speed or position loop, which makes the base motion.
 
     Raises:
-        ValueError: the room does not suffice.
+        ValueError: the limits do not suffice.
     """
 
     def size(f: FloatArray) -> FloatArray:
@@ -172,7 +172,7 @@ def _referenced(
 ) -> Iterator[tuple[Excitation, FloatArray]]:  # fmt: skip
     """Excitations of peak 1 with amplitudes ``size``, each with the loop's base motion.
 
-    A stepped sine is one pair: it is long, and its tones need no other phases.
+    A stepped sine needs only one pair: it is long, and its tones need no other phases.
     """
     of = grid("multisine" if waveform == "stepped" else waveform, rate, band)
     reference = _slow_reference(rate, of.period, room, position) if base else None
@@ -191,7 +191,7 @@ def _referenced(
 
 
 def _slow_reference(rate: float, period: int, room: Room, position: bool) -> FloatArray:
-    """One period of the base motion as a speed, or as a position that begins at zero."""
+    """One period of the base motion as speed, or as a position that begins at zero."""
     slow = TURN * rate / period
     speed = min(20.0, 0.35 * room.speed_rad_s, room.travel_rad * slow / 2.2)
     if speed < 0.5:
@@ -234,14 +234,14 @@ def loop_reference(
     weight: npt.NDArray[np.floating] | None = None,
     first: int = 0,
 ) -> tuple[Sequence, ...]:
-    """An excitation on the reference of the closed loop itself, ``amplitude`` in rad/s or rad.
+    """Excitations of the closed loop's reference, ``amplitude`` in rad/s or rad.
 
-    Amplitudes fall with frequency, from ``corner_hz`` on, so that the torque they ask for does not
-    grow without end. ``weight`` [lines] comes on top of that; a stepped sine has none. ``first``
-    pairs of realisations are passed over: the phases that follow are other ones.
+    Amplitudes fall with frequency above ``corner_hz``, which limits the torque that they cause.
+    ``weight`` [lines] is applied in addition, except to a stepped sine. The first ``first`` pairs
+    of realisations are skipped, so that the phases differ from theirs.
 
     Raises:
-        ValueError: the room does not suffice.
+        ValueError: the limits do not suffice.
     """
     corner = corner_hz or (20.0 if position else 40.0)
 
@@ -259,7 +259,7 @@ def loop_reference(
 
 
 def probe(rate: float, peak_nm: float, duration_s: float, step_nm: float) -> FloatArray:
-    """A torque doublet that leaves a free rigid axis at standstill where it began: s, -s, -s, s."""
+    """Torque doublet s, -s, -s, s that returns a free rigid axis to standstill where it began."""
     n = max(8, round(duration_s * rate / 4))
     hump = np.sin(np.pi * (np.arange(n) + 0.5) / n)
     whole = np.concatenate([hump, -hump, -hump, hump, np.zeros(max(4, n // 2))]) * peak_nm

@@ -1,4 +1,4 @@
-"""Figures of the analysis as plain values, for results that files and pages read."""
+"""Figures of the analysis as plain values, for results in files and pages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def figures_of(record: DataclassInstance) -> dict[str, Any]:
-    """The fields of a record by name; None for what is not finite, which JSON does not know."""
+    """The fields of a record by name; non-finite values become None, as JSON has none."""
     return {name: _plain(value) for name, value in asdict(record).items()}
 
 

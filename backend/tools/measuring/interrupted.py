@@ -1,4 +1,4 @@
-"""What ends a measurement: something that was asked of the axis, or others."""
+"""Classification of the ends of a motion: by what the tool commanded, or by others."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted
 from drivers.texts.message import text
 from drivers.texts.states import state_text
 
-#: Ends that the loop makes by itself for what a tool has asked of the axis. A smaller motion or
-#: other gains may mend them; nothing mends any other end but a person.
+#: Ends caused by the commanded motion itself. A smaller motion or other gains may avoid them; any
+#: other end requires a person.
 _OF_THE_MOTION = ENVELOPE_CAUSES | {HaltCause.EXPIRED}
 _LOOK = text("measuring.look-why-it-ended")
 
 
 class Interrupted(NotAllowed):
-    """The drive, a switch or a person ended the motion, or did not let it begin.
+    """The drive, a switch or a person ended the motion, or prevented its start.
 
-    No work in progress tries anything else then: an emergency stop that was pressed and is
-    released again must not let an axis move by itself (ISO 13850). ``halt`` is how the loop ended
-    the motion; None where none had begun.
+    Work in progress must not try anything else then: after an emergency stop has been pressed and
+    released again, an axis must not move by itself (ISO 13850). ``halt`` is how the loop ended the
+    motion; None where none had begun.
     """
 
     halt: Halted | None = None
 
 
 def interrupted(error: NotAllowed) -> Interrupted:
-    """The same, as an end that nothing else may be tried after."""
+    """Convert an error into one after which nothing else may be tried."""
     return Interrupted(
         error.text,
         drive=error.drive,
@@ -41,7 +41,7 @@ def interrupted(error: NotAllowed) -> Interrupted:
 
 
 def interrupted_by(axis: Axis, halt: Halted) -> Interrupted:
-    """A halt of this axis that nothing else may be tried after."""
+    """Error for a halt of this axis after which nothing else may be tried."""
     name, words = axis.drive.name, halt_words(halt, axis.known_units)
     error = Interrupted(
         "motion.halted", drive=name, where=name, cause=words, remedy=halt_remedy(halt, _LOOK)
@@ -51,7 +51,11 @@ def interrupted_by(axis: Axis, halt: Halted) -> Interrupted:
 
 
 def require_held(axis: Axis, session: CyclicSession) -> None:
-    """Disabled by others after its last sample, it must not be enabled again to go home either."""
+    """Check that nobody disabled the axis after its last sample; it must not be enabled again then.
+
+    Raises:
+        Interrupted: it was disabled by others.
+    """
     power = session.power()
     halt = None if power is None else power.axis_state(session.station(axis.drive)).halted
     if halt is not None and halt.cause is HaltCause.LEFT_ENABLED:
@@ -59,10 +63,10 @@ def require_held(axis: Axis, session: CyclicSession) -> None:
 
 
 async def require_enabled(axis: Axis) -> None:
-    """What is read of a standing axis counts only if its loop has held it all the time.
+    """Check that the axis is still enabled, so that readings at standstill are valid.
 
     Raises:
-        Interrupted: it is disabled meanwhile.
+        Interrupted: it was disabled meanwhile.
     """
     state = await axis.state()
     if state is not State.OPERATION_ENABLED:
@@ -70,19 +74,19 @@ async def require_enabled(axis: Axis) -> None:
 
 
 async def ends_all(axis: Axis, error: DriveError) -> bool:
-    """Whether work must end with this error, whatever else it could try."""
+    """Whether work must end with this error, whatever alternatives remain."""
     if isinstance(error, Interrupted | LinkLost):
         return True
     return await axis.state() in (State.FAULT, State.FAULT_REACTION)
 
 
 def raise_if_ended(axis: Axis, session: CyclicSession) -> None:
-    """Raise with the reason when the loop has ended the motion by force.
+    """Raise the reason if the loop has ended the motion.
 
     Raises:
-        MotionHalted: by what was asked of the axis; `EnvelopeExceeded` for a limit.
-        Interrupted: by something else.
-        LinkLost: nothing is exchanged any more.
+        MotionHalted: caused by the commanded motion; `EnvelopeExceeded` for a limit.
+        Interrupted: caused by something else.
+        LinkLost: the cyclic exchange has ended.
     """
     power, name = session.power(), axis.drive.name
     halt = None if power is None else power.axis_state(session.station(axis.drive)).halted

@@ -1,4 +1,4 @@
-"""Numbers as people are shown them; a dash where there is none."""
+"""Numbers formatted for people; a dash where there is none."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ NONE = "—"
 
 
 def fixed(value: float | None, decimals: int, unit: str = "") -> str:
-    """With fixed decimals, a true minus sign and its unit."""
+    """Number with fixed decimals, a true minus sign and its unit."""
     if value is None or not math.isfinite(value):
         return NONE
     text = f"{value:.{decimals}f}".replace("-", "−")
@@ -18,7 +18,7 @@ def fixed(value: float | None, decimals: int, unit: str = "") -> str:
 
 
 def significant(value: float | None, unit: str = "", digits: int = 4) -> str:
-    """With so many digits; powers of ten as 1.2e−4."""
+    """Number with this many significant digits; powers of ten as 1.2e−4."""
     if value is None or not math.isfinite(value):
         return NONE
     text = f"{value:.{digits}g}".replace("-", "−")
@@ -26,14 +26,14 @@ def significant(value: float | None, unit: str = "", digits: int = 4) -> str:
 
 
 def hertz(value: float | None) -> str:
-    """Hz or kHz."""
+    """Frequency in Hz or kHz."""
     if value is None or not math.isfinite(value):
         return NONE
     return significant(value / 1000, "kHz") if value >= 1000 else significant(value, "Hz")
 
 
 def milliseconds(value_s: float | None) -> str:
-    """Seconds as ms."""
+    """Time in ms, from seconds."""
     return fixed(None if value_s is None else value_s * 1e3, 1, "ms")
 
 
@@ -43,6 +43,6 @@ def moment(value: datetime) -> str:
 
 
 def margin(margins: Mapping[str, bool | float | None], name: str) -> float | None:
-    """A read-out of a loop; None where it could not be read."""
+    """Figure of a loop; None where it could not be read."""
     value = margins.get(name)
     return None if value is None or isinstance(value, bool) else float(value)

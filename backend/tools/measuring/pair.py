@@ -1,7 +1,7 @@
-"""Play two sequences at once on two axes of one machine, and keep every sample of both.
+"""Play two sequences at once on two axes of one machine, and record every sample of both.
 
-The loop holds the axes together: neither goes on when the other is stopped, and both stop when
-they go apart by more than the skew limit.
+The loop couples the axes: neither continues when the other is stopped, and both stop when their
+skew exceeds the limit.
 """
 
 from __future__ import annotations
@@ -43,8 +43,10 @@ from drivers.halt import HaltCause
 
 @dataclass(frozen=True)
 class Pair:
-    """Two axes with the exchange that moves them; ``sense`` is -1 where the second motor turns the
-    other way. ``home`` is where both stood [increments]: there their skew is 0.
+    """Two axes with the exchange that moves them.
+
+    ``sense`` is -1 where the second motor turns the other way. ``home`` are the positions of both
+    [increments] at which their skew is 0.
     """
 
     axes: tuple[Axis, Axis]
@@ -54,12 +56,12 @@ class Pair:
     rated_torque_nm: tuple[float, float]
 
     async def coupled(self, skew_limit_rev: float) -> bus.Coupled:
-        """The skew limit as the loop watches it."""
+        """The skew limit in the form that the cyclic loop monitors."""
         first, second = [(await axis.units()).position(1.0) for axis in self.axes]
         return bus.Coupled(self.home, self.sense * second / first, skew_limit_rev / abs(first))
 
     async def ways_rev(self) -> tuple[float, float]:
-        """How far each axis is from home, turning alike counted alike."""
+        """Distance of each axis from home [rev], with equal signs for equal machine motion."""
         first, second = [
             (await axis.units()).position(await axis.position_raw() - home)
             for axis, home in zip(self.axes, self.home, strict=True)
@@ -69,7 +71,7 @@ class Pair:
 
 @asynccontextmanager
 async def both_enabled(pair: Pair) -> AsyncIterator[None]:
-    """Both axes enabled for speeds; on every way out both are braked before either is disabled.
+    """Enable both axes in CSV; on every way out both are braked before either is disabled.
 
     Raises:
         Interrupted: one cannot be enabled, or has a fault at the end.
@@ -91,12 +93,14 @@ async def play_pair(
     skew_limit_rev: float,
     progress: Callable[[float], None],
 ) -> tuple[Recording, Recording]:
-    """Enable both, play speeds [2, n] of each axis (turning alike is alike), and disable both.
+    """Enable both axes, play speeds [2, n] in rpm, and disable both.
+
+    Equal speeds mean equal motion of the machine, also where the motors are mirrored.
 
     Raises:
         MotionHalted: the envelope or the skew limit ended the motion.
         Interrupted: anything else did.
-        LinkLost: samples did not come.
+        LinkLost: samples did not arrive.
     """
     session = pair.session
     plays, catches, trajectories = [], [], []
@@ -147,7 +151,7 @@ async def _through(
     catches: list[Catch],
     progress: Callable[[float], None],
 ) -> None:
-    """Renew both until every sample of both has come back."""
+    """Renew both until every sample of both has arrived."""
     session, (first, second) = pair.session, pair.axes
     period_s, count = cycle_s(session), len(trajectories[0].values)
     drives, grants = (first.drive, second.drive), (first.grant(), second.grant())
@@ -162,7 +166,7 @@ async def _through(
         arrived = min(catch.arrived for catch in catches)
         if arrived > heard:
             heard, deadline = arrived, time.monotonic() + threshold.TAIL_S
-        # Some bunches beyond the end, as for a single axis.
+        # Some blocks beyond the end, as for a single axis.
         if arrived * period_s > count * period_s + 0.15:
             _raise_if_ended(pair)
             return
@@ -181,7 +185,7 @@ async def _through(
 
 
 def _raise_if_ended(pair: Pair) -> None:
-    """Raise for the axis that was stopped first, not for the one that followed it.
+    """Raise for the axis that was stopped first, not for the one stopped with it.
 
     Raises:
         MotionHalted, Interrupted, LinkLost: as `raise_if_ended`.

@@ -1,8 +1,9 @@
-"""Play a precomputed excitation cycle by cycle and keep every sample of it, or fail.
+"""Play a precomputed excitation cycle by cycle and record every sample of it, or fail.
 
-The recording is aligned with what was sent by the setpoints that come back with each sample,
-so lost blocks cannot shift it. A cycle that was lost or late is marked and never evaluated; it
-holds what lies between its neighbours, since filters and extremes run over it.
+The recording is aligned with the sequence by the setpoints that are read back with each sample, so
+lost blocks cannot shift it. A cycle that was lost or late is marked and never evaluated; it
+contains values interpolated between its neighbours, as filters and extremes are computed over all
+samples.
 """
 
 from __future__ import annotations
@@ -46,11 +47,11 @@ TARGET_OF = {
 
 @dataclass(frozen=True)
 class Recording:
-    """What the bus saw of one played sequence; arrays [n], one sample per cycle.
+    """Samples of one played sequence, as received on the bus; arrays [n], one sample per cycle.
 
     ``position_rad``, ``velocity_rad_s``, ``torque_nm`` are at the motor; ``sent`` and ``offset``
-    in raw units as they went out. ``valid`` is False where a sample was lost or not trusted.
-    ``also`` [n, k] holds further signals that were asked for, raw.
+    are raw values as sent. ``valid`` is False where a sample was lost or is not trusted. ``also``
+    [n, k] holds further requested signals, raw.
     """
 
     sample_rate_hz: float
@@ -63,7 +64,7 @@ class Recording:
     also: FloatArray | None = None
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
-        """For storage."""
+        """The samples as arrays for storage."""
         return {
             "position_rad": self.position_rad,
             "velocity_rad_s": self.velocity_rad_s,
@@ -76,7 +77,7 @@ class Recording:
 
 @dataclass(frozen=True)
 class Play:
-    """One sequence in raw units: the mode's own target, and torque offsets next to it if any."""
+    """One sequence in raw units: setpoints of the mode, and optional torque offsets with them."""
 
     mode: Mode
     values: npt.NDArray[np.int64]
@@ -86,10 +87,10 @@ class Play:
 
 @dataclass
 class Catch:
-    """Blocks as they come, of a motion that begins with cycle ``first``.
+    """Received blocks of a motion that begins with cycle ``first``.
 
-    A server that stood still finds in one go what the bus did meanwhile, and most of that belongs
-    to what was before the motion.
+    A server that was blocked for a while receives at once everything that the bus did meanwhile,
+    and most of it belongs to the time before the motion.
     """
 
     names: tuple[str, ...]
@@ -97,16 +98,16 @@ class Catch:
     first: int | None = None
 
     def take(self, block: bus.ScopeBlock) -> None:
-        """Keep a block, as the exchange delivers it."""
+        """Store a block as the exchange delivers it."""
         self.blocks += self._of_motion(block)
 
     def begin(self, first: int) -> None:
-        """The bus has shown the number; what came meanwhile is looked through."""
+        """Set the number of the first cycle, once known, and discard earlier samples."""
         self.first = first
         self.blocks = [part for block in self.blocks for part in self._of_motion(block)]
 
     def _of_motion(self, block: bus.ScopeBlock) -> list[bus.ScopeBlock]:
-        """What may belong to it; everything as long as the number is not known."""
+        """Part of a block that may belong to the motion; all of it while ``first`` is unknown."""
         if self.first is None or block.cycle is None:
             return [block]
         early = self.first - threshold.RUN_IN - block.cycle
@@ -127,7 +128,7 @@ class Catch:
 
     @property
     def arrived(self) -> int:
-        """Samples of the motion so far, those that were lost included."""
+        """Number of samples of the motion so far, lost ones included."""
         if self.first is None or not self.blocks:
             return 0
         newest = self.blocks[-1]
@@ -135,7 +136,7 @@ class Catch:
         return newest.cycle + len(newest.samples) - self.first
 
     def since(self, number: int) -> FloatArray:
-        """Rows of position, velocity and torque of the blocks from this number on."""
+        """Rows [n, 3] of raw position, velocity and torque of the blocks from this index on."""
         rows = [
             block.samples[:, [block.channels.index(name) for name in self.names[:3]]]
             for block in self.blocks[number:]
@@ -143,13 +144,13 @@ class Catch:
         return np.concatenate(rows) if rows else np.empty((0, 3))
 
     def runs(self) -> list[Run]:
-        """Runs without a gap."""
+        """Runs of samples without a gap."""
         found: list[Run] = []
         for block in self.blocks:
             samples = block.samples[:, [block.channels.index(name) for name in self.names]]
             good = np.ones(len(samples), dtype=np.bool_) if block.valid is None else block.valid
             good = good & ~np.isnan(samples).any(axis=1)
-            # By the cycle counter and not by the clock: the grid follows the drives' clock.
+            # By the cycle counter and not by the clock: the cycle grid follows the drives' clock.
             missing = block.dropped if found else 0
             if found and not missing:
                 before, rows, valid = found.pop()
@@ -160,10 +161,10 @@ class Catch:
 
 
 def cycle_s(session: CyclicSession) -> float:
-    """Cycle time of a running exchange.
+    """Cycle time of a running exchange [s].
 
     Raises:
-        NotAllowed: none runs.
+        NotAllowed: no exchange runs.
     """
     if session.state is None:
         raise NotAllowed("measuring.cyclic-exchange-not-run", url=session.link.url)
@@ -171,10 +172,10 @@ def cycle_s(session: CyclicSession) -> float:
 
 
 def require_signals(axis: Axis, session: CyclicSession, mode: Mode, offset: bool) -> None:
-    """What the measurement needs must come with every cycle.
+    """Check that the signals that the measurement needs come with every cycle.
 
     Raises:
-        NotAllowed: naming the signal that does not.
+        NotAllowed: states the missing signal.
     """
     drive = axis.drive
     needed = [*ROLES[:3], TARGET_OF[mode], *(["torque_offset"] if offset else [])]
@@ -190,7 +191,7 @@ def require_signals(axis: Axis, session: CyclicSession, mode: Mode, offset: bool
 
 
 def takes_torque(axis: Axis, session: CyclicSession) -> bool:
-    """Whether the axis is given torques with every cycle."""
+    """Whether the exchange carries the target torque in every cycle."""
     key = axis.drive.key(TARGET_OF[Mode.CST])
     return key is not None and session.carries(axis.drive, key)
 
@@ -199,20 +200,18 @@ def takes_torque(axis: Axis, session: CyclicSession) -> bool:
 async def enabled(
     axis: Axis, session: CyclicSession, mode: Mode, *, by_increments: bool = False
 ) -> AsyncIterator[int]:
-    """Operation enabled through the loop, for the length of the block; yields the position.
+    """Enable the axis through the cyclic loop for the length of the block; yields the raw position.
 
-    ``by_increments`` as in `Axis.enabled_cyclic`.
-
-    On every way out the axis is braked and disabled.
+    ``by_increments`` as in `Axis.enabled_cyclic`. On every way out the axis is braked and disabled.
 
     Raises:
-        ScaleUnknown: a scale is not certain, so that the envelope would say nothing.
-        ScaleChanged: it is another one than that of the plan.
-        Interrupted: it cannot be enabled, or the drive has a fault at the end.
+        ScaleUnknown: a scale is not certain, so that the envelope would have no meaning.
+        ScaleChanged: a scale differs from the one used for planning.
+        Interrupted: the axis cannot be enabled, or the drive has a fault at the end.
     """
     inside = False
     if not by_increments:
-        # Said as what it is, not as a motion that was interrupted.
+        # Raised as what it is, not as an interrupted motion.
         await axis.require_planned_scales()
     entered = axis.enabled_cyclic(
         session, mode, threshold.STATE_TIMEOUT_S, by_increments=by_increments
@@ -241,7 +240,7 @@ async def _forgotten(axis: Axis, session: CyclicSession) -> None:
 
 
 async def dwell(axis: Axis, session: CyclicSession, seconds: float) -> None:
-    """Hold the last setpoint of a sequence for this time [s], on an axis that stays enabled.
+    """Hold the last setpoint of a sequence for this time [s]; the axis stays enabled.
 
     Raises:
         Interrupted: the loop ended the motion meanwhile.
@@ -254,7 +253,7 @@ async def dwell(axis: Axis, session: CyclicSession, seconds: float) -> None:
 
 
 async def bus_limits(axis: Axis, envelope: Envelope, start_raw: int) -> bus.Envelope:
-    """An envelope around a starting point in raw units."""
+    """Envelope around a starting position, in raw units."""
     units = await axis.units()
     travel = units.position_raw(envelope.travel_rev)
     return bus.Envelope(
@@ -280,13 +279,13 @@ async def play(
     """Play one sequence on an enabled axis and return the recording.
 
     ``until`` is called about 20 times a second with the rows [n, 3] of raw position, velocity and
-    torque that came since, and ends the motion early, by braking, when it returns True. ``also``
-    are keys of further signals that come with every cycle.
+    torque received since the last call; when it returns True, the motion ends early, by braking.
+    ``also`` are the keys of further signals that come with every cycle.
 
     Raises:
-        MotionHalted: the envelope ended the motion; `MotionHalted.halt` is why.
-        Interrupted: so did anything else, such as a fault.
-        LinkLost: samples did not come.
+        MotionHalted: the envelope ended the motion; `MotionHalted.halt` states why.
+        Interrupted: anything else ended it, such as a fault.
+        LinkLost: samples did not arrive.
     """
     drive = axis.drive
     period_s = cycle_s(session)
@@ -328,10 +327,10 @@ async def play(
 def require_agreement(
     axis: Axis, table: FloatArray, valid: BoolArray, period_s: float, scale: FeedbackScale
 ) -> None:
-    """Nothing is computed from a 606Ch that the position contradicts.
+    """Check the reported speed (606Ch) against the position before anything is computed from it.
 
     Raises:
-        Interrupted: naming both speeds.
+        Interrupted: they contradict each other; states both speeds.
     """
     halt = disagreement_of(table[:, 0], table[:, 1], period_s, scale, valid)
     if halt is not None:
@@ -347,7 +346,7 @@ async def _drive_through(
     progress: Callable[[float], None],
     until: Callable[[FloatArray], bool] | None,
 ) -> bool:
-    """Renew until every sample of the sequence has come back; True when ended by ``until``."""
+    """Renew until every sample of the sequence has arrived; True when ended by ``until``."""
     count = len(trajectory.values)
     station = trajectory.station
     try:
@@ -358,11 +357,12 @@ async def _drive_through(
     while True:
         arrived = catch.arrived
         if arrived > heard:
-            # A bus may be slow where a busy computer simulates it; one that is silent is gone.
+            # A bus may be slow where a busy computer simulates it; only a silent one counts as
+            # lost.
             heard, deadline = arrived, time.monotonic() + threshold.TAIL_S
-        # Some bunches beyond the end: the first samples may be older than the first setpoint.
+        # Some blocks beyond the end: the first samples may be older than the first setpoint.
         if arrived * period_s > count * period_s + 0.15:
-            # What happened since the last look, in the tail, is no better than before it.
+            # Also check what happened in the tail, since the last check.
             raise_if_ended(axis, session)
             return False
         if time.monotonic() > deadline:
@@ -391,7 +391,7 @@ async def in_si(
     period_s: float,
     rated_torque_nm: float,
 ) -> Recording:
-    """Rows [n, 3 and more] of raw position, velocity and torque next to what was sent, in SI."""
+    """Recording in SI from rows [n, 3 or more] of raw position, velocity and torque."""
     units = await axis.units()
     count = len(table)
     table = bridged(table, valid)
@@ -407,10 +407,9 @@ async def in_si(
 
 
 def bridged(table: FloatArray, valid: BoolArray) -> FloatArray:
-    """Rows [n, k] that are not ``valid`` [n] replaced by a straight line between those that are.
+    """Rows [n, k] with those that are not ``valid`` [n] interpolated linearly between valid ones.
 
-    What came in their place is nothing, zero or not a number: an axis far from zero would seem to
-    leap there and back.
+    A lost row contains zero or NaN: an axis far from zero would seem to jump there and back.
     """
     if np.all(valid) or not np.any(valid):
         return table
@@ -419,15 +418,15 @@ def bridged(table: FloatArray, valid: BoolArray) -> FloatArray:
 
 
 def share(progress: Progress, low: float, high: float, step: Text) -> Callable[[float], None]:
-    """A part of a job's progress bar."""
+    """Progress callback for the part from ``low`` to ``high`` of a job's progress."""
     return lambda fraction: progress(low + (high - low) * fraction, step)
 
 
 async def quiet(axis: Axis, timeout_s: float = 3.0) -> None:
-    """Wait until the axis is at standstill.
+    """Wait for standstill.
 
     Raises:
-        LinkTimeout: it does not.
+        LinkTimeout: no standstill within the time.
     """
     if not await axis.standstill(timeout_s):
         raise LinkTimeout(

@@ -1,4 +1,4 @@
-"""What could be measured again to know it better: always by itself, as time allows in a tuning."""
+"""Optional repetitions of measurements: always in a single tool, as time allows in a tuning."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from dataclasses import dataclass
 
 @dataclass
 class Repeats:
-    """``by_s`` is by `time.monotonic`; ``left_out`` counts what it did not allow,
-    ``repeated`` what was measured again, needed or not, of so many that were ``played``.
+    """Time limit for repetitions, and their count.
 
-    What nothing can be evaluated without is none of this: it is measured again whatever the time.
+    ``by_s`` is on `time.monotonic`. ``left_out`` counts the repetitions that it did not allow,
+    ``repeated`` those that were made, needed or not, for ``played`` measurements. A repetition
+    without which nothing can be evaluated is not counted: it is always made.
     """
 
     by_s: float = math.inf
@@ -21,7 +22,7 @@ class Repeats:
     repeated: int = 0
 
     def allow(self, takes_s: float) -> bool:
-        """Whether something that takes so long ends in time; counted where it does not."""
+        """Whether something of this duration ends in time; if not, counted in ``left_out``."""
         if time.monotonic() + takes_s <= self.by_s:
             return True
         self.left_out += 1
@@ -29,5 +30,5 @@ class Repeats:
 
     @property
     def lossy(self) -> float:
-        """How much of it was measured again, 0 to 1."""
+        """Share of the measurements that was repeated, 0 to 1."""
         return min(self.repeated / self.played, 1.0) if self.played else 0.0

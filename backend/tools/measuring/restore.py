@@ -1,4 +1,4 @@
-"""Putting back, once a drive answers again, what a tool could not restore when it ended."""
+"""Restoring what a tool could not restore when it ended, once the drive responds again."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from profiles.schema import Raw
 
 
 async def settle(axis: Axis, *, asked: bool) -> JobResult:
-    """Restore the pending values of a standing axis' drive.
+    """Restore the pending values of a drive whose axis is at standstill.
 
-    Where nobody ``asked``, only values that are still what a tool left there: what has changed
-    since may be meant. Returns ``back`` (raw values by key) and ``left`` (why the others are not).
+    Unless ``asked`` by a person, only values are restored that are still as a tool left them: a
+    value changed since may be intended. Returns ``back`` (raw values by key) and ``left`` (why
+    others were not restored).
 
     Raises:
-        NotAllowed: the axis is enabled or moves, or another drive answers here.
-        RestoreFailed: naming what could not be restored; it stays pending.
+        NotAllowed: the axis is enabled or moves, or another drive is connected here.
+        RestoreFailed: states what could not be restored; it stays pending.
     """
     drive = axis.drive
     if await axis.state() is State.OPERATION_ENABLED or not await axis.standstill(

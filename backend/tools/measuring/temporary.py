@@ -1,4 +1,4 @@
-"""Settings for the length of a measurement: written, made effective, and restored on every exit."""
+"""Temporary settings of a measurement: written, made effective, and restored on every exit."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from profiles.schema import Raw
 
 
 async def make_effective(axis: Axis) -> None:
-    """Carry out "write settings" where the family needs it for changes to act.
+    """Carry out "write settings" in families where changes take effect only after it.
 
     Raises:
         NotAllowed: the axis is enabled.
@@ -35,14 +35,14 @@ async def make_effective(axis: Axis) -> None:
 
 
 async def write_settings(axis: Axis, values: Mapping[str, int]) -> dict[str, int]:
-    """Write raw values that differ from what the drive has, and make them act.
+    """Write raw values that differ from the drive's, and make them effective.
 
-    Returns what was there before, for every key. Nothing is changed unless every value can be
+    Returns the previous raw values of all keys. Nothing is changed unless every value can be
     written; a failure on the way restores what was written.
 
     Raises:
         NotAllowed, OutOfRange: nothing was sent.
-        DriveError: the drive refused one; the earlier ones are back.
+        DriveError: the drive refused a value; the earlier ones are restored.
     """
     drive = axis.drive
     for key, raw in values.items():
@@ -66,10 +66,10 @@ async def write_settings(axis: Axis, values: Mapping[str, int]) -> dict[str, int
 
 
 async def put_back(axis: Axis, before: Mapping[str, Raw]) -> None:
-    """Write these raw values where they differ, and make them act.
+    """Write these raw values back where they differ, and make them effective.
 
     Raises:
-        RestoreFailed: naming what could not be restored.
+        RestoreFailed: states what could not be restored; it stays on the restore list.
     """
     drive = axis.drive
     failed: list[Text] = []
@@ -85,7 +85,7 @@ async def put_back(axis: Axis, before: Mapping[str, Raw]) -> None:
             except DriveError as error:
                 failed.append(not_restored(drive, key, raw, error))
     finally:
-        # When this is cut off in the middle, too, it is known what is missing.
+        # Keeps the restore list complete where this is aborted, too.
         drive.pending_restores.add(left)
     back = {key: raw for key, raw in before.items() if key not in left}
     if changed or drive.pending:
@@ -103,10 +103,10 @@ async def put_back(axis: Axis, before: Mapping[str, Raw]) -> None:
 
 
 async def put_back_in_time(axis: Axis, before: Mapping[str, Raw]) -> None:
-    """`put_back` to its end whatever happens meanwhile, but no longer than a cleanup may take.
+    """Complete `put_back` despite cancellation, within the time limit of a cleanup.
 
     Raises:
-        RestoreFailed: naming what could not be restored, also where a slow line left no time.
+        RestoreFailed: states what could not be restored, also where a slow line left no time.
     """
     drive = axis.drive
     try:
@@ -126,7 +126,7 @@ async def put_back_in_time(axis: Axis, before: Mapping[str, Raw]) -> None:
 
 @asynccontextmanager
 async def temporary(axis: Axis, values: Mapping[str, int]) -> AsyncIterator[dict[str, int]]:
-    """These raw values act inside the block; yields what is restored afterwards."""
+    """Apply these raw values inside the block; yields the values restored afterwards."""
     drive = axis.drive
     with drive.pending_restores.temporary({key: await drive.raw(key) for key in values}):
         before = await write_settings(axis, values)
@@ -138,10 +138,10 @@ async def temporary(axis: Axis, values: Mapping[str, int]) -> AsyncIterator[dict
 
 @asynccontextmanager
 async def stopping_hard(axis: Axis, speed_rpm: float) -> AsyncIterator[None]:
-    """Inside the block a quick stop brakes from this speed as fast as setpoints are ramped down.
+    """Let a quick stop from this speed brake as fast as setpoints are ramped down, in the block.
 
     Raises:
-        ScaleUnknown: what a speed is, is not certain: nothing may move.
+        ScaleUnknown: the scale of the speed is not certain: nothing may move.
         RestoreFailed: on leaving, where the drive's own deceleration could not be restored.
     """
     drive, units = axis.drive, await axis.require_certain_scales()

@@ -1,6 +1,6 @@
-"""The four kinds of excitation as the tools play them: multisine, chirp, PRBS, stepped sine.
+"""The four excitation waveforms of the tools: multisine, chirp, PRBS, stepped sine.
 
-The first three fill a period that is repeated, so that one way of evaluating serves them all
+The first three fill a period that is repeated, so that one evaluation applies to all of them
 (Pintelon & Schoukens, *System Identification*, 2012, section 5.3: periodic chirp, maximum-length
 sequences). The stepped sine plays one tone after the other.
 """
@@ -29,13 +29,13 @@ from drivers.texts.message import Unsuitable, text
 Waveform = Literal["multisine", "chirp", "prbs", "stepped"]
 FloatArray = npt.NDArray[np.float64]
 
-#: Registers that `prbs_period` knows.
+#: Register lengths that `prbs_period` supports.
 _ORDERS = range(7, 16)
 
 
 @dataclass(frozen=True)
 class Band:
-    """Which lines: lowest and highest frequency, at most how many; ``odd_only``: odd ones alone."""
+    """Selection of lines: lowest and highest frequency, maximum count; ``odd_only``: odd lines."""
 
     f_min_hz: float
     f_max_hz: float
@@ -45,7 +45,7 @@ class Band:
 
 @dataclass(frozen=True)
 class Grid:
-    """Samples of one period and the bins that are evaluated."""
+    """One period of a waveform: sample rate, samples per period, and the evaluated bins."""
 
     waveform: Waveform
     rate_hz: float
@@ -54,12 +54,12 @@ class Grid:
 
     @property
     def line_hz(self) -> FloatArray:
-        """Frequencies of the lines."""
+        """Frequencies of the lines [Hz]."""
         return np.asarray(self.lines * (self.rate_hz / self.period))
 
     @property
     def slow_hz(self) -> float:
-        """Frequency of the base motion: one turn per period."""
+        """Frequency of the base motion [Hz]: one cycle per period."""
         return self.rate_hz / self.period
 
 
@@ -76,7 +76,7 @@ def grid(waveform: Waveform, rate_hz: float, band: Band) -> Grid:
     lines = choose_lines(
         band.f_min_hz, band.f_max_hz, rate_hz / period, count=band.count, odd_only=band.odd_only
     )
-    # Its own bin carries the base motion.
+    # Bin 1 contains the base motion.
     return Grid(waveform, rate_hz, period, lines[lines > 1])
 
 
@@ -89,7 +89,7 @@ def periodic(
     integrations: int = 0,
     ramp_samples: int,
 ) -> Excitation:
-    """Realisation ``number`` with these weights of the lines: pairs of opposite sign."""
+    """Realisation ``number`` with these amplitudes of the lines; pairs have opposite signs."""
     realisation, invert = number // 2, bool(number % 2)
     if of.waveform == "multisine":
         return multisine(
@@ -111,7 +111,7 @@ def periodic(
 
 
 def tones_hz(band: Band) -> FloatArray:
-    """Tones of a stepped sine: evenly spread over the octaves, as many as the time allows.
+    """Tones of a stepped sine, spaced logarithmically, as many as the time allows [Hz].
 
     Raises:
         ValueError: even the fewest take too long.
@@ -131,7 +131,7 @@ def tones_hz(band: Band) -> FloatArray:
 def stepped(
     rate_hz: float, tones: FloatArray, amplitude: FloatArray, *, invert: bool
 ) -> Excitation:
-    """A stepped sine, or its mirror image; peak of the largest tone 1."""
+    """A stepped sine, or its negative with ``invert``; the largest tone has amplitude 1."""
     sign = -1.0 if invert else 1.0
     return stepped_sine(
         sample_rate_hz=rate_hz,

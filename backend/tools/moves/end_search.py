@@ -1,4 +1,4 @@
-"""Where the hard ends of an axis are: it creeps to each at limited torque until it stalls."""
+"""Search for the end stops of an axis: it creeps to each at limited torque until it stalls."""
 
 from __future__ import annotations
 
@@ -33,7 +33,12 @@ async def find_ends(
     rough: RoughFit,
     progress: Progress,
 ) -> tuple[float, float]:
-    """Creep both ways at limited torque until the axis stalls; positions of the ends in rev."""
+    """Creep both ways at limited torque until the axis stalls; positions of the ends in rev.
+
+    Raises:
+        OutOfRange: the torque of the search cannot move the axis.
+        NotAllowed: the family has no torque limit, or there is no end within the travel.
+    """
     drive, units = axis.drive, await axis.units()
     available = settings.search_torque_percent / 100.0 * facts.rated_torque_nm
     needed = 1.5 * (rough.coulomb_nm + abs(rough.gravity_nm))
@@ -58,13 +63,13 @@ async def find_ends(
 
 
 def limited(now: int, wanted: int) -> int:
-    """A torque limit no wider than ``wanted``; some families keep the negative one below zero."""
+    """Torque limit not above ``wanted``; in some families the negative limit is below zero."""
     return min(now, wanted) if now >= 0 else max(now, -wanted)
 
 
 @dataclass
 class _Stall:
-    """Sees in the samples as they come when a creeping axis has stopped."""
+    """Detects in the received samples that a creeping axis has stopped."""
 
     slow: float
     enough: int
@@ -74,8 +79,8 @@ class _Stall:
     found: bool = False
 
     def seen(self, rows: npt.NDArray[np.float64]) -> bool:
-        """Whether it rests; ``rows`` [n, 3] are raw position, velocity and torque."""
-        # What was lost is not a number, and no standstill.
+        """Whether the axis is stalled; ``rows`` [n, 3] are raw position, velocity and torque."""
+        # A lost sample is NaN and does not count as standstill.
         moving = np.flatnonzero(~(np.abs(rows[:, 1]) < self.slow))
         self.resting = self.resting + len(rows) if not moving.size else len(rows) - moving[-1] - 1
         self.count += len(rows)
@@ -90,7 +95,11 @@ async def _creep(
     facts: AxisFacts,
     direction: float,
 ) -> float:
-    """Position of one end in rev."""
+    """Position of the end in this direction [rev].
+
+    Raises:
+        NotAllowed: no end was found within the travel.
+    """
     units, rate = await axis.units(), 1.0 / cycle_s(session)
     way = settings.envelope.travel_rev
     speed = min(settings.search_speed_rpm, settings.envelope.speed_rpm)

@@ -1,4 +1,4 @@
-"""Bring an axis back to a place by a slow speed profile, whatever its position gain may be."""
+"""Return an axis to a position by a slow speed profile, independent of its position gain."""
 
 from __future__ import annotations
 
@@ -20,11 +20,12 @@ from drivers.halt import HaltCause
 async def go_back(
     axis: Axis, session: CyclicSession, goal_raw: int, envelope: Envelope, facts: AxisFacts
 ) -> None:
-    """Move to ``goal_raw`` in CSV with a raised-cosine profile; repeats where the loop is soft.
+    """Move to ``goal_raw`` in CSV with a raised-cosine profile; repeated where the loop is soft.
 
-    A load that pulls takes the same way of each move, until the loop's integral holds it, and a
-    loop without an integral goes a share of what is asked: the next move is asked for more. A
-    heavy load that takes more torque than is permitted is moved slower.
+    A static load torque subtracts the same distance from each move, until the loop's integral
+    compensates it, and a loop without an integral covers only a share of the commanded distance:
+    the next move is commanded longer. A heavy load that takes more torque than permitted is moved
+    more slowly. At most `threshold.ATTEMPTS` moves are made in succession.
 
     Raises:
         NotAllowed: the motion was ended by the envelope or a fault.
@@ -54,7 +55,7 @@ async def go_back(
                 raise
             slower *= 2.0
             await quiet(axis)
-            # What it went of that move shows nothing of the next one.
+            # An aborted move does not predict the next one.
             moves.clear()
             rest = units.position(goal_raw - await axis.position_raw())
             continue
@@ -71,9 +72,9 @@ async def _move(
     envelope: Envelope,
     facts: AxisFacts,
 ) -> None:
-    """One move by ``distance`` turns that takes ``slower`` times as long as it has to."""
+    """Make one move by ``distance`` rev in ``slower`` times the shortest duration."""
     units, rate = await axis.units(), 1.0 / cycle_s(session)
-    # Peak speed of a raised cosine is twice its mean.
+    # The peak speed of a raised cosine is twice its mean.
     highest_rps = 0.25 * envelope.speed_rpm / 60.0
     duration_s = slower * max(2.0 * abs(distance) / highest_rps, 0.4)
     speed_rpm = 60.0 * raised_cosine(distance, duration_s, rate)
@@ -94,7 +95,7 @@ async def _move(
 
 
 def _to_ask(rest: float, moves: list[tuple[float, float]]) -> float:
-    """What to ask of a loop for it to go ``rest``, by what it went of the moves before (turns)."""
+    """Distance to command so that the axis moves ``rest``, by the earlier moves [rev]."""
     if not moves:
         return rest
     asked, gone = moves[-1]

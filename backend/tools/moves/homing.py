@@ -23,7 +23,7 @@ _START_HOMING = 0x10
 
 @dataclass(frozen=True, slots=True)
 class HomingSettings:
-    """Method of 6098h; speeds rpm, acceleration rpm/s, offset rev. None leaves the drive's own."""
+    """Method of 6098h; speeds rpm, acceleration rpm/s, offset rev. None keeps the drive's value."""
 
     method: int
     envelope: Envelope
@@ -34,10 +34,10 @@ class HomingSettings:
 
 
 async def home(axis: Axis, settings: HomingSettings, progress: Progress) -> JobResult:
-    """Home the axis; mode and torque limit are as before afterwards, homing objects stay written.
+    """Home the axis; mode and torque limit are restored, homing objects stay written.
 
     Raises:
-        OutOfRange: a method that the drive does not have.
+        OutOfRange: the drive does not have this method.
         NotAllowed: homing error (bit 13), a fault, or travel beyond the envelope.
         LinkTimeout: not attained in time.
     """
@@ -70,8 +70,8 @@ async def home(axis: Axis, settings: HomingSettings, progress: Progress) -> JobR
         await drive.write(key, raw)
     opens_s = await brake_opens_s(drive)
     async with axis.enabled(Mode.HM, settings.envelope):
-        # A start is lost while the brake opens (000:1377, 002:8117), and the status word would
-        # show the verdict of an earlier homing.
+        # A start command is lost while the brake opens (000:1377, 002:8117), and the status word
+        # would still show the result of an earlier homing.
         await asyncio.sleep(opens_s)
         await axis.control(cia402.ENABLE_OPERATION | _START_HOMING)
         await _attained(axis, settings, progress)
@@ -110,14 +110,14 @@ async def _attained(axis: Axis, settings: HomingSettings, progress: Progress) ->
         elapsed = time.monotonic() - began
         attained = bool(status & homed_bit) and (own or status & cia402.STATUS_TARGET_REACHED)
         busy_seen = busy_seen or not attained
-        # A drive that was homed before may show the old verdict until it has started again.
+        # A drive that was homed before may show its old status until it has started again.
         if attained and (busy_seen or elapsed > 0.3):
             return
         asked_s = time.monotonic()
         readings = await drive.read_many(reported)
         position, velocity = (_integer(drive.name, readings[key]) for key in reported)
         step, last = abs(position - last), position
-        # Taking over the new origin makes the position jump; that is no travel, and no speed.
+        # The new origin makes the position jump; that is neither travel nor speed.
         if step <= units.position_raw(settings.envelope.speed_rpm / 60.0 * 0.5) + 2:
             travelled += step
             guard.look(position, velocity, asked_s)

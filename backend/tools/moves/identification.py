@@ -40,17 +40,17 @@ _STATES: dict[IdentificationState, Text] = {
 
 @dataclass(frozen=True, slots=True)
 class IdentifySettings:
-    """Travel in rev from the start point; ``confirmed``: the profile's warning was agreed to."""
+    """Travel in rev from the start; ``confirmed``: a person agreed to the profile's warning."""
 
     envelope: Envelope
     confirmed: bool
 
 
 def require_identification(axis: Axis) -> DriveIdentification:
-    """How this family identifies by itself.
+    """The identification function of this family.
 
     Raises:
-        NotAllowed: it does not, or its manual does not say how it is started.
+        NotAllowed: it has none, or its manual does not state how it is started.
     """
     spec = axis.drive.profile.functions.identification
     if spec is None:
@@ -63,20 +63,21 @@ def require_identification(axis: Axis) -> DriveIdentification:
 
 
 def state_of(spec: DriveIdentification, status: int) -> Text:
-    """What a value of the status object means; the value itself where the profile does not say."""
+    """Meaning of a value of the status object; the value itself where the profile has none."""
     state = spec.states.get(status)
     return text("moves.identification-status", value=status) if state is None else _STATES[state]
 
 
 async def identify(axis: Axis, settings: IdentifySettings, progress: Progress) -> JobResult:
-    """Let the drive identify; power state and mode are as before afterwards.
+    """Let the drive identify motor and load; power state and mode are restored afterwards.
 
-    The values that it found replace those of the motor, which is what the drive does; they are
-    read back, and given with those from before.
+    The drive itself replaces its motor data by the identified values; they are read back and
+    returned with the previous values.
 
     Raises:
-        NotAllowed: not agreed to, left Operation enabled, or travel beyond the envelope.
-        Rejected: the drive reports an error. LinkTimeout: it does not begin or end in time.
+        NotAllowed: not confirmed, left Operation enabled, or travel beyond the envelope.
+        Rejected: the drive reports an error.
+        LinkTimeout: it does not begin or end in time.
     """
     drive = axis.drive
     spec = require_identification(axis)

@@ -1,4 +1,4 @@
-"""Moves in the profile modes: one move, back and forth, velocity and torque for a time."""
+"""Moves in profile modes: single moves, reciprocating moves, velocity and torque for a time."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class MoveSettings:
 
 @dataclass(frozen=True, slots=True)
 class SequenceSettings:
-    """Back and forth: positions in rev, speed rpm, ramp rpm/s, dwell s."""
+    """Reciprocating move: positions in rev, speed rpm, ramp rpm/s, dwell s."""
 
     first: float
     second: float
@@ -50,7 +50,7 @@ class SequenceSettings:
 
 @dataclass(frozen=True, slots=True)
 class _Watch:
-    """What one motion is held to, from where it began."""
+    """Limits of one motion, relative to its start."""
 
     start: int
     envelope: Envelope
@@ -62,7 +62,7 @@ def _watch(axis: Axis, units: AxisUnits, start: int, envelope: Envelope) -> _Wat
 
 
 async def move(axis: Axis, settings: MoveSettings, progress: Progress) -> JobResult:
-    """One move in a profile mode; ends at the target, or after the envelope's time (PV, PT).
+    """Make one move in a profile mode, to the target, or for the envelope's time (PV, PT).
 
     Raises:
         OutOfRange: target or speed outside the envelope; nothing has moved.
@@ -138,8 +138,8 @@ async def sequence(axis: Axis, settings: SequenceSettings, progress: Progress) -
 
 def _require_watchdog_or_consent(axis: Axis, consent: bool) -> None:
     spec = axis.drive.ports[0].spec
-    # The watchdogs of EtherCAT and CANopen drives watch the cyclic exchange; commands that go
-    # through the mailbox without one are watched by nobody.
+    # The watchdogs of EtherCAT and CANopen drives monitor the cyclic exchange; without one, mailbox
+    # commands are not monitored.
     exchanging = axis.session is not None and axis.session.running
     watched = exchanging and spec is not None and spec.watchdog.present
     if not watched and not consent:
@@ -187,7 +187,7 @@ def _target(units: AxisUnits, settings: MoveSettings, start: int) -> int:
 def _require_reachable(
     axis: Axis, units: AxisUnits, target: int, start: int, envelope: Envelope
 ) -> None:
-    """The target is inside the travel limit and the drive's number range, before enabling."""
+    """Check, before enabling, that the target is inside the travel limit and the number range."""
     drive, shown = axis.drive, envelope.shown
     if abs(target - start) > units.position_raw(envelope.travel_rev):
         away = shown.say(units.position(target - start), "+.4g")
@@ -203,7 +203,7 @@ def _require_reachable(
 
 
 async def _dwell(axis: Axis, dwell_s: float, watch: _Watch) -> None:
-    """Wait, and notice when the axis is pushed away or leaves Operation enabled meanwhile."""
+    """Wait, and check that the axis stays inside the envelope and in Operation enabled."""
     end = time.monotonic() + dwell_s
     while (left := end - time.monotonic()) > 0:
         await asyncio.sleep(min(left, 5 * threshold.POLL_S))
@@ -213,14 +213,14 @@ async def _dwell(axis: Axis, dwell_s: float, watch: _Watch) -> None:
 async def _to(
     axis: Axis, target: int, watch: _Watch, progress: Progress | None, opens_s: float = 0.0
 ) -> None:
-    """Setpoint handshake (CiA 402-2 clause 10.3.3), then wait for target reached.
+    """Carry out the setpoint handshake (CiA 402-2 clause 10.3.3), then wait for target reached.
 
     ``opens_s`` is how long the brake of an axis that was just enabled may still be opening.
     """
     drive, units = axis.drive, await axis.units()
     start, envelope = watch.start, watch.envelope
     _require_reachable(axis, units, target, start, envelope)
-    # A word that enables must not bring back an axis that somebody or a fault took out.
+    # The enable command must not re-enable an axis that a person or a fault has disabled.
     await _still_inside(axis, watch)
     word = cia402.ENABLE_OPERATION | cia402.CHANGE_IMMEDIATELY
     await axis.control(word)
@@ -249,10 +249,10 @@ async def _to(
 
 
 async def _handed_over(axis: Axis, word: int, opens_s: float) -> None:
-    """Raise the bit of a new setpoint, again while the brake opens and none is acknowledged.
+    """Set the new-setpoint bit; repeat while the brake opens and there is no acknowledge.
 
-    A drive loses what comes while its brake opens (000:1377, 002:8117): without this the axis
-    would stand, enabled, until the time of the move is over.
+    A drive ignores setpoints while its brake opens (000:1377, 002:8117): without the repetition the
+    enabled axis would stay at standstill until the time of the move is over.
     """
     opened = time.monotonic() + opens_s
     while True:
@@ -264,10 +264,10 @@ async def _handed_over(axis: Axis, word: int, opens_s: float) -> None:
 
 
 async def _acknowledged(axis: Axis) -> bool:
-    """Give the drive time to take the setpoint (CiA 402: bit 12); whether it has said so.
+    """Wait for the acknowledge of the setpoint (CiA 402: bit 12); whether it came.
 
-    Families print the acknowledge in different bits (004:3765 has it in 13), so its absence
-    is no error here; whether the axis arrives is judged afterwards.
+    The families' manuals state different bits for it (004:3765: bit 13), so a missing acknowledge
+    is not an error here; whether the axis reaches the target is checked afterwards.
     """
     deadline = time.monotonic() + threshold.ACKNOWLEDGE_S
     while not await axis.status_word() & cia402.STATUS_SET_POINT_ACKNOWLEDGE:
@@ -278,7 +278,7 @@ async def _acknowledged(axis: Axis) -> bool:
 
 
 def _require_inside(axis: Axis, units: AxisUnits, settings: MoveSettings) -> tuple[str, int]:
-    """Role and raw value of a velocity or torque target that is inside the envelope."""
+    """Role and raw value of a velocity or torque target, after checking it against the envelope."""
     drive, envelope = axis.drive, settings.envelope
     velocity = settings.mode == "PV"
     limit = envelope.speed_rpm if velocity else envelope.torque_percent
@@ -302,7 +302,7 @@ def _require_inside(axis: Axis, units: AxisUnits, settings: MoveSettings) -> tup
 
 
 async def _hold(axis: Axis, settings: MoveSettings, start: int, progress: Progress) -> None:
-    """Velocity or torque for the envelope's time, inside its travel and speed."""
+    """Command velocity or torque for the envelope's time, inside its travel and speed."""
     drive, units, envelope = axis.drive, await axis.units(), settings.envelope
     role, raw = _require_inside(axis, units, settings)
     await drive.command(drive.require(role), raw, axis.grant())
@@ -315,7 +315,7 @@ async def _hold(axis: Axis, settings: MoveSettings, start: int, progress: Progre
 
 
 async def _still_inside(axis: Axis, watch: _Watch) -> int:
-    """Status word; ends the motion when the axis left the envelope or Operation enabled."""
+    """Status word; raises when the axis left the envelope or Operation enabled."""
     drive, units, envelope = axis.drive, await axis.units(), watch.envelope
     asked_s = time.monotonic()
     keys = [drive.require(r) for r in ("status_word", "position_actual", "velocity_actual")]

@@ -1,4 +1,4 @@
-"""Runs a profile's named procedures: save, restore, reset, write-settings …"""
+"""Execution of a profile's named procedures: save, restore, reset, write settings and others."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from profiles.schema import (
 
 
 def describe(procedure: Procedure) -> list[Text]:
-    """Each step as a message; ``text`` of a confirmation is a text of the profile."""
+    """Messages that describe the steps; the ``text`` of a confirmation is a text of the profile."""
     return [_described(step) for step in procedure.steps]
 
 
@@ -54,11 +54,11 @@ def _described(step: Step) -> Text:
 async def run_procedure(
     axis: Axis, procedure: Procedure, confirmed: bool, progress: Progress
 ) -> JobResult:
-    """Carry out the steps in order; the first that fails ends it.
+    """Carry out the steps in order; the first failure ends the procedure.
 
     Raises:
-        NotAllowed: not confirmed, or the axis is enabled and must not be.
-        DriveError: a step failed; the message says which and that later steps were not done.
+        NotAllowed: not confirmed, or the axis is enabled although it must not be.
+        DriveError: a step failed; states which, and that later steps were not carried out.
     """
     drive = axis.drive
     texts = [step.text for step in procedure.steps if isinstance(step, ConfirmStep)]
@@ -116,10 +116,10 @@ async def _carry_out(
 
 
 def _rest_from(steps: Sequence[Step], number: int) -> float:
-    """For how long others leave the drive alone from this step on; 0 to begin nothing.
+    """Time without access by others to the drive, beginning with this step [s]; 0: none begins.
 
-    It begins before the write that a wait follows: what is asked between the two, an EP3E would
-    hear while it stores, and store nothing (001:1212).
+    It begins before the write that a wait follows: if an EP3E receives a request between the two,
+    while it stores, it stores nothing (001:1212).
     """
     step, after = steps[number], steps[number + 1 : number + 2]
     if isinstance(step, WriteStep) and after and isinstance(after[0], WaitStep):
@@ -141,7 +141,7 @@ async def _step(axis: Axis, step: Step) -> None:
                 await drive.trigger(step.key, int(value))
         case RewriteStep():
             for key in sorted(drive.unsaved):
-                # Read again: what is stored must be what the drive holds, not what was seen last.
+                # Read again: the drive must store what it holds, not what was read last.
                 raw = (await drive.read(key)).raw
                 if raw is not None and motion_of(drive.parameter(key)) != "energises":
                     await drive.write(key, raw)
@@ -183,7 +183,7 @@ async def _poll(axis: Axis, step: PollStep) -> None:
 
 
 async def _reconnect(axis: Axis, timeout_s: float) -> None:
-    """The drive restarts: wait until its status word can be read again."""
+    """Wait until the restarting drive's status word can be read again."""
     axis.drive.forget()
     axis.forget()
     deadline = time.monotonic() + timeout_s
@@ -202,7 +202,7 @@ async def _reconnect(axis: Axis, timeout_s: float) -> None:
 
 
 def _remember(axis: Axis, name: str) -> None:
-    """What a well-known procedure means for the change marks."""
+    """Update the change marks after a well-known procedure."""
     drive = axis.drive
     match name:
         case "save":

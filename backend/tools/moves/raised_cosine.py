@@ -1,4 +1,4 @@
-"""The speed of a gentle way between two places."""
+"""Speed profile of a gentle move between two positions."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 
 def raised_cosine(distance_rev: float, duration_s: float, rate: float) -> npt.NDArray[np.float64]:
-    """Speed [n] in rev/s, from 0 to 0, whose sum over the samples is ``distance_rev``.
+    """Speed [n] in rev/s, from 0 to 0, whose integral is ``distance_rev``.
 
     ``rate`` is in samples per s. The peak is twice the mean speed.
     """

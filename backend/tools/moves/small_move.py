@@ -1,7 +1,7 @@
-"""A small move by increments, which needs no scale and teaches one.
+"""A small move by increments, which needs no scale and helps to find it.
 
-The axis follows a smooth path of so many increments in CSP, slowly and with little torque; a person
-looks how far its shaft turns. It is not known beforehand how far that is: the first move is short,
+The axis follows a smooth path of this many increments in CSP, slowly and with little torque; a
+person observes how far its shaft turns. As that is not known beforehand, the first move is short,
 and each may be ten times as long as the longest before it.
 """
 
@@ -33,14 +33,14 @@ _MOST_INCREMENTS = 2**30
 
 @dataclass(frozen=True, slots=True)
 class SmallMoveSettings:
-    """``increments`` with their sign; ``torque_percent`` of rated, above which the axis stops."""
+    """Signed ``increments``; ``torque_percent`` of rated torque, above which the axis stops."""
 
     increments: int
     torque_percent: float = 20.0
 
 
 def longest_allowed(axis: Axis) -> int:
-    """Increments that the next move of this axis may have."""
+    """Largest number of increments for the next move of this axis."""
     known = axis.small_moves
     return FIRST_INCREMENTS if known is None else min(LONGER * known.longest, _MOST_INCREMENTS)
 
@@ -48,14 +48,14 @@ def longest_allowed(axis: Axis) -> int:
 async def small_move(
     axis: Axis, session: CyclicSession, settings: SmallMoveSettings, progress: Progress
 ) -> JobResult:
-    """Move, and note what 606Ch said meanwhile; the axis stays where it arrived, disabled.
+    """Move, and measure the scale of 606Ch; the axis stays where it arrived, disabled.
 
     Raises:
         OutOfRange: no increments, more than may be moved now, or a torque outside its bounds.
         NotAllowed: no CSP in this exchange, or the axis did not follow.
     """
     drive = axis.drive
-    # What an increment is may have changed since the last small move, which permits a longer one.
+    # The scales may have changed since the last small move, which determines the permitted length.
     await axis.read_scales()
     _check(axis, settings)
     require_signals(axis, session, Mode.CSP, False)
@@ -100,7 +100,7 @@ async def small_move(
 
 
 class _Seen:
-    """Raw 6064h and 606Ch by the number of their cycle, as they come."""
+    """Raw 6064h and 606Ch by cycle number, as received."""
 
     def __init__(self, axis: Axis) -> None:
         drive = axis.drive
@@ -109,7 +109,7 @@ class _Seen:
         self._rows: list[tuple[float, float, float]] = []
 
     def take(self, block: bus.ScopeBlock) -> None:
-        """Samples of the exchange; those that are lost or not trusted are left out."""
+        """Add samples of the exchange, without lost or untrusted ones."""
         columns = [block.channels.index(name) for name in self._names]
         for number, row in enumerate(block.samples[:, columns]):
             good = block.valid is None or bool(block.valid[number])
@@ -117,7 +117,7 @@ class _Seen:
                 self._rows.append((block.cycle + number, float(row[0]), float(row[1])))
 
     def evenly(self) -> tuple[FloatArray, FloatArray]:
-        """Position and speed of every cycle; a straight line where some are missing."""
+        """Position and speed of every cycle; interpolated linearly where some are missing."""
         if len(self._rows) < 2:
             return np.zeros(0), np.zeros(0)
         cycle, position, speed = np.array(self._rows).T
@@ -148,7 +148,7 @@ def _check(axis: Axis, settings: SmallMoveSettings) -> None:
 
 
 def _path(increments: int, cycle: float) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """A raised cosine from 0 to the end, with a rest before and behind."""
+    """Raised cosine from 0 to the end, with a dwell before and after."""
     count, rest = round(threshold.MOVE_S / cycle), round(threshold.REST_S / cycle)
     way = 0.5 * increments * (1.0 - np.cos(np.pi * np.arange(count + 1) / count))
     ends = np.zeros(rest), np.full(rest, float(increments))
@@ -156,7 +156,7 @@ def _path(increments: int, cycle: float) -> np.ndarray[tuple[int], np.dtype[np.i
 
 
 async def _envelope(axis: Axis, settings: SmallMoveSettings, start: int) -> bus.Envelope:
-    """By position and torque alone: what a speed means is what is to be found out."""
+    """Limits of position and torque alone: the scale of the speed is not known yet."""
     margin = round(threshold.MARGIN * abs(settings.increments)) + threshold.MARGIN_INCREMENTS
     low, high = sorted((start, start + settings.increments))
     torque = (await axis.units()).torque_raw(settings.torque_percent)

@@ -1,4 +1,4 @@
-"""Constant speeds, in turn forwards and backwards about one place."""
+"""Reciprocating strokes of constant speed about one position."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class Stroke:
-    """One speed: ``strokes`` plateaus, in turn forwards and backwards."""
+    """One speed: ``strokes`` plateaus, alternately forwards and backwards."""
 
     speed_rps: float
     ramp_s: float
@@ -29,19 +29,19 @@ class Stroke:
 
     @property
     def length_rev(self) -> float:
-        """Way of one stroke."""
+        """Length of one stroke [rev]."""
         return self.speed_rps * (self.ramp_s + threshold.SETTLE_S + self.plateau_s)
 
     @property
     def duration_s(self) -> float:
-        """About, with the ways to where it begins and back."""
+        """Approximate duration with the ways to its start and back [s]."""
         one = 2 * self.ramp_s + threshold.SETTLE_S + self.plateau_s + threshold.DWELL_S
         return self.strokes * one + 2 * threshold.DWELL_S + 1.0
 
 
 @dataclass(frozen=True)
 class Room:
-    """What the plan may use: rev to each side, rev/s, s, and the time of a ramp per rev/s."""
+    """Limits of the plan: rev to each side, rev/s, s, and the duration of a ramp per rev/s."""
 
     travel_rev: float
     speed_rps: float
@@ -49,19 +49,19 @@ class Room:
     ramp_s_per_rps: float
 
     def ramp_s(self, speed_rps: float) -> float:
-        """Time in which this speed is reached."""
+        """Duration of the ramp to this speed [s]."""
         return max(threshold.RAMP_S, self.ramp_s_per_rps * speed_rps)
 
     def plateau_rev(self, speed_rps: float) -> float:
-        """Way at this speed that the ramp to it, and what settles after it, leave of the travel."""
+        """Length of a plateau at this speed, after ramp and settling, within the travel [rev]."""
         return 2 * self.travel_rev - speed_rps * (self.ramp_s(speed_rps) + threshold.SETTLE_S)
 
 
 def room_of(envelope: Envelope, facts: AxisFacts, rough: RoughFit) -> Room:
-    """Shares of the envelope, and ramps that take a share of the torque beyond friction."""
+    """Shares of the envelope, and ramps that use a share of the torque beyond friction."""
     permitted_nm = envelope.torque_percent / 100.0 * facts.rated_torque_nm
     free_nm = permitted_nm - rough.coulomb_nm - abs(rough.gravity_nm)
-    # The steepest place of a raised cosine is π/2 times its mean.
+    # The highest slope of a raised cosine is π/2 times its mean.
     per_rps = np.pi / 2 * rough.inertia_kgm2 * _TURN / max(threshold.RAMP_SHARE * free_nm, 1e-9)
     return Room(
         threshold.USED * envelope.travel_rev,
@@ -72,15 +72,15 @@ def room_of(envelope: Envelope, facts: AxisFacts, rough: RoughFit) -> Room:
 
 
 def representable(speeds_rps: FloatArray, units: AxisUnits) -> list[float]:
-    """The same, as the drive can be given them."""
+    """The nearest speeds that can be commanded to the drive [rev/s], without duplicates and 0."""
     raws = sorted({int(units.velocity_raw(60.0 * v)) for v in speeds_rps} - {0})
     return [float(units.velocity(raw)) / 60.0 for raw in raws]
 
 
 def speeds_of(stroke: Stroke, rate: float, slow_rps: float) -> tuple[FloatArray, FloatArray]:
-    """Speed [n] in rpm and, per sample, the signed number of the plateau that it counts for.
+    """Speed [n] in rpm and, per sample, the signed number of its plateau.
 
-    The axis goes half a stroke back from where it is, and comes back there at the end.
+    The axis first moves back by half a stroke, and returns to its position at the end.
     """
     half = raised_cosine(-0.5 * stroke.length_rev, max(stroke.length_rev / slow_rps, 0.4), rate)
     still = np.zeros(round(threshold.DWELL_S * rate))

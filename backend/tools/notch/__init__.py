@@ -1,1 +1,1 @@
-"""Notches of a drive: read, write, and measure what their values do."""
+"""Notches of a drive: reading, writing, and measuring the effect of their values."""

@@ -1,10 +1,10 @@
-"""What the notch values of a drive mean, measured on the drive where no manual prints it.
+"""Measurement of what a drive's notch values do, where no manual documents it.
 
-The same signal is played without a notch and with some of its values, all at one frequency; what
-they do is read from the reported torque (:mod:`backend.analysis.loop.notch_effect`): of a free axis
-without a loop (here), of one that a load pulls with its closed speed loop
-(:mod:`backend.tools.notch.in_loop`). M6-L prints no depth, R6L only levels. Every value is put
-back.
+The same signal is played without a notch and with some of its values, all at one frequency; their
+effect is read from the reported torque (:mod:`backend.analysis.loop.notch_effect`): on a free axis
+without a loop (here), on one with a static load torque under its closed speed loop
+(:mod:`backend.tools.notch.in_loop`). The manual of M6-L states no depth, that of R6L only levels.
+All values are restored.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ ATTEMPTS = threshold.ATTEMPTS
 
 
 def unknown(drive: Drive) -> bool:
-    """Whether the family has notches whose effect no manual prints."""
+    """Whether the family has notches whose effect no manual documents."""
     spec = drive.profile.notch
     return spec is not None and spec.encoding in ("hz_width", "hz_levels")
 
@@ -72,14 +72,14 @@ async def measure_meaning(
     still: bool = False,
     repeats: Repeats | None = None,
 ) -> NotchMeaning:
-    """Try values of the first notch on an axis that no load pulls, without a loop.
+    """Try values of the first notch without a loop, on an axis without static load torque.
 
-    ``path`` lies between setpoint and torque, as a measurement of the mechanics found it. With
-    ``still`` the axis only trembles where it is: what a notch does to the torque shows
-    without any travel, and friction is no part of it.
+    ``path`` is the signal path between setpoint and torque, as a measurement of the mechanics found
+    it. With ``still`` the axis only vibrates about its position: the effect of a notch on the
+    torque is visible without travel, and friction does not affect it.
 
     Raises:
-        NotAllowed: the axis cannot be measured so, or the notch does nothing that can be seen.
+        NotAllowed: the axis cannot be measured in this way, or the notch has no visible effect.
     """
     require_signals(axis, session, Mode.CST, False)
     rate = 1.0 / cycle_s(session)
@@ -96,10 +96,10 @@ async def measure_meaning(
 
 
 class Player(Protocol):
-    """One way of playing the same signal again and again, and of comparing what came."""
+    """A way of playing the same signal repeatedly and of comparing the responses."""
 
     async def plain(self, reported: Callable[[float], None]) -> float:
-        """Play without a notch, first of all; the lowest centre in Hz to try notches at.
+        """Play without a notch, as the first step; the lowest centre to try notches at [Hz].
 
         Raises:
             NotAllowed: no notch may be tried on this axis.
@@ -107,10 +107,10 @@ class Player(Protocol):
         ...
 
     async def notched(self, reported: Callable[[float], None]) -> NotchEffect:
-        """Play with the notch that the drive has now.
+        """Play with the drive's present notch.
 
         Raises:
-            ValueError: nothing like a notch is seen.
+            ValueError: no effect of a notch is visible.
         """
         ...
 
@@ -119,13 +119,13 @@ async def tried_with(
     player: Player, axis: Axis, session: CyclicSession, envelope: Envelope, facts: AxisFacts,
     progress: Progress, near_rev: float = 0.0, repeats: Repeats | None = None,
 ) -> NotchMeaning:  # fmt: skip
-    """Try values of the first notch; all are restored, and the axis where it was.
+    """Try values of the first notch; afterwards all values and the position are restored.
 
-    Nearer to there than ``near_rev`` the next trial begins where the one before has ended.
-    Values beyond those that it takes at least are tried as ``repeats`` allows.
+    Where the axis is within ``near_rev`` of its start, the next trial begins where the previous one
+    ended. Values beyond the necessary minimum are tried as ``repeats`` allows.
 
     Raises:
-        NotAllowed: the axis cannot be measured so, or the notch does nothing that can be seen.
+        NotAllowed: the axis cannot be measured in this way, or the notch has no visible effect.
     """
     drive = axis.drive
     spec = drive.profile.notch
@@ -180,7 +180,7 @@ async def tried_with(
 def room_to_tremble(
     envelope: Envelope, at_rev: float, ends_rev: tuple[float, float] | None
 ) -> Envelope | None:
-    """The envelope of an axis that stays where it is; None too near to an end for it."""
+    """Envelope of an axis that vibrates about its position; None where it is too near to an end."""
     to_end = (
         threshold.STILL_REV if ends_rev is None else min(at_rev - ends_rev[0], ends_rev[1] - at_rev)
     )
@@ -199,7 +199,7 @@ def _sequence(
     still: bool,
     part: float = 1.0,
 ) -> excite.Sequence:
-    """The excitation of a frequency response, one realisation, or ``part`` of its size."""
+    """Excitation of a frequency response, one realisation, at ``part`` of its size."""
     rated = facts.rated_torque_nm
     room = excite.Room(
         envelope.torque_percent / 100.0 * rated,
@@ -220,12 +220,12 @@ def _sequence(
         )
     except ValueError as error:
         raise NotAllowed("notch.envelope-not-allow-measure", cause=reason_of(error)) from error
-    # Another period shows no more: tried on axes that turn and on such that tremble.
+    # Further periods add no accuracy: tried on turning and on vibrating axes.
     return _one_period(made[0])
 
 
 def _one_period(sequence: excite.Sequence) -> excite.Sequence:
-    """With one period after the settling; a whole one moves a free axis nowhere."""
+    """The sequence with one period after the settling; a whole period moves a free axis nowhere."""
     e = sequence.excitation
     kept = e.transient_periods + 1
     cut = slice(
@@ -236,10 +236,10 @@ def _one_period(sequence: excite.Sequence) -> excite.Sequence:
 
 @dataclass
 class _Free:
-    """No loop: the ratio of the torques is the notch.
+    """Trial without a loop: the ratio of the torques is the response of the notch.
 
-    Friction leaves the axis a turn from where it began, so each trial is the one before with its
-    sign turned: that brings it back.
+    Friction leaves the axis about a revolution from its start, so each trial has the opposite sign
+    of the one before: that returns it.
     """
 
     axis: Axis
@@ -250,7 +250,7 @@ class _Free:
     sequence: excite.Sequence
     home: int
     smaller: Callable[[int], excite.Sequence] | None = None
-    """The sequence after so many that were too fast; nothing where there is one alone."""
+    """Makes the sequence after this many that were too fast; None where there is only one."""
     repeats: Repeats = field(default_factory=Repeats)
     _plain: ComplexArray | None = None
     _sign: int = 1
@@ -266,10 +266,10 @@ class _Free:
         return fit_effect(self.sequence.excitation.line_hz, seen / self._plain, self.path)
 
     async def _by_sent(self, reported: Callable[[float], None]) -> ComplexArray:
-        """Reported torque over the one sent, at the lines; smaller where the axis is too fast.
+        """Reported torque over commanded torque [lines]; weaker where the axis is too fast.
 
-        How fast it becomes depends on how its load swings. What a notch does is the same at any
-        size.
+        The speed that it reaches depends on how its load oscillates. The effect of a notch does not
+        depend on the size.
         """
         while True:
             try:
@@ -290,10 +290,10 @@ class _Free:
         return np.asarray(torque / np.fft.rfft(e.one_period)[e.lines])
 
     async def _torque(self, reported: Callable[[float], None]) -> ComplexArray:
-        """Spectrum of the reported torque at the lines, over the whole periods.
+        """Spectrum of the reported torque over the whole periods [lines].
 
         Raises:
-            NotAllowed: also where samples were lost each time.
+            NotAllowed: also where samples were lost in every attempt.
         """
         axis, facts = self.axis, self.facts
         units = await axis.units()
@@ -336,11 +336,11 @@ def periods_of(
 
 
 class SamplesLost(NotAllowed):
-    """No try of a notch had as many periods without a gap as it needs."""
+    """No attempt with a notch had the necessary number of periods without a gap."""
 
 
 def samples_lost(axis: Axis, tries: int) -> SamplesLost:
-    """That so many tries of one value all lost samples."""
+    """Error that all attempts with one value lost samples."""
     if tries < ATTEMPTS:
         return SamplesLost("notch.samples-lost-no-time", drive=axis.drive.name)
     return SamplesLost("notch.samples-lost", drive=axis.drive.name, tries=tries)
@@ -349,7 +349,11 @@ def samples_lost(axis: Axis, tries: int) -> SamplesLost:
 def _meaning(
     drive: Drive, centre: int, effects: list[tuple[Trial, NotchEffect | None]]
 ) -> NotchMeaning:
-    """What the trials say together."""
+    """Combine the trials.
+
+    Raises:
+        NotAllowed: no trial showed an effect.
+    """
     seen = [(trial, effect.notch) for trial, effect in effects if effect is not None]
     if not seen:
         raise NotAllowed("notch.notch-hz-nothing-torque", drive=drive.name, centre_hz=centre)
@@ -357,7 +361,7 @@ def _meaning(
         scale = float(np.mean([notch.width_hz / trial.width for trial, notch in seen]))
         depth = float(np.mean([notch.depth_db for _trial, notch in seen]))
         return NotchMeaning(float(centre), None, scale, depth)
-    # The same width was tried with several depths: the deep ones show it best.
+    # The same width was tried with several depths: the deepest ones determine it best.
     widths: dict[int, list[Notch]] = {}
     for trial, notch in seen:
         widths.setdefault(trial.width, []).append(notch)
@@ -376,7 +380,7 @@ def _meaning(
 
 
 def _every_level(drive: Drive, points: list[tuple[int, float]]) -> tuple[tuple[int, float], ...]:
-    """Depth of each level between those that were tried, by what is left of the amplitude."""
+    """Depth of each level between those tried, interpolated in the remaining amplitude."""
     spec = drive.profile.notch
     assert spec is not None
     low, high = limits_of(drive, spec.slots[0].depth_key)
@@ -387,7 +391,7 @@ def _every_level(drive: Drive, points: list[tuple[int, float]]) -> tuple[tuple[i
 
 
 def path_of(rate: float, facts: AxisFacts, hold: str | None, delay_s: float) -> SignalPath:
-    """The path between setpoint and torque, as a frequency response found it."""
+    """Signal path between setpoint and torque, as a frequency response found it."""
     path = SignalPath(
         rate, current_bandwidth_hz=facts.current_bandwidth_hz, command_delay_s=delay_s
     )

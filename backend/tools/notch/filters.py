@@ -1,7 +1,7 @@
-"""Notches of a drive: read, show what a wanted notch would become, write.
+"""Notches of a drive: read, preview how the drive would realise a wanted notch, write.
 
-Encodings come from the profile (`NotchSpec`); what a drive does with levels whose formula no
-manual prints is not guessed here.
+Encodings come from the profile (`NotchSpec`); the effect of levels without a documented formula is
+not guessed here.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ UNKNOWN_DEPTH_DB = threshold.UNKNOWN_DEPTH_DB
 
 @dataclass(frozen=True)
 class SlotState:
-    """One notch of the drive. ``notch`` is None where its values mean none (or levels only)."""
+    """One notch of the drive. ``notch`` is None where its values define none (or only levels)."""
 
     slot: int
     enabled: bool
@@ -51,7 +51,7 @@ class SlotState:
 
 @dataclass(frozen=True)
 class Preview:
-    """What a wanted notch would become; ``realised`` is None where no formula is known."""
+    """How a wanted notch would be realised; ``realised`` is None where no formula is known."""
 
     slot: int
     asked: Notch | None
@@ -61,7 +61,11 @@ class Preview:
 
 
 def spec_of(profile: Profile, drive: str) -> NotchSpec:
-    """Raises NotAllowed where the family documents no notch."""
+    """Notch encoding of the profile.
+
+    Raises:
+        NotAllowed: the family documents no notch.
+    """
     if profile.notch is None:
         raise NotAllowed(
             "notch.documents-no-notch-filters", drive=drive, profile_title=profile.title
@@ -96,7 +100,7 @@ def _hz_width_db(
     """Steps of frequency, width and attenuation.
 
     Raises:
-        Unsuitable: what a step means is not known.
+        Unsuitable: the unit of a step is not known.
     """
     keys = profile.by_key
     frequency, width = keys[slot.frequency_key or ""], keys[slot.width_key or ""]
@@ -104,7 +108,7 @@ def _hz_width_db(
 
 
 def _width_steps(slot: NotchSlot, width: Parameter) -> IntegerRange:
-    """Steps of a width whose meaning is measured: Hz, or levels where depth is one as well."""
+    """Steps of a width whose effect is measured: Hz, or levels where the depth has levels too."""
     return hz_steps(width) if slot.depth_key is None else level_steps(width)
 
 
@@ -122,13 +126,13 @@ def encode(
     enable_now: int | None,
     meaning: NotchMeaning | None = None,
 ) -> Preview:
-    """Raw values for one slot; None switches it off. ``enable_now`` is its enable word as it is.
+    """Raw values for one slot; None switches it off. ``enable_now`` is its present enable word.
 
-    ``meaning`` is what was measured of values that no manual explains.
+    ``meaning`` is the measured effect of values that no manual documents.
 
     Raises:
-        NotAllowed: no notches, or an encoding without a printed formula.
-        OutOfRange: the drive cannot make this notch.
+        NotAllowed: no notches, or an encoding without a documented formula.
+        OutOfRange: the drive cannot realise this notch.
     """
     spec = spec_of(profile, drive)
     slot = _slot(spec, number, drive)
@@ -159,10 +163,14 @@ def _require_meant(
     raw: Mapping[str, int],
     meaning: NotchMeaning | None,
 ) -> None:
-    """Raise OutOfRange where these values, read back, are no notch or one elsewhere."""
+    """Check that these values, read back, define a notch at the wanted frequency.
+
+    Raises:
+        OutOfRange: they define none, or one elsewhere.
+    """
     spec = spec_of(profile, drive)
     if notch is None or spec.encoding == "coefficients":
-        # Coefficients show their own response, coarse as it may be.
+        # Coefficients determine their own response, however coarse.
         return
     slot = spec.slots[number]
     on = slot.enable_key is not None or slot.frequency_key is None
@@ -193,12 +201,12 @@ def _enable(profile: Profile, slot: NotchSlot, on: bool, enable_now: int | None)
 
 
 def off_raw(profile: Profile, frequency_key: str) -> int:
-    """What a frequency is where its notch is off, in a family without an enable bit.
+    """Raw frequency of a notch that is off, in a family without an enable bit.
 
-    All notches are off by default: some by a frequency of 0, some by the highest there is.
+    All notches are off by default: in some families by a frequency of 0, in others by the highest.
 
     Raises:
-        NotAllowed: the manual does not say.
+        NotAllowed: the manual does not state it.
     """
     parameter = profile.by_key[frequency_key]
     _low, high = parameter.raw_limits
@@ -235,7 +243,7 @@ def _encoded(
 def _by_measure(
     profile: Profile, slot: NotchSlot, notch: Notch, meaning: NotchMeaning | None
 ) -> tuple[dict[str, int], RealisedNotch | None, Text | None]:
-    """Values that no manual explains, by what was measured of them."""
+    """Raw values of an undocumented encoding, by its measured effect."""
     keys = profile.by_key
     frequency, width = keys[slot.frequency_key or ""], keys[slot.width_key or ""]
     depth = None if slot.depth_key is None else level_steps(keys[slot.depth_key])
@@ -257,10 +265,10 @@ def _by_measure(
 def response(
     profile: Profile, notch: Notch, frequency_hz: FloatArray, meaning: NotchMeaning | None = None
 ) -> ComplexArray:
-    """What the family's drive makes of a notch.
+    """Response of a notch as the family's drive realises it [lines].
 
     Raises:
-        ValueError: it cannot make it.
+        ValueError: the drive cannot realise it.
     """
     spec = profile.notch
     if spec is None:
@@ -280,7 +288,7 @@ def response(
 
 
 def _possible(profile: Profile, notch: Notch, meaning: NotchMeaning | None) -> Preview:
-    """As `encode`; ValueError where the drive's ranges do not hold the notch."""
+    """As `encode`; ValueError where the notch is outside the drive's ranges."""
     try:
         return encode(profile, profile.drive, 0, notch, None, meaning)
     except OutOfRange as error:
@@ -288,7 +296,7 @@ def _possible(profile: Profile, notch: Notch, meaning: NotchMeaning | None) -> P
 
 
 async def read_notches(drive: Drive, meaning: NotchMeaning | None = None) -> tuple[SlotState, ...]:
-    """All notches of a drive, read now.
+    """Read all notches of a drive.
 
     Raises:
         NotAllowed: the family documents none.
@@ -347,10 +355,10 @@ def _decoded(
 async def plan_notches(
     drive: Drive, wanted: Sequence[Notch | None], meaning: NotchMeaning | None = None
 ) -> dict[str, int]:
-    """Raw values that make the drive's slots these notches, those without one switched off.
+    """Raw values that set the drive's slots to these notches and switch the other slots off.
 
     Raises:
-        OutOfRange, NotAllowed: the drive cannot make one of them; nothing is written.
+        OutOfRange, NotAllowed: the drive cannot realise one of them; nothing is written.
     """
     spec = spec_of(drive.profile, drive.name)
     if len(wanted) > len(spec.slots):
@@ -378,10 +386,11 @@ async def plan_notches(
 async def write_notches(
     axis: Axis, wanted: Sequence[Notch | None], meaning: NotchMeaning | None = None
 ) -> dict[str, int]:
-    """Write all slots; returns the raw values that were there, for undo.
+    """Write all slots; returns the previous raw values, for undo.
 
     Raises:
-        NotAllowed: the axis is enabled, or the drive cannot make one. Nothing is half written.
+        NotAllowed: the axis is enabled, or the drive cannot realise a notch. Nothing stays partly
+            written.
     """
     return await write_settings(axis, await plan_notches(axis.drive, wanted, meaning))
 
@@ -392,7 +401,7 @@ def combined(
     frequency_hz: FloatArray,
     meaning: NotchMeaning | None = None,
 ) -> ComplexArray:
-    """All notches in series as the drive makes them."""
+    """Response of all notches in series as the drive realises them [lines]."""
     total: ComplexArray = np.ones(frequency_hz.shape, dtype=np.complex128)
     for notch in notches:
         total = np.asarray(total * response(profile, notch, frequency_hz, meaning))

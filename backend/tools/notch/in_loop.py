@@ -1,9 +1,9 @@
-"""What notch values do on an axis that must be held: measured with its closed speed loop.
+"""Effect of notch values on an axis that must be held: measured under its closed speed loop.
 
-A load that pulls is never let go. The speed loop's reference is the excitation, as where a drive
-takes no torque with a loop (:mod:`backend.tools.sweep.speed_injection`); torque and speed
-together show the notch (:mod:`backend.analysis.loop.notch_effect`). Nothing is tried before the
-loop as measured is known to stay stable whatever a notch there may do.
+A load with static torque is never released. The speed loop's reference is the excitation, as where
+a drive accepts no torque offset (:mod:`backend.tools.sweep.speed_injection`); torque and speed
+together show the notch (:mod:`backend.analysis.loop.notch_effect`). No value is tried before the
+measured loop is known to stay stable with any notch at that frequency.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from drivers.errors import NotAllowed
 from drivers.texts.message import reason_of
 
 _TURN = 2.0 * np.pi
-#: Centres to try, Hz.
+#: Centre frequencies to try [Hz].
 _CENTRES = np.geomspace(50.0, 400.0, 19)
 
 
@@ -59,11 +59,11 @@ async def measure_meaning_in_loop(
     progress: Progress,
     repeats: Repeats | None = None,
 ) -> NotchMeaning:
-    """As `notch_effect.measure_meaning`, with the speed loop closed all the time.
+    """Measure as `notch_effect.measure_meaning`, with the speed loop closed all the time.
 
     Raises:
-        NotAllowed: the axis cannot be measured so, a notch might make its loop swing, or it does
-            nothing that can be seen.
+        NotAllowed: the axis cannot be measured in this way, a notch might make its loop unstable,
+            or it has no visible effect.
     """
     require_signals(axis, session, Mode.CSV, False)
     if mechanics.model is None:
@@ -78,7 +78,7 @@ async def measure_meaning_in_loop(
     )
     setup = await setup_of(axis, session, settings, facts, "speed", None)
     if not setup.by_speed:
-        # Where torque could be added, too: whether it passes the notch no manual says.
+        # Also where a torque offset is possible: no manual states whether it passes the notch.
         reported = await gains.read_gains(axis, facts)
         setup = replace(setup, by_speed=True, integral_hz=reported.integral_hz)
     plant = measured_plant(mechanics.frf, mechanics.model)
@@ -101,7 +101,7 @@ async def measure_meaning_in_loop(
 
 @dataclass
 class _ClosedLoopTrial:
-    """The speed loop closed, its reference excited."""
+    """Trial with the speed loop closed and its reference excited."""
 
     axis: Axis
     session: CyclicSession
@@ -154,10 +154,10 @@ class _ClosedLoopTrial:
     async def _played(
         self, sequence: excite.Sequence, reported: Callable[[float], None]
     ) -> tuple[excite.Sequence, Recording, LoopLines]:
-        """Weaker where the loop answers with too much torque; lines per rad/s sent.
+        """Play the sequence, weaker where the loop takes too much torque; lines per rad/s sent.
 
         Raises:
-            NotAllowed: also where samples are lost each time, so that nothing shows the noise.
+            NotAllowed: also where samples are lost in every attempt, so that the noise is unknown.
         """
         begun_s, tries = time.monotonic(), 0
         kept: tuple[ComplexArray, ComplexArray] | None = None
@@ -179,7 +179,7 @@ class _ClosedLoopTrial:
             period = e.samples[e.first_sample :][: e.period_samples]
             found = periods_of(sent, recording)
             if kept and before is not None and np.array_equal(before, e.samples):
-                # The same was played before: its periods show as much.
+                # The same signal was played before: its periods can be used as well.
                 found = (np.concatenate([kept[0], found[0]]), np.concatenate([kept[1], found[1]]))
             kept, before = (found, e.samples) if len(found[0]) else (kept, before)
             if len(found[0]) >= threshold.FEWEST_PERIODS:
@@ -191,10 +191,10 @@ class _ClosedLoopTrial:
 def safe_centre_hz(
     loop: LoopModel, plant: MeasuredPlant, fixed: Callable[[FloatArray], ComplexArray]
 ) -> float | None:
-    """The lowest centre at which no notch brings the loop near to its limit; None: there is none.
+    """Lowest centre at which no notch brings the loop near to instability [Hz]; None without one.
 
-    For all that the axis may be; ``fixed`` is the response of the rest of the loop: current loop,
-    speed filter and delay.
+    Valid for all variants of the plant; ``fixed`` is the response of the rest of the loop: current
+    loop, speed filter and delay.
     """
     f = plant.frequency_hz
     bare = plant.shifted() * (loop.response(f) * fixed(f))

@@ -1,4 +1,4 @@
-"""What notch values mean where no manual prints it: the result of measuring them."""
+"""Measured effect of notch values that no manual documents."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ from backend.drive.drive import Drive
 
 @dataclass(frozen=True)
 class NotchMeaning:
-    """Measured at ``centre_hz``.
+    """Effect of notch values, measured at ``centre_hz``.
 
-    ``levels`` for families of levels; else the width in Hz is ``width_scale`` times the value and
-    every notch is ``depth_db`` deep. ``left_out`` counts values that there was no time to try.
+    ``levels`` is for families with levels; otherwise the width in Hz is ``width_scale`` times the
+    value and every notch has the depth ``depth_db``. ``left_out`` counts values that were not tried
+    for lack of time.
     """
 
     centre_hz: float
@@ -33,19 +34,19 @@ class NotchMeaning:
     def encoded(
         self, notch: Notch, frequency: IntegerRange, width: IntegerRange, depth: IntegerRange | None
     ) -> tuple[int, int, int | None]:
-        """Raw frequency, width and depth that come nearest to a wanted notch.
+        """Raw frequency, width and depth of the nearest possible notch.
 
         Raises:
             ValueError: the centre is outside the range.
         """
         if self.levels is not None and depth is not None:
             return encode_hz_levels(notch, frequency, width, self._known(depth), self.levels)
-        # What was measured is a factor of the width that the value says.
+        # The measurement yields a factor of the nominal width.
         asked = Notch(notch.center_hz, notch.width_hz / self.width_scale, notch.depth_db)
         return *encode_hz_width(asked, frequency, width), None
 
     def _known(self, depth: IntegerRange) -> IntegerRange:
-        """Levels beyond the ones that were tried are not trusted."""
+        """Depth levels within those that were tried; others are not trusted."""
         assert self.levels is not None
         tried = [level for level, _db in self.levels.depth_db]
         return IntegerRange(max(depth.low, min(tried)), min(depth.high, max(tried)))
@@ -53,10 +54,10 @@ class NotchMeaning:
     def decoded(
         self, raw: tuple[int, int, int | None], frequency: IntegerRange, width: IntegerRange
     ) -> Notch:
-        """The notch that these raw values make.
+        """The notch that these raw values define.
 
         Raises:
-            ValueError: they make none.
+            ValueError: they define none.
         """
         hz, wide, deep = raw
         centre_hz = frequency.value(hz)
@@ -65,15 +66,15 @@ class NotchMeaning:
         return Notch(centre_hz, width.value(max(wide, 1)) * self.width_scale, self.depth_db)
 
 
-#: What was measured of the drives of this program, until it ends.
+#: Effects measured on the drives of this process, until it ends.
 _MEASURED: WeakKeyDictionary[Drive, NotchMeaning] = WeakKeyDictionary()
 
 
 def remember(drive: Drive, meaning: NotchMeaning) -> None:
-    """Keep what was measured, for previews and designs of this drive."""
+    """Store the measured effect, for previews and designs of this drive."""
     _MEASURED[drive] = meaning
 
 
 def meaning_of(drive: Drive) -> NotchMeaning | None:
-    """What was measured of this drive's notches; None where nothing was."""
+    """Measured effect of this drive's notches; None where not measured."""
     return _MEASURED.get(drive)

@@ -1,4 +1,4 @@
-"""What a step of a notch's frequency, width and depth means, by the profile's unit and scale."""
+"""Steps of a notch's frequency, width and depth, by the unit and scale in the profile."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from backend.analysis.loop.notch import IntegerRange
 from drivers.texts.message import Unsuitable, text
 from profiles.schema import Parameter
 
-#: Printed units of frequencies, in Hz. One without a unit is in Hz, as its encoding says.
+#: Documented units of frequencies, in Hz. A value without a unit is in Hz, as its encoding states.
 _HZ = {"": 1.0, "Hz": 1.0, "0.1 Hz": 0.1, "kHz": 1e3, "rad/s": 0.5 / math.pi}
 
 
 def level_steps(parameter: Parameter) -> IntegerRange:
-    """Raw limits; a level means what was measured of it."""
+    """Raw limits of levels, whose effect is measured."""
     low, high = parameter.raw_limits
     return IntegerRange(int(low or 0), int(high if high is not None else 0xFFFF))
 
 
 def hz_steps(parameter: Parameter) -> IntegerRange:
-    """Limits and steps of a frequency or a width.
+    """Limits and steps of a frequency or a width in Hz.
 
     Raises:
-        Unsuitable: its unit is none of a frequency.
+        Unsuitable: its unit is not one of frequency.
     """
     unit = _HZ.get(parameter.unit)
     if unit is None:
@@ -34,13 +34,13 @@ def hz_steps(parameter: Parameter) -> IntegerRange:
 
 
 def attenuation_steps(parameter: Parameter) -> IntegerRange:
-    """Limits and steps of a depth, as attenuation.
+    """Limits and steps of a depth as attenuation in dB.
 
     Values of 0 and above are an attenuation, values of 0 and below the gain at the centre.
 
     Raises:
-        Unsuitable: its unit is not dB, or its limits have either sign, so that which one it is
-            cannot be known.
+        Unsuitable: its unit is not dB, or its limits have both signs, so that its meaning is
+            ambiguous.
     """
     if parameter.unit not in ("", "dB"):
         raise Unsuitable(text("notch.unit-of-depth", parameter=parameter.key, unit=parameter.unit))

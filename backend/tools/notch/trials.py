@@ -1,4 +1,4 @@
-"""Which values of a notch are tried to learn what it does, and about how long that takes."""
+"""Values of a notch that are tried to measure its effect, and how long that takes."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ BEFORE = threshold.BEFORE
 
 @dataclass(frozen=True)
 class Trial:
-    """Values of one slot that are tried: levels or Hz."""
+    """Values of one slot to try: levels or Hz."""
 
     width: int
     depth: int | None
 
 
 def trials_of(drive: Drive, slot: NotchSlot, centre: int) -> list[Trial]:
-    """Values that show how width and depth go."""
+    """Values that show the effect of width and depth, the necessary ones first."""
     if slot.depth_key is None:
         return [Trial(round(share * centre), None) for share in threshold.WIDTHS]
     low_w, high_w = limits_of(drive, slot.width_key)
@@ -36,18 +36,18 @@ def trials_of(drive: Drive, slot: NotchSlot, centre: int) -> list[Trial]:
 
 
 def least_of(slot: NotchSlot) -> int:
-    """How many of the trials, from the first, show what there is to show."""
+    """Number of trials, from the first, that are necessary."""
     return threshold.LEAST_WIDTHS if slot.depth_key is None else threshold.LEAST_LEVELS
 
 
 def least_s(drive: Drive) -> float:
-    """About how long it takes to try what must be tried."""
+    """Approximate duration of the necessary trials [s]."""
     slot = _slot(drive)
     return 0.0 if slot is None else threshold.TRIAL_S * (BEFORE + least_of(slot))
 
 
 def every_s(drive: Drive) -> float:
-    """About how long it takes to try all that is worth it, with a closed loop."""
+    """Approximate duration of all useful trials, with a closed loop [s]."""
     slot = _slot(drive)
     return 0.0 if slot is None else threshold.TRIAL_S * (BEFORE + len(trials_of(drive, slot, 1)))
 
@@ -57,16 +57,16 @@ def _slot(drive: Drive) -> NotchSlot | None:
 
 
 def limits_of(drive: Drive, key: str | None) -> tuple[int, int]:
-    """Lowest and highest raw value."""
+    """Lowest and highest raw value of a parameter."""
     low, high = drive.parameter(key or "").raw_limits
     return int(low or 0), int(high or 0)
 
 
 def raw_of(drive: Drive, slot: NotchSlot, centre_hz: int, trial: Trial) -> dict[str, int]:
-    """The raw values that make it.
+    """Raw values of a trial.
 
     Raises:
-        Unsuitable: what a step of its frequency or width means is not known.
+        Unsuitable: the unit of its frequency or width is not known.
     """
     raw: dict[str, int] = {}
     if slot.frequency_key is not None:

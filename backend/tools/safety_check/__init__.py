@@ -1,1 +1,1 @@
-"""Safety acceptance record: what an axis does when a person triggers a safety function."""
+"""Safety acceptance record: the response of an axis when a person triggers a safety function."""

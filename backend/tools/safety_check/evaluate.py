@@ -1,4 +1,4 @@
-"""From the trace of a safety function to times, ways and a verdict. Pure: also from files."""
+"""Times, distances and verdict from the trace of a safety function. Pure: also from stored data."""
 
 from __future__ import annotations
 
@@ -25,27 +25,28 @@ from backend.tools.tool import Arrays, Meta
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
-#: A speed below this share of the commanded one is a sign, once it has lasted this long.
+#: A speed below this share of the commanded one is a sign of the function, after this time.
 _LEFT, _LASTS_S = 0.9, 0.01
-#: The commanded speed must have been constant for this long, so that no run-up is mistaken for a
+#: The commanded speed must have been constant for this time, so that a run-up is not mistaken for a
 #: sign.
 STEADY_S = 0.15
-#: The speed by position is calculated over this time; slower than the greater of these is standing.
+#: Window of the speed by position; standstill is below the greater of this share and this speed.
 _WINDOW_S, _STANDS_SHARE, _STANDS_RPM = 0.02, 0.02, 3.0
-#: Rest is where no more of the way is left than this share of it, or this many revolutions.
+#: The axis has stopped where no more than this share of the distance, or this distance, is left.
 _SETTLED, _RESOLVED_REV = 0.002, 2e-4
-#: The noise of the torque is known without power; deviations, and the least that is distinguished
-#: [%].
+#: The noise of the torque is measured without power: deviations, and the smallest torque that is
+#: distinguished [%].
 _DEVIATIONS, _LEAST_PERCENT, _FILTER = 5.0, 0.3, 5
-#: Torque before the trigger must be so many times that, or its end cannot be determined.
+#: The torque before the trigger must be this many times the noise, or its end is not determined.
 _DISTINCT = 3.0
 _BEFORE_S = 0.1
-#: With SS1 the power goes at standstill: below this share of the speed.
+#: With SS1 the power is removed at standstill: below this share of the speed.
 _AT_STANDSTILL = 0.1
-#: Above a speed limit by this share is beyond it; by so much of the test speed it did not react.
+#: Share by which the speed limit may be exceeded; share of the test speed above which the drive did
+#: not react.
 SPEED_MARGIN, _FOLLOWED = 0.05, 0.95
 _POINTS, _SHOWN_BEFORE_S = 400, 0.2
-#: What a checksum of the signature is over.
+#: Metadata that the checksum of the signature covers.
 _SIGNED = (
     "settings", "measured_at", "sample_rate_hz", "asked_until", "reports", "profile", "drive_id",
     "identity",
@@ -63,9 +64,11 @@ _ARRAYS = (
 
 @dataclass(frozen=True)
 class Trace:
-    """[n], one sample per cycle. ``commanded_rpm`` as it was planned; ``enabled`` and
-    ``quick_stop`` as the drive says. ``asked_until``: from that sample on the tool itself ended
-    the motion."""
+    """Trace [n], one sample per cycle.
+
+    ``commanded_rpm`` as planned; ``enabled`` and ``quick_stop`` as the drive reports. From sample
+    ``asked_until`` on, the tool itself ended the motion.
+    """
 
     position_rev: FloatArray
     speed_rpm: FloatArray
@@ -85,11 +88,11 @@ class Trace:
         return replace(self, **{name: getattr(self, name)[:end] for name in _ARRAYS})
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
-        """For storage."""
+        """The samples as arrays for storage."""
         return {name: getattr(self, name) for name in _ARRAYS}
 
     def facts(self) -> dict[str, object]:
-        """For storage, with the arrays."""
+        """The scalar facts for storage, with the arrays."""
         return {
             "sample_rate_hz": self.sample_rate_hz,
             "asked_until": self.asked_until,
@@ -99,7 +102,7 @@ class Trace:
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> SafetyResult:
-    """The result again, from kept raw data, with its signature where it has one.
+    """Evaluate stored raw data again; with the signature where there is one.
 
     Raises:
         ValueError: not the raw data of a safety check.
@@ -139,7 +142,7 @@ def reevaluate(arrays: Arrays, meta: Meta) -> SafetyResult:
 
 
 def digest(arrays: Arrays, meta: Meta, person: str, signed: str, notes: str) -> str:
-    """SHA-256 over the trace, the settings, and who signs when."""
+    """SHA-256 over the trace, the settings, and the signing person and time."""
     content = {name: meta.get(name) for name in _SIGNED}
     content |= {"person": person, "signed": signed, "notes": notes}
     found = hashlib.sha256(json.dumps(content, sort_keys=True, ensure_ascii=False).encode())
@@ -150,10 +153,10 @@ def digest(arrays: Arrays, meta: Meta, person: str, signed: str, notes: str) -> 
 
 
 def signed(arrays: Arrays, meta: Meta, person: str, when: str, notes: str) -> dict[str, object]:
-    """What is kept next to the raw data when a person signs them.
+    """Signature record to be stored with the raw data.
 
     Raises:
-        ValueError: they are none of a safety check, or are signed already.
+        ValueError: not the raw data of a safety check, or signed already.
     """
     if meta.get("tool") != "safety-check" or "signature" in meta:
         raise ValueError("not the raw data of a safety check that nobody has signed")
@@ -166,12 +169,12 @@ def signed(arrays: Arrays, meta: Meta, person: str, when: str, notes: str) -> di
 
 
 def evaluate(trace: Trace, settings: SafetySettings) -> SafetyResult:
-    """The verdict, of what was seen before the tool itself ended the motion."""
+    """Result, from the samples before the tool itself ended the motion."""
     return _Check(trace.until(trace.asked_until), settings).result()
 
 
 class _Check:
-    """One trace."""
+    """Evaluation of one trace."""
 
     def __init__(self, trace: Trace, settings: SafetySettings) -> None:
         self._trace, self._settings, self._rate = trace, settings, trace.sample_rate_hz
@@ -188,7 +191,7 @@ class _Check:
         self._sign: Sign | None = None if found is None else found[1]
 
     def _torque_noise(self) -> float:
-        """Below it torque is not distinguished from noise; of the time before enabling."""
+        """Torque that is distinguished from noise, from the time before enabling [%]."""
         enabled = np.flatnonzero(self._trace.enabled)
         quiet = self._trace.torque_percent[: enabled[0]] if enabled.size else np.empty(0)
         scatter = float(np.std(quiet)) if quiet.size > _FILTER else 0.0
@@ -196,7 +199,7 @@ class _Check:
         return max(offset + _DEVIATIONS * scatter / math.sqrt(_FILTER / 1.5), _LEAST_PERCENT)
 
     def _steady(self) -> BoolArray:
-        """Where the commanded speed has been constant, and not zero, for some time."""
+        """Samples at which the commanded speed has been constant, and not zero, for `STEADY_S`."""
         commanded = self._trace.commanded_rpm
         changed = np.flatnonzero(np.diff(commanded, prepend=commanded[:1]) != 0.0)
         since = np.zeros(commanded.size, np.int64)
@@ -206,7 +209,7 @@ class _Check:
         return steady
 
     def _first_sign(self) -> tuple[int, Sign] | None:
-        """The first sample that shows it, and by what."""
+        """First sample that shows the function, and the kind of sign; None where there is none."""
         trace, n = self._trace, self._trace.enabled.size
         asked = np.arange(n) < trace.asked_until
         began = np.flatnonzero(trace.enabled & (trace.commanded_rpm != 0.0))
@@ -232,13 +235,13 @@ class _Check:
         return min(signs, default=None)
 
     def _last_above(self, values: FloatArray, limit: float, begin: int) -> int | None:
-        """First sample from ``begin`` on after which none is above; None where the last one is."""
+        """First sample, not before ``begin``, from which no value exceeds the limit; else None."""
         above = np.flatnonzero(values[begin:] > limit)
         found = begin if not above.size else begin + int(above[-1]) + 1
         return found if found < values.size else None
 
     def _rest(self, at: int, stands_rpm: float) -> int | None:
-        """First sample from which on it stays where it ends; None where it still turns then."""
+        """First sample from which the axis stays at its final position; None if it still turns."""
         last = np.abs(self._speed[-max(1, round(_BEFORE_S * self._rate)) :])
         if float(np.median(last)) > stands_rpm:
             return None
@@ -321,7 +324,7 @@ class _Check:
         return None
 
     def _cut(self, at: int, free: int, speed: float) -> bool:
-        """It braked by a quick stop at whose beginning our own exchange took the power away."""
+        """Whether the power was removed by the exchange at the beginning of a quick stop."""
         fast = abs(float(self._speed[free])) > _AT_STANDSTILL * abs(speed)
         return fast and bool(np.any(self._trace.quick_stop[at : free + 1]))
 
@@ -382,5 +385,5 @@ class _Check:
 
 
 def _above(value: object, limit: float) -> bool:
-    """What is not known is no proof of anything: another verdict says so."""
+    """Whether a known value is above the limit; unknown values are covered by other verdicts."""
     return isinstance(value, float) and value > limit

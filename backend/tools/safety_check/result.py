@@ -1,4 +1,4 @@
-"""What was recorded of a safety function: times from the first sign of it on the bus."""
+"""Record of a safety function; times from its first sign on the bus."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ Verdict = Literal[
     "within_limits",
     "recorded",
 ]
-"""The worst first. ``recorded``: all of it was seen, and no limit was given."""
+"""The worst first. ``recorded``: everything was observed, and no limit was given."""
 Obstacle = Literal[
     "torque_in_noise", "too_slow", "samples_lost", "stayed_enabled", "quick_stop_cut"
 ]
-"""Why something cannot be shown."""
+"""Reason why a property of the function cannot be shown."""
 Sign = Literal["state", "speed"]
-"""What showed first: the drive left Operation enabled, or the speed left the commanded one."""
+"""First sign: the drive left Operation enabled, or the speed left the commanded one."""
 Exceeded = Literal["torque_free", "stop_time", "stop_distance", "speed"]
 
 
 class Signature(BaseModel):
-    """Who signed the record, when. ``intact``: the signed contents have the same checksum now."""
+    """Who signed the record, and when. ``intact``: the signed contents still have this checksum."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -44,10 +44,10 @@ class Signature(BaseModel):
 
 
 class SafetyResult(ToolResult):
-    """Times are in ms from the first sign on the bus, ways in revolutions of the motor.
+    """Times are in ms from the first sign on the bus, distances in revolutions of the motor.
 
-    No time includes what passed from the person's hand to that sign: contacts, the safety relay
-    and the drive's own input are not on the bus. ``torque`` is what the drive says of itself, in %
+    No time includes the delay from the person's hand to that sign: contacts, the safety relay and
+    the drive's own input are not on the bus. ``torque`` values are as the drive reports them, in %
     of the motor's rated torque. ``measured_at`` is ISO 8601, UTC.
     """
 

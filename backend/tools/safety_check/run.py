@@ -1,7 +1,7 @@
-"""The axis moves, a person triggers the safety function by hand, and the tool watches.
+"""Recording while the axis moves and a person triggers the safety function by hand.
 
-What ends the motion is the drive. The tool sends no stop of its own until the watching is over,
-nothing enables the axis again, and each further check is started by a person (ISO 13850).
+The drive ends the motion. The tool commands no stop before the observation is over, nothing enables
+the axis again, and each further check is started by a person (ISO 13850).
 """
 
 from __future__ import annotations
@@ -42,26 +42,26 @@ from drivers.halt import HaltCause
 from drivers.texts.message import Text, text
 
 FloatArray = npt.NDArray[np.float64]
-#: Without power before, which shows the noise of the torque; seconds of a run-up; of the end.
+#: Time without power before, for the noise of the torque; duration of a ramp; of the end [s].
 _LEAD_S, _RAMP_S, _END_S = 0.3, 0.4, 0.3
-#: A trigger is looked for from this long after the run-up on.
+#: A sign is a speed below this share of the commanded one in this many successive rows.
 _SIGN_SHARE, _SIGN_ROWS = 0.9, 10
-#: The part of the travel that is used: a run-down is to end within it, too.
+#: Used share of the travel, which leaves room for the run-down.
 _USED = 0.85
-#: With the speed limit the axis runs at this share of it first.
+#: For the speed limit, the axis first runs at this share of it.
 _BELOW_LIMIT = 0.8
 
 
 @dataclass
 class _Catch:
-    """Every row of the exchange from before the axis is enabled until the watching is over."""
+    """All rows of the exchange from before the axis is enabled until the observation is over."""
 
     names: tuple[str, ...]
     blocks: list[bus.ScopeBlock] = field(default_factory=list)
 
     @property
     def newest(self) -> int:
-        """Number of the cycle after the last one that has come."""
+        """Number of the cycle after the last one received."""
         if not self.blocks:
             return 0
         last = self.blocks[-1]
@@ -69,7 +69,7 @@ class _Catch:
         return last.cycle + len(last.samples)
 
     def table(self) -> tuple[int, FloatArray, npt.NDArray[np.bool_]]:
-        """Number of the first cycle, rows [n, k] and whether each was seen."""
+        """Number of the first cycle, rows [n, k], and whether each was received."""
         first = self.blocks[0].cycle or 0
         table = np.zeros((self.newest - first, len(self.names)))
         valid = np.zeros(len(table), np.bool_)
@@ -82,10 +82,11 @@ class _Catch:
 
 
 async def run(run: Run, settings: SafetySettings) -> SafetyResult:
-    """Record one function; the axis ends without power, its settings as they were.
+    """Record one function; afterwards the axis is disabled and its settings are restored.
 
     Raises:
-        NotAllowed: nobody said what hangs at the axis, or something but the function ended it.
+        NotAllowed: the settings do not state what hangs at the axis, the axis is enabled, or
+            something other than the function ended the motion.
         OutOfRange: the motion does not fit into the envelope.
     """
     axis, session, drive = run.axis, run.session, run.axis.drive
@@ -150,7 +151,7 @@ async def _reports(axis: Axis) -> tuple[str, ...]:
 
 
 def _require_status(run: Run) -> None:
-    """The state of the drive must come with every cycle: between two polls it means nothing.
+    """Check that the status word comes with every cycle: polling would be too slow.
 
     Raises:
         NotAllowed: it does not.
@@ -168,7 +169,7 @@ def _step_of(settings: SafetySettings) -> Text:
 
 
 def plan_of(settings: SafetySettings, rate: float, lead_s: float) -> FloatArray:
-    """Commanded speed [n] in rpm: one way where the travel has room for it, else to and fro.
+    """Commanded speed [n] in rpm: one way where the travel suffices, else reciprocating.
 
     Raises:
         OutOfRange: it does not fit into the envelope.
@@ -204,7 +205,11 @@ def plan_of(settings: SafetySettings, rate: float, lead_s: float) -> FloatArray:
 def _above_limit(
     settings: SafetySettings, rate: float, lead: FloatArray, ramp: FloatArray, end: FloatArray
 ) -> FloatArray:
-    """Below the limit while the person switches it on, then beyond it."""
+    """Speed below the limit while the person activates it, then above it [n] in rpm.
+
+    Raises:
+        OutOfRange: no suitable speed limit is given, or the travel does not suffice.
+    """
     limited, speed = settings.limited_rpm, settings.speed_rpm
     if limited is None or speed < 1.2 * limited:
         raise OutOfRange(
@@ -241,8 +246,8 @@ def _no_room(settings: SafetySettings, needed_rev: float) -> OutOfRange:
 class _Watch:
     """Ends the motion ``watch_s`` after the speed has left the commanded one.
 
-    Called with the rows that came since; what the drive leaves its enabled state for is reported by
-    the loop.
+    Called with the rows received since the last call. When the drive leaves Operation enabled, the
+    cyclic loop reports that itself.
     """
 
     def __init__(
@@ -279,12 +284,12 @@ def _trace(
     catch: _Catch, plan: FloatArray, units: AxisUnits, axis: Axis, rate: float,
     asked_until: int | None, measured_at: str,
 ) -> Trace:  # fmt: skip
-    """In engineering units; the plan is placed by the first setpoint that is not zero."""
+    """Trace in engineering units; the plan is aligned by the first setpoint that is not zero."""
     first, table, valid = catch.table()
     went = np.flatnonzero(valid & (table[:, 3] != 0.0))
     begun = int(went[0]) if went.size else len(table)
     commanded = np.zeros(len(table))
-    # Rounded to the drive's unit, the first values of the plan may still be zero.
+    # Rounded to the drive's unit, the first values of the plan may be zero.
     raw = np.round(plan * (units.velocity_raw(1e6) / 1e6))
     lead = int(np.flatnonzero(raw)[0])
     known = plan[lead : lead + len(table) - begun]

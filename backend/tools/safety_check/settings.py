@@ -1,4 +1,4 @@
-"""Which safety function is recorded, how the axis moves meanwhile, and what is to be met."""
+"""Settings of a safety check: the function, the motion meanwhile, and the limits to be met."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ Function = Literal["sto", "ss1", "limit_positive", "limit_negative", "speed_limi
 
 
 class SafetySettings(ToolSettings):
-    """One function at a time: after a person has stopped the axis, nothing moves it by itself.
+    """Settings for one function: after a person has stopped the axis, nothing moves it by itself.
 
-    Limits that are None are not judged, only recorded.
+    Limits that are None are not judged; the values are only recorded.
     """
 
     function: Function = Field(default="sto", description="the function that you trigger")

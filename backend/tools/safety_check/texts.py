@@ -1,4 +1,4 @@
-"""The words of a safety acceptance record, English and Chinese, and what a report shows of it."""
+"""Texts of a safety acceptance record, English and Chinese, and its section of a report."""
 
 from __future__ import annotations
 
@@ -196,7 +196,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "line_commanded": ("commanded", "给定"),
     "line_torque": ("torque", "转矩"),
 }
-#: A verdict names its function, in each language.
+#: Names of the functions in the verdicts, in each language.
 TEXTS |= {
     f"verdict.{function}.{verdict}": (
         f"{TEXTS[f'function.{function}'][0]}: {TEXTS[f'verdict.{verdict}'][0]}",
@@ -212,12 +212,12 @@ _TONES: dict[Verdict, Literal["good", "warn", "plain"]] = {
 
 
 def report(result: SafetyResult) -> Section:
-    """Verdict, that it certifies nothing, what it rests on, who signed, and the trace."""
+    """Verdict, disclaimer of certification, figures, signature, and the trace."""
     return Section(tuple(notes(result)), tuple(_rows(result)), _charts(result))
 
 
 def notes(result: SafetyResult) -> list[Note]:
-    """The verdict first, then that it is no certificate."""
+    """Notes on the result: the verdict first, then that it is no certificate."""
     value = result.highest_rpm
     if result.verdict == "power_off_at_speed":
         value = abs(result.speed_at_torque_free_rpm or 0.0)

@@ -1,1 +1,1 @@
-"""Command shaping: the slow vibration that a move leaves, and setpoints that do not excite it."""
+"""Command shaping: residual vibration of a move, and setpoints that do not excite it."""

@@ -1,4 +1,4 @@
-"""From recordings of moves to the slow mode, its shapers and what they changed. Pure."""
+"""Slow mode, shapers for it, and their effect, from recordings of moves. Pure."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ UNITS: Mapping[Signal, str] = {"position_error": "rev", "speed": "rpm", "torque"
 
 @dataclass(frozen=True)
 class Moves:
-    """What was played: pairs out and back, each after the same lead; ``kind`` of the shaper."""
+    """Played pairs of moves out and back, each after the same lead; ``kind`` of the shaper."""
 
     rate: float
     rated_torque_nm: float
@@ -59,7 +59,7 @@ class Moves:
     filter: DriveFilter = field(default_factory=DriveFilter)
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
-        """For storage; rows are pairs."""
+        """The samples as arrays for storage; rows are pairs."""
         found: dict[str, npt.NDArray[np.generic]] = {}
         for name, pairs in (("free", self.free), ("shaped", self.shaped)):
             for key in self.free[0].arrays() if pairs else ():
@@ -67,7 +67,7 @@ class Moves:
         return found
 
     def meta(self, settings: ShapingSettings) -> dict[str, object]:
-        """For storage, beside the arrays."""
+        """Settings and facts for storage, with the arrays."""
         return {
             "tool": "shaping",
             "settings": settings.model_dump(mode="json"),
@@ -79,7 +79,7 @@ class Moves:
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> ShapingResult:
-    """The result again, from kept raw data.
+    """Evaluate stored raw data again.
 
     Raises:
         ValueError: not the raw data of this tool.
@@ -117,7 +117,7 @@ def reevaluate(arrays: Arrays, meta: Meta) -> ShapingResult:
 
 @dataclass(frozen=True)
 class Seen:
-    """The mode as the unshaped moves show it."""
+    """The mode as identified from the unshaped moves."""
 
     signal: int
     found: ShapingMode
@@ -125,7 +125,7 @@ class Seen:
 
 
 def see(moves: Moves, settings: ShapingSettings) -> Seen | None:
-    """The mode of the ring-downs of the unshaped moves; None where they show none."""
+    """Mode of the ring-downs of the unshaped moves; None where they show none."""
     demand = demand_of(settings, moves.rate)
     ways = _ways(moves, moves.free, settings, demand, 0)
     low, high = settings.lowest_hz, settings.highest_hz
@@ -162,7 +162,7 @@ def see(moves: Moves, settings: ShapingSettings) -> Seen | None:
 
 
 def designs(seen: Seen | None, settings: ShapingSettings) -> tuple[list[Shaper], Band | None]:
-    """The shapers for the mode that was seen, else for the stated one, and what it may be."""
+    """Shapers for the identified mode, else for the stated one, and the range of that mode."""
     if seen is not None:
         f, z = seen.found.frequency_hz, seen.found.damping
         band = Band(seen.found.range_hz, seen.found.range_damping)
@@ -176,7 +176,7 @@ def designs(seen: Seen | None, settings: ShapingSettings) -> tuple[list[Shaper],
 
 
 def choose(made: list[Shaper], band: Band, settings: ShapingSettings) -> Shaper:
-    """The one that was asked for; else the shortest that leaves no more than the tolerance."""
+    """The requested shaper; else the shortest with no more residual than the tolerance."""
     if settings.shaper != "auto":
         return next(each for each in made if each.kind == settings.shaper)
     most = settings.tolerance_percent / 100.0 * (1.0 + threshold.ROUNDING)
@@ -193,7 +193,7 @@ def demand_of(settings: ShapingSettings, rate: float) -> FloatArray:
 
 
 def pair_of(demand: FloatArray, settings: ShapingSettings, rate: float) -> FloatArray:
-    """A move out and back, both with their time at the end; ``demand`` may be shaped."""
+    """A move out and back, each followed by its hold time; ``demand`` may be shaped."""
     lead, hold = np.zeros(round(threshold.LEAD_S * rate)), round(settings.hold_s * rate)
     out = np.concatenate([demand, np.full(hold, demand[-1])])
     return np.concatenate([lead, out, demand[-1] - out])
@@ -206,9 +206,9 @@ def _ways(
     demand: FloatArray,
     extra: int,
 ) -> list[RingDown]:
-    """Signals [n, 3] from the end of the unshaped setpoints on, of each move of these pairs.
+    """Signals [n, 3] of each move of these pairs, from the end of the unshaped setpoints on.
 
-    Those that lost many samples are left out.
+    Moves with many lost samples are left out.
     """
     hold, lead = round(settings.hold_s * moves.rate), round(threshold.LEAD_S * moves.rate)
     one = demand.size + extra + hold
@@ -229,7 +229,7 @@ def _ways(
 
 
 def evaluate(moves: Moves, settings: ShapingSettings, seen: Seen | None) -> ShapingResult:
-    """Shapers for the mode that was seen, comparison and what follows of them."""
+    """Shapers for the identified mode, the comparison, and the findings."""
     demand = demand_of(settings, moves.rate)
     made, band = designs(seen, settings)
     chosen = None if band is None else choose(made, band, settings)
@@ -258,7 +258,7 @@ def evaluate(moves: Moves, settings: ShapingSettings, seen: Seen | None) -> Shap
 
 
 def extra_samples(shaper: Shaper, rate: float) -> int:
-    """By how many samples shaped setpoints are longer, as `shaper.shaped` makes them."""
+    """Number of samples by which shaped setpoints are longer, as `shaper.shaped` makes them."""
     return math.ceil(shaper.delay_s * rate - 1e-9)
 
 
@@ -281,7 +281,7 @@ def _compared(
     seen: Seen, rate: float, free: list[RingDown], played: list[RingDown], extra: int,
     settings: ShapingSettings,
 ) -> tuple[ShapingComparison, _Traces]:  # fmt: skip
-    """Residuals over the same time of both, and settling from the same moment on."""
+    """Residuals over the same period of both, and settling times from the same moment on."""
     period = max(2, round(rate / seen.mode.frequency_hz))
     begin = extra + round(threshold.SKIP_S * rate)
     before = [about_creep(way, seen.mode, begin) for way in free]
@@ -329,7 +329,7 @@ def _compared(
 def _window(
     seen: Seen, before: list[FloatArray], rate: float, settings: ShapingSettings
 ) -> tuple[int, float]:
-    """The signal that settling is judged by, and how far it may still be from its end."""
+    """The signal for the settling time (column), and its settling window."""
     if settings.window_rev is not None:
         return 0, settings.window_rev
     period = max(2, round(rate / seen.mode.frequency_hz))
@@ -340,7 +340,7 @@ def _window(
 
 
 def _mean_or_none(values: list[float | None]) -> float | None:
-    """The mean; None where one of them is missing."""
+    """The mean; None where a value is missing."""
     known = [each for each in values if each is not None]
     return float(np.mean(known)) if len(known) == len(values) else None
 

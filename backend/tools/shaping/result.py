@@ -1,4 +1,4 @@
-"""The slow mode, the shapers for it, and what a shaped move left of the vibration."""
+"""Slow mode, shapers for it, and the residual vibration of a shaped move."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ from backend.analysis.signals.shaper import Kind
 from backend.tools.tool import Interval, ToolResult
 
 Verdict = Literal["verified", "improved", "no_better", "designed", "stated", "not_seen"]
-"""``verified``: residual or settling time is at most half. ``designed``: not tried. ``stated``:
-made for a mode that the motor does not show."""
+"""Verdict on the shaper.
+
+``verified``: residual or settling time is at most half. ``designed``: not tried. ``stated``:
+designed for a mode that the motor does not show.
+"""
 Signal = Literal["position_error", "speed", "torque"]
 Code = Literal[
     "motor_side",
@@ -33,7 +36,7 @@ class _Part(BaseModel):
 
 
 class ShapingFinding(_Part):
-    """What limits the answer, or where the shaper belongs."""
+    """Something that limits the validity of the result, or where to implement the shaper."""
 
     code: Code
     value: float | None = None
@@ -62,7 +65,7 @@ class ShaperImpulse(_Part):
 
 
 class DesignedShaper(_Part):
-    """A shaper and its prediction: what is left, of the unshaped vibration at the same time."""
+    """A shaper and its prediction: the residual in % of the unshaped vibration at the same time."""
 
     kind: Kind
     impulses: tuple[ShaperImpulse, ...]
@@ -76,7 +79,7 @@ class DesignedShaper(_Part):
 
 
 class ShapingResidual(_Part):
-    """Half of peak to peak in the period after the shaped move, of one signal."""
+    """Half the peak-to-peak value of one signal in the period after the shaped move."""
 
     signal: Signal
     unit: Literal["rev", "rpm", "%"]
@@ -87,8 +90,8 @@ class ShapingResidual(_Part):
 class ShapingComparison(_Part):
     """The same move without and with the shaper.
 
-    Settling counts from the end of the unshaped setpoints in both, so that it contains the delay
-    of the shaper; null: not settled at the end of the recording.
+    Settling counts from the end of the unshaped setpoints in both, so that it includes the delay of
+    the shaper; null: not settled at the end of the recording.
     """
 
     unit: Literal["rev", "rpm", "%"]
@@ -110,7 +113,7 @@ class ShapingComparison(_Part):
 
 
 class ShapingDriveValue(_Part):
-    """A parameter of the drive's own filter, and the value that it would take."""
+    """A parameter of the drive's own filter, and its value for the mode."""
 
     parameter: str
     name: str
@@ -120,7 +123,7 @@ class ShapingDriveValue(_Part):
 
 
 class FilterSlot(_Part):
-    """The parameter of the drive's own filter that takes the mode: Hz, or ms of its period."""
+    """The parameter of the drive's own filter that holds the mode: Hz, or the period in ms."""
 
     parameter: str
     name: str
@@ -130,7 +133,7 @@ class FilterSlot(_Part):
 
 
 class DriveFilter(_Part):
-    """The drive's own filter as its manual states it; nothing in it where there is none."""
+    """The drive's own filter as its manual documents it; empty where there is none."""
 
     takes: Literal["frequency", "period"] | None = None
     slot: FilterSlot | None = None
@@ -138,7 +141,7 @@ class DriveFilter(_Part):
     unstated: tuple[str, ...] = ()
 
     def values_for(self, period_s: float) -> list[ShapingDriveValue]:
-        """What the filter would take for this period; nothing where it cannot."""
+        """Parameter values of the filter for this period; empty where it is out of range."""
         slot = self.slot
         if slot is None:
             return []
@@ -156,7 +159,7 @@ class DriveFilter(_Part):
 
 
 class ShapingResult(ToolResult):
-    """``signal`` is the one that shows the mode best; traces are of it, about what creeps."""
+    """Result; ``signal`` shows the mode best, and the traces are of it, without its slow creep."""
 
     tool: Literal["shaping"] = "shaping"
     verdict: Verdict

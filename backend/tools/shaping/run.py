@@ -49,12 +49,12 @@ from profiles.schema import Parameter
 async def run(run: Run, settings: ShapingSettings) -> ShapingResult:
     """Measure the vibration, design the shapers, and play the chosen one.
 
-    The axis ends where it began, with its settings as they were.
+    The axis ends where it began, with its settings restored.
 
     Raises:
         OutOfRange: the move does not fit into the envelope; nothing has moved.
-        NotAllowed: the drive takes no positions with every cycle, or the envelope or a fault
-            ended a motion.
+        NotAllowed: the drive accepts no cyclic positions, or the envelope or a fault ended a
+            motion.
     """
     axis, session, drive = run.axis, run.session, run.axis.drive
     if Mode.CSP not in drive.modes:
@@ -75,14 +75,14 @@ async def run(run: Run, settings: ShapingSettings) -> ShapingResult:
     run.progress(0.45, text("shaping.evaluating"))
     seen = await asyncio.to_thread(see, moves, settings)
     made, band = designs(seen, settings)
-    # What the motor does not show cannot be compared: nothing moves for it.
+    # A mode that the motor does not show cannot be compared: no further move is made.
     if seen is not None and band is not None and settings.verify:
         chosen = choose(made, band, settings)
         try:
             values = shaped(demand, chosen, rate)
             pairs = await _played(run, settings, facts, values, (0.5, 0.93, text("shaping.shaped")))
         except DriveError:
-            # What was measured before stays of use.
+            # The first measurement remains useful.
             _keep(run, moves, settings)
             raise
         moves = replace(moves, shaped=pairs, kind=chosen.kind)
@@ -104,7 +104,7 @@ async def _played(
     demand_rev: FloatArray,
     where: tuple[float, float, Text],
 ) -> tuple[Recording, ...]:
-    """The recordings of each move out and back, on an axis that is enabled for them."""
+    """Recordings of the moves out and back; the axis is enabled for their duration."""
     axis, session = run.axis, run.session
     units, rate = await axis.units(), 1.0 / cycle_s(session)
     low, high, step = where
@@ -135,10 +135,10 @@ async def _played(
 
 
 def _require_inside(settings: ShapingSettings, move_s: float) -> None:
-    """The move and its longest shaped form fit into the envelope.
+    """Check that the move and its longest shaped form fit into the envelope.
 
     Raises:
-        OutOfRange: naming what is needed and what is permitted.
+        OutOfRange: states what is needed and what is permitted.
     """
     envelope = settings.envelope
     if settings.speed > envelope.speed_rpm or abs(settings.size) > envelope.travel_rev:

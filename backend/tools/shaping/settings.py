@@ -1,4 +1,4 @@
-"""The move whose vibration is measured, and the shaper that is to be tried."""
+"""Settings of command shaping: the move that is measured, and the shaper to try."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Choice = Literal["auto", "zv", "zvd", "ei"]
 
 
 class ShapingSettings(ToolSettings):
-    """A move out and back, repeated, without a shaper and then with one."""
+    """A move out and back, repeated, first without and then with a shaper."""
 
     size: float = Field(default=1.0, description="way of the move, in revolutions")
     speed: Annotated[float, Option(("--move-rpm",))] = Field(

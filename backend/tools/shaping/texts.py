@@ -1,4 +1,4 @@
-"""The words of command shaping, English and Chinese, and what a report shows of it."""
+"""Texts of command shaping, English and Chinese, and its section of a report."""
 
 from __future__ import annotations
 
@@ -200,7 +200,7 @@ def report(result: ShapingResult) -> Section:
 
 
 def notes(result: ShapingResult) -> list[Note]:
-    """The verdict first, then the findings."""
+    """Notes on the result: the verdict first, then the findings."""
     places = {"shaper": (result.chosen or "").upper(), "residual": "", "before": "", "after": ""}
     if (found := result.comparison) is not None:
         places |= {
@@ -213,7 +213,7 @@ def notes(result: ShapingResult) -> list[Note]:
 
 
 def _seconds(value: float | None, found: ShapingComparison) -> str:
-    """A settling time; longer than what was watched, where it did not settle."""
+    """A settling time as text; longer than the recorded time where it did not settle."""
     return f"> {found.watched_s:g} s" if value is None else f"{value:.3g} s"
 
 

@@ -1,1 +1,1 @@
-"""Step and move responses with their figures."""
+"""Step and move responses and the figures read from them."""

@@ -1,4 +1,4 @@
-"""From the recording of a step or a move to its numbers, and to the files that keep it. Pure."""
+"""Figures of a step or a move from its recording, and the files that store it. Pure."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LEAD_S = threshold.LEAD_S
 
 @dataclass(frozen=True, slots=True)
 class StepSettings:
-    """``size`` in rpm (speed) or rev (move). A move runs at ``speed_rpm`` and ``acceleration``."""
+    """``size`` in rpm (speed) or rev (move); ``speed_rpm`` and ``acceleration_rpm_s`` of a move."""
 
     envelope: Envelope
     kind: Literal["speed", "move"] = "speed"
@@ -38,7 +38,7 @@ class StepSettings:
 
 @dataclass(frozen=True)
 class StepResult:
-    """Curves [n] in rpm or rev and % of rated torque, and the numbers read from them."""
+    """Curves [n] in rpm or rev and % of rated torque, and the figures read from them."""
 
     kind: Literal["speed", "move"]
     time_s: npt.NDArray[np.float64]
@@ -50,12 +50,11 @@ class StepResult:
     torque_peak_percent: float
     torque_rms_percent: float
     noise: float = 0.0
-    """Standard deviation about the trend of a speed that is held, in rpm, or of the position at the
-    end of a move, in rev."""
+    """Standard deviation about the trend, of a held speed [rpm] or a final position [rev]."""
     window: float | None = None
     """The settling window, in rpm or rev."""
     widened: bool = False
-    """Whether noise is more than a tenth of the usual window, so that a wider one was taken."""
+    """Whether noise exceeds a tenth of the usual window, so that a wider one was used."""
 
 
 def evaluate(
@@ -64,7 +63,7 @@ def evaluate(
     settings: StepSettings,
     rated_torque_nm: float,
 ) -> StepResult:
-    """Numbers from a recording."""
+    """Read the figures from a recording."""
     rate = recording.sample_rate_hz
     time = np.arange(demand.size) / rate
     torque = recording.torque_nm / rated_torque_nm * 100.0
@@ -96,7 +95,7 @@ def evaluate(
 
 
 def _noise(part: npt.NDArray[np.float64]) -> float:
-    """Standard deviation about a parabola, in the unit of the signal; 0 for too few samples."""
+    """Standard deviation about a parabola, in the unit of the signal; 0 with too few samples."""
     if part.size < 8:
         return 0.0
     x = np.linspace(-1.0, 1.0, part.size)
@@ -104,14 +103,14 @@ def _noise(part: npt.NDArray[np.float64]) -> float:
 
 
 def significant_size(result: StepResult) -> float:
-    """The size in rpm whose usual settling window is ten times the noise that this step shows."""
+    """Size [rpm] whose usual settling window is ten times the noise of this step."""
     return threshold.NOISES * result.noise / 0.02
 
 
 def raw_of(
     recording: Recording, demand: npt.NDArray[np.float64], settings: StepSettings, facts: AxisFacts
 ) -> tuple[dict[str, npt.NDArray[np.generic]], dict[str, object]]:
-    """Arrays and facts from which `reevaluate` makes the same answer again."""
+    """Arrays and facts from which `reevaluate` reproduces the result."""
     return {**recording.arrays(), "demand": demand}, {
         "tool": "step",
         "sample_rate_hz": recording.sample_rate_hz,
@@ -121,7 +120,7 @@ def raw_of(
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> StepAnswer:
-    """The answer again, from kept raw data.
+    """Evaluate stored raw data again.
 
     Raises:
         ValueError: not the raw data of a step.
@@ -143,7 +142,7 @@ def reevaluate(arrays: Arrays, meta: Meta) -> StepAnswer:
 
 
 def answer_of(result: StepResult) -> StepAnswer:
-    """The result as page, report, files and command line have it."""
+    """The result in the form that page, report, files and command line use."""
     return StepAnswer(
         kind=result.kind,
         unit="rpm" if result.kind == "speed" else "rev",

@@ -1,4 +1,4 @@
-"""What a step of speed or a move concludes; curves and numbers in the unit that ``unit`` names."""
+"""Result of a speed step or a move; curves and figures in the unit of ``unit``."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class _Numbers(BaseModel):
 
 
 class StepNumbers(_Numbers):
-    """Read-outs of a step of speed; times from the command, None where it was never reached."""
+    """Figures of a speed step; times from the command, None where never reached."""
 
     initial: float
     final: float
@@ -25,7 +25,7 @@ class StepNumbers(_Numbers):
 
 
 class MoveNumbers(_Numbers):
-    """Read-outs of a move; ``settling_s`` counts from the end of the commanded motion."""
+    """Figures of a move; ``settling_s`` counts from the end of the commanded motion."""
 
     following_peak: float
     following_rms: float
@@ -36,7 +36,7 @@ class MoveNumbers(_Numbers):
 
 
 class StepAnswer(ToolResult):
-    """Curves [n] over ``time_s``, and what is read from them."""
+    """Curves [n] over ``time_s``, and the figures read from them."""
 
     tool: Literal["step"] = "step"
     kind: Literal["speed", "move"]

@@ -1,4 +1,4 @@
-"""How an axis answers a commanded step of speed, or a commanded move."""
+"""Response of an axis to a commanded step of speed, or to a commanded move."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ async def step_response(
     progress: Progress,
     keep: Keep | None = None,
 ) -> StepResult:
-    """Play the step and read the numbers; the axis ends where it began.
+    """Play the step and read the figures; the axis ends where it began.
 
     Raises:
-        OutOfRange: the step leaves the envelope; nothing has moved.
+        OutOfRange: the step exceeds the envelope; nothing has moved.
         NotAllowed: the envelope or a fault ended it.
     """
     units, rate = await axis.require_certain_scales(), 1.0 / cycle_s(session)
@@ -84,7 +84,11 @@ async def step_response(
 
 
 def _demand(settings: StepSettings, rate: float) -> npt.NDArray[np.float64]:
-    """Commanded speed in rpm, or position in rev from the start."""
+    """Commanded speed in rpm, or position in rev from the start [n].
+
+    Raises:
+        OutOfRange: the step exceeds the envelope.
+    """
     envelope = settings.envelope
     lead, hold = np.zeros(round(LEAD_S * rate)), round(settings.hold_s * rate)
     if settings.kind == "speed":
@@ -113,7 +117,7 @@ def _demand(settings: StepSettings, rate: float) -> npt.NDArray[np.float64]:
 
 
 async def run(run: Run, request: StepRequest) -> StepAnswer:
-    """As `step_response`, for the descriptor."""
+    """Run `step_response` for the descriptor."""
     return answer_of(
         await step_response(run.axis, run.session, request.inner, run.progress, run.keep)
     )

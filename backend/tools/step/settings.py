@@ -1,4 +1,4 @@
-"""What a step of speed or a move may be asked for."""
+"""Settings of a speed step or a move."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from backend.tools.tool import Option, ToolSettings
 
 
 class StepRequest(ToolSettings):
-    """A step of speed (rpm) or a move (rev)."""
+    """Settings of a step of speed (rpm) or a move (rev)."""
 
     kind: Literal["speed", "move"] = Field(default="speed", description="what is commanded")
     size: float = Field(
@@ -30,7 +30,7 @@ class StepRequest(ToolSettings):
 
     @property
     def inner(self) -> StepSettings:
-        """The same for the tool's own layers."""
+        """The same settings for the tool's inner layers."""
         return StepSettings(
             self.envelope, self.kind, self.size, self.hold_s, self.speed, self.acceleration,
             self.window, self.rated_torque_nm,

@@ -1,4 +1,4 @@
-"""The words of a step of speed and a move, English and Chinese, and what is shown of them."""
+"""Texts of a speed step and a move, English and Chinese, and their section of a report."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ TEXTS: dict[str, tuple[str, str]] = {
 
 
 def report(result: StepAnswer) -> Section:
-    """Whether it settled, the numbers, and the curves."""
+    """Whether it settled, the figures, and the curves."""
     numbers = result.step or result.move
     settled = numbers is not None and numbers.settling_s is not None
     window = "–" if result.window is None else f"{result.window:.3g}"

@@ -1,7 +1,7 @@
-"""A speed loop's realisations, each pair as the one before shows that it shows most.
+"""Realisations of a speed loop, each pair weighted by what the first one showed.
 
-A soft loop moves a heavy axis little at high frequencies, and a coarse encoder hides what it does.
-What noise leaves open after the first pair gets the energy of those that follow.
+A soft loop moves a heavy axis little at high frequencies, and the steps of a coarse encoder mask
+it. Lines that are uncertain after the first pair receive more energy in the following ones.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from backend.tools.sweep.plan import Setup
 from backend.tools.sweep.play import Records, play_fitting, sized
 from backend.work.jobs import Progress
 
-#: Realisations with the same phases, of opposite sign.
+#: Realisations with the same phases and opposite signs.
 _PAIR = 2
 
 
@@ -29,7 +29,7 @@ async def play_informative(
     sequences: tuple[excite.Sequence, ...], home: int, progress: Progress, spare: int = 0,
     repeats: Repeats | None = None,
 ) -> Records:  # fmt: skip
-    """As `play_fitting`; where a reference is played, the lines after the first pair differ.
+    """Play as `play_fitting`; with an excited reference, the first pair weights the following ones.
 
     Raises:
         NotAllowed: as `play_fitting`.
@@ -54,7 +54,7 @@ async def play_informative(
 def _more_informative(
     first: Records, further: tuple[excite.Sequence, ...], settings: SweepSettings, setup: Setup
 ) -> tuple[excite.Sequence, ...]:
-    """Further realisations, as large as the first pair became, with weights that it shows."""
+    """Further realisations of the size that the first pair reached, weighted by its result."""
     sent = first[0][0]
     base = np.zeros(1) if sent.base is None else sent.base
     peak = float(np.max(np.abs(sent.excitation.samples - base)))

@@ -1,4 +1,4 @@
-"""From recordings of a sweep to its answer, and to the files that keep it. Pure."""
+"""Result of a sweep from its recordings. Pure: also works on stored recordings."""
 
 from __future__ import annotations
 
@@ -55,11 +55,11 @@ _DROPPED = text("sweep.torque-not-used")
 class SweepSettings:
     """What to measure and within which limits.
 
-    ``loop`` is the loop that is closed while mechanics are measured; *auto* takes none on an
-    axis that turns freely and the speed loop otherwise; a stepped sine always takes a loop, for
-    it lasts too long for an axis that drifts. ``share`` is the excitation's share of the
-    envelope's torque. ``rated_torque_nm`` overrides what the drive says. ``inertia_kgm2`` is the
-    whole axis'; where moves have shown it with a relative ``inertia_deviation`` the model is held
+    ``loop`` is the loop that is closed while mechanics are measured; *auto* uses none on an axis
+    that turns freely and the speed loop otherwise; a stepped sine always uses a loop, as it lasts
+    too long for an axis that drifts. ``share`` is the excitation's share of the envelope's torque.
+    ``rated_torque_nm`` replaces the drive's value. ``inertia_kgm2`` is that of the whole axis;
+    where moves have identified it with a relative ``inertia_deviation``, the model is constrained
     to it.
     """
 
@@ -75,24 +75,25 @@ class SweepSettings:
     inertia_kgm2: float | None = None
     notches_off: bool = True
     hold: Hold | None = None
-    """How the drive holds setpoints between cycles; None asks the drive, or the recording."""
+    """How the drive holds setpoints between cycles; None: as the drive or the recording shows."""
     excitation: Waveform = "multisine"
     coulomb_nm: float | None = None
-    """Friction that is removed from a speed loop's response; None: the recording shows."""
+    """Friction that is removed from a speed loop's response; None: from the recording."""
     inertia_deviation: float | None = None
     pairs_before: int = 0
-    """Of a loop's own response: pairs of realisations whose phases are not to be used again."""
+    """For a closed loop's response: pairs of realisations whose phases must not be used again."""
     odd_lines: bool = False
-    """Of mechanics by a multisine: odd lines alone, which distinguish even and odd distortion."""
+    """For mechanics by a multisine: odd lines only, which separate even and odd distortion."""
 
 
 @dataclass(frozen=True)
 class SweepResult:
-    """The answer: ``frf`` is the best estimate, ``direct`` the one without any model.
+    """Result: ``frf`` is the best estimate, ``direct`` the one without any model.
 
-    ``unit`` of the magnitude. ``model`` is None for closed loops and where no model fits
-    (``trusted`` False); ``saturated_share`` of the samples had the
-    torque at its limit.
+    ``unit`` is that of the magnitude. ``model`` is None for closed loops and where no model fits
+    (``trusted`` False). ``saturated_share`` is the share of the samples with the torque at its
+    limit. ``current_bandwidth_hz``, ``speed_filter_hz`` and ``hold`` are as the drive reports or as
+    the recording showed.
     """
 
     kind: Kind
@@ -111,9 +112,9 @@ class SweepResult:
     current_bandwidth_hz: float | None = None
     speed_filter_hz: float | None = None
     hold: Hold | None = None
-    """What the drive reports of its loops, or what the recording showed of them."""
+    """How setpoints are held between cycles, as the drive reports or the recording showed."""
     detected: Detected | None = None
-    """Noise and distortion on the lines that were left empty, where they were."""
+    """Noise and distortion on the lines that were left empty, where there were any."""
 
 
 def evaluate(
@@ -126,7 +127,7 @@ def evaluate(
     by_speed: bool = False,
     integral_hz: float | None = None,
 ) -> SweepResult:
-    """From recordings to the answer; also works on recordings that were kept.
+    """Evaluate recordings; also works on stored recordings.
 
     ``by_speed``: the speed loop's reference was the excitation, ``integral_hz`` its integral's
     corner where the drive reports it.
@@ -144,14 +145,14 @@ def evaluate(
     )
     if settings.kind != "mechanics":
         return _evaluate_loop(records, path, settings, loop)
-    # That the dictionary has 60C2h does not say that torques are interpolated.
+    # An existing object 60C2h does not prove that torques are interpolated.
     known = settings.hold is not None
     quantity: Quantity = "torque_mode" if loop == "none" else "torque_injection"
     inertia = _known_inertia(settings) if facts.torque_known else None
     taken = _taken(records)
     if (cycles := mean_cycles(taken)) is not None:
         raise Unsuitable(text("sweep.speed-is-mean", cycles=cycles))
-    # A search for mechanics that explain another torque takes a minute, and finds none.
+    # A search for mechanics that explain a clipped torque takes a minute, and finds none.
     if (cut := _cut(taken, path, quantity)) > threshold.CUT:
         raise Unsuitable(text("sweep.torque-cut", cut_share=cut))
     if by_speed:
@@ -172,7 +173,7 @@ def evaluate(
 def _widened(
     found: Identification, facts: AxisFacts, quantity: Quantity, *, by_speed: bool
 ) -> tuple[Identification, tuple[Text, ...]]:
-    """Bands with what the drive does not report of its torque, and what is said of that."""
+    """Widen the bands by what the drive does not report of its torque; with the warnings."""
     path, lines = found.fit.path, found.direct.frequency_hz
     said: list[Text] = []
     if facts.current_bandwidth_hz is None and commanded(path):
@@ -180,7 +181,7 @@ def _widened(
         said.append(_COMMANDED)
     corner = path.current_bandwidth_hz
     slow = corner is not None and _slow(corner, facts)
-    # Where the torque was dropped it is another one, and an ordinary path explains the motion.
+    # A dropped torque was replaced by another one, and an ordinary path explains the motion.
     if slow or (found.torque_unexplained and not found.torque_dropped):
         ordinary = path_uncertainty(lines)
         uncertainty = ordinary if corner is None else slow_uncertainty(lines, corner)
@@ -191,7 +192,7 @@ def _widened(
         )
         said.append(_SLOW)
     if slow and quantity == "torque_injection" and facts.torque_filter_hz is None:
-        # With a loop the motion alone does not show which of the two it is.
+        # With a loop, the motion alone does not show which of the two it is.
         direct = charged(found.direct, lines, np.log(lag_response(lines, corner)))
         found = replace(found, direct=direct, corrected=direct, trusted=False)
         said.append(_SLOW_OR_FILTERED)
@@ -201,7 +202,7 @@ def _widened(
 
 
 def _charged(found: Identification, uncertainty: ComplexArray) -> Identification:
-    """Both responses with a band that is wider by this, [lines of the direct one]."""
+    """Both responses with bands widened by ``uncertainty`` [lines of the direct one]."""
     lines = found.direct.frequency_hz
     direct, corrected = (charged(x, lines, uncertainty) for x in (found.direct, found.corrected))
     return replace(found, direct=direct, corrected=corrected)
@@ -216,7 +217,7 @@ def _mechanics(
     facts: AxisFacts,
     warnings: tuple[Text, ...],
 ) -> SweepResult:
-    """The answer of mechanics; without a model where none is trusted."""
+    """Result for mechanics; without a model where none is trusted."""
     path, model = found.fit.path, found.fit.model
     resonances: tuple[Resonance, ...] = ()
     if found.trusted:
@@ -268,7 +269,8 @@ def _by_reference(
 ) -> tuple[Identification, tuple[Record, ...]]:
     """Mechanics by a speed loop's reference, and the records as if its torque had been injected.
 
-    The loop's gains need the mechanics, as a light axis' own speed is sampled, too.
+    The loop's gains depend on the mechanics, as the speed of a light axis is sampled, too: both are
+    found by iteration.
     """
     as_reported = speed_gain(records, path, integral_hz, hold_known=hold_known)
     for _ in range(threshold.ROUNDS):
@@ -289,14 +291,14 @@ def _by_reference(
 
 
 def _known_inertia(settings: SweepSettings) -> KnownInertia | None:
-    """What the model is held to; nothing where how exactly it is known is not."""
+    """Inertia that constrains the model; None where its uncertainty is unknown."""
     if settings.inertia_kgm2 is None or settings.inertia_deviation is None:
         return None
     return KnownInertia(settings.inertia_kgm2, settings.inertia_deviation)
 
 
 def completed(facts: AxisFacts, result: SweepResult) -> AxisFacts:
-    """Facts with what the mechanics' measurement found where the drive reports nothing."""
+    """Facts completed by the measurement of the mechanics where the drive reports nothing."""
     return replace(
         facts,
         current_bandwidth_hz=facts.current_bandwidth_hz or result.current_bandwidth_hz,
@@ -312,11 +314,11 @@ def _saturated(
     *,
     as_reported: bool,
 ) -> float:
-    """Share of samples whose torque is at the envelope's limit, or not what was commanded.
+    """Share of samples whose torque is at the envelope's limit, or less than commanded.
 
-    ``reported``: the reported torque acts itself, so that a missing one is none of a filter.
-    Of another torque only a level counts at which it stays while more is commanded: a filter or a
-    copy of the demand has no such level.
+    ``as_reported``: the reported torque is the acting one, so that a missing part is not caused by
+    a filter. Otherwise only a level counts at which the torque stays while more is commanded: a
+    filter or a copy of the demand has no such level.
     """
     shares = []
     for r in records:
@@ -332,7 +334,7 @@ def _saturated(
 
 
 def _cut(records: tuple[Record, ...], path: SignalPath, quantity: Quantity) -> float:
-    """Share of samples at one level of torque while more was commanded; 0 where nobody knows."""
+    """Share of samples at one level of torque while more was commanded; 0 where unknown."""
     shares = [0.0]
     for r in records:
         if r.torque is not None and quantity == "torque_mode":
@@ -342,13 +344,13 @@ def _cut(records: tuple[Record, ...], path: SignalPath, quantity: Quantity) -> f
 
 
 def _missing(record: Record, torque: FloatArray, path: SignalPath) -> BoolArray:
-    """Where the torque [n], without its sign, is clearly less than commanded."""
+    """Where the torque [n], as absolute value, is clearly less than commanded."""
     asked = np.abs(sampled_command(record.excitation.samples, path))
     return np.asarray(asked - torque > 0.1 * np.max(asked))
 
 
 def _at_highest(torque: FloatArray) -> BoolArray:
-    """Where the torque [n], without its sign, is at the highest that was seen."""
+    """Where the torque [n], as absolute value, is at its maximum."""
     return np.asarray(torque >= 0.97 * np.max(torque))
 
 
@@ -384,7 +386,7 @@ def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tupl
 
 
 def _injection_margins(found: Identification) -> dict[str, float | bool | None]:
-    """Margins of the loop that was closed meanwhile, from its own torque."""
+    """Margins of the loop that was closed during the measurement, from its own torque."""
     frf, fit = found.corrected, found.fit
     use = frf.in_band
     f = frf.frequency_hz[use]
@@ -396,8 +398,8 @@ def _injection_margins(found: Identification) -> dict[str, float | bool | None]:
 def margins_of(f: FloatArray, open_loop: ComplexArray) -> dict[str, float | bool | None]:
     """Margins and bandwidths of an open loop, for files and pages.
 
-    They hold from ``from_hz`` to ``to_hz``. ``ms`` is None where |S| stays below 1 there: over all
-    frequencies it cannot (Bode's integral), so that its peak lies outside of the band.
+    They are valid from ``from_hz`` to ``to_hz``. ``ms`` is None where |S| stays below 1 in that
+    band: over all frequencies it cannot (Bode's integral), so its peak lies outside the band.
     """
     closed = closed_from_open(open_loop)
     width = bandwidth(f, closed)
@@ -418,7 +420,7 @@ def _evaluate_loop(
     settings: SweepSettings,
     loop: Literal["none", "speed", "position"],
 ) -> SweepResult:
-    """Closed loop from its reference to the motion, of a speed loop without what friction does."""
+    """Closed loop from reference to motion; of a speed loop, without the effect of friction."""
     taken = []
     if settings.kind == "position_loop":
         for s, r in records:
@@ -431,8 +433,8 @@ def _evaluate_loop(
                 Record(s.excitation, r.velocity_rad_s, r.torque_nm, r.valid, r.position_rad)
             )
         coulomb_nm = settings.coulomb_nm
-    # The drive takes the reference at the beginning of its step, and the torque's mean follows by
-    # half a step, as does the speed's: both belong to the loop (`loops_of`), not to the way in.
+    # The drive reads the reference at the beginning of its step, and the mean torque follows half a
+    # step later, as does the speed: both belong to the loop (`loops_of`), not to the input path.
     path = replace(path, command_delay_s=path.command_delay_s - path.loop_delay_s)
     frf = estimate_periodic(tuple(taken), path, "closed_loop", coulomb_nm=coulomb_nm)
     use = frf.in_band & (frf.coherence > 0.8)

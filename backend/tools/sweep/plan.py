@@ -1,4 +1,4 @@
-"""What a sweep is to play: whether its settings make sense, which loop is closed, how much fits."""
+"""Planning of a sweep: checks of its settings, the loop to close, and the possible size."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class Setup:
-    """Everything that was found out before the excitation is made."""
+    """Everything that is determined before the excitation is designed."""
 
     rate: float
     facts: AxisFacts
@@ -36,15 +36,15 @@ class Setup:
     rigid: excite.Rigid
     torque_step_nm: float
     by_speed: bool = False
-    """Mechanics by the speed loop's reference, where a closed loop accepts no torque."""
+    """Mechanics by the speed loop's reference, where a closed loop accepts no torque offset."""
     integral_hz: float | None = None
 
 
 def check(settings: SweepSettings) -> None:
-    """Refuse settings that make no sense.
+    """Check settings for impossible values.
 
     Raises:
-        OutOfRange: naming the value and its limit.
+        OutOfRange: states the value and its limit.
     """
     if not 0.01 <= settings.share <= 0.9:
         raise OutOfRange(
@@ -67,10 +67,10 @@ def check(settings: SweepSettings) -> None:
 
 
 def chosen_loop(axis: Axis, settings: SweepSettings, probed: Probed) -> Literal["none", "speed"]:
-    """No loop on an axis that stays where it is and whose inertia rules, else the speed loop.
+    """No loop on an axis that does not drift and whose inertia dominates, else the speed loop.
 
-    Where friction takes more of the base motion's torque than inertia, a torque that is off by
-    little makes a speed that is off by much.
+    Where friction takes more of the base motion's torque than inertia, a small error of the torque
+    causes a large error of the speed.
     """
     drifts = abs(probed.gravity_nm) > max(0.5 * probed.coulomb_nm, 0.01 * probed.rated_nm)
     if drifts:
@@ -81,16 +81,16 @@ def chosen_loop(axis: Axis, settings: SweepSettings, probed: Probed) -> Literal[
 
 
 def _can_offset(axis: Axis, session: CyclicSession) -> bool:
-    """Whether torque can be injected with a closed loop."""
+    """Whether a torque offset can be added with a closed loop."""
     key = axis.drive.key("torque_offset")
     return key is not None and session.carries(axis.drive, key)
 
 
 def held_by_loop(axis: Axis, wanted: Loop, pull_nm: float) -> Literal["speed"]:
-    """The loop that holds an axis which a load pulls.
+    """The loop that holds an axis with a static load torque.
 
     Raises:
-        NotAllowed: the user wants none.
+        NotAllowed: the user chose no loop.
     """
     if wanted == "none":
         raise NotAllowed(
@@ -110,7 +110,7 @@ async def setup_of(
     loop: str,
     probed: Probed | None,
 ) -> Setup:
-    """Everything the excitation needs, from the envelope and what the drive reports.
+    """Data that the excitation needs, from the envelope and the drive.
 
     Raises:
         DriveError: a parameter cannot be read.
@@ -142,7 +142,7 @@ async def setup_of(
 
 
 async def drive_limit_percent(axis: Axis) -> float:
-    """The drive's own torque limit: what is asked beyond it does not come."""
+    """The drive's own torque limit, at which commands are clipped [% of rated]; inf if none."""
     drive, units = axis.drive, await axis.units()
     roles = ("torque_limit_positive", "torque_limit_negative", "max_torque")
     found = await existing(drive, [drive.key(role) for role in roles])
@@ -151,7 +151,11 @@ async def drive_limit_percent(axis: Axis) -> float:
 
 
 def sequences_of(setup: Setup, settings: SweepSettings) -> tuple[excite.Sequence, ...]:
-    """The excitation; too little room becomes the user's error."""
+    """Design the excitation.
+
+    Raises:
+        OutOfRange: the envelope does not suffice for it.
+    """
     band = excite.band_for(
         setup.rate, settings.f_min_hz, settings.f_max_hz, odd_only=settings.odd_lines
     )
@@ -190,10 +194,10 @@ def sequences_of(setup: Setup, settings: SweepSettings) -> tuple[excite.Sequence
 
 
 def _reference_size(setup: Setup, position: bool) -> tuple[float, float]:
-    """Amplitude of a loop's reference (rad/s or rad), and 1e-4 of it as its rounding."""
+    """Amplitude of a loop's reference (rad/s or rad), and its rounding step: 0, no rounding."""
     speed = 0.15 * setup.room.speed_rad_s
-    # Torque to follow the fall-off corner's acceleration must stay far from the limit, since
-    # lines and resonances add up.
+    # The torque for the acceleration at the corner must stay far below the limit, since lines and
+    # resonances add up.
     corner = _TURN * (20.0 if position else 40.0)
     speed = min(speed, setup.room.torque_nm / 8.0 / setup.rigid.inertia_kgm2 / corner, 8.0)
     size = speed / corner if position else speed

@@ -1,4 +1,4 @@
-"""Playing the sequences of a sweep on an axis, made weaker where it comes to its envelope."""
+"""Playing the sequences of a sweep on an axis, with less excitation where it reaches its limits."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ async def scaled_by_speed(
     home: int,
     progress: Progress,
 ) -> tuple[excite.Sequence, ...]:
-    """The excitation made so large that its torque has the wanted share."""
+    """Scale the excitation so that its torque has the wanted share."""
     trial = Progress(lambda: progress(0.09, text("sweep.feeling-how-much-torque")))
     ((sent, recording),) = await play_fitting(
         axis, session, settings, setup, sequences[:1], home, trial
@@ -66,7 +66,7 @@ async def scaled_by_speed(
 def sized(
     sequences: tuple[excite.Sequence, ...], factor: float, base_rad_s: float
 ) -> tuple[excite.Sequence, ...]:
-    """The same with excitations so many times as large and this peak of the base motion."""
+    """The sequences with excitations scaled by ``factor`` and with this peak of the base motion."""
     made = []
     for s in sequences:
         base = s.base
@@ -88,10 +88,10 @@ async def _play_all(
     place: tuple[int, int] | None,
     repeats: Repeats,
 ) -> Records:
-    """Every realisation, from the same place as far as the travel asks for it.
+    """Play every realisation, from the start position where the travel requires it.
 
-    One that lost samples is played again, ``spare`` times over all of them; the best one counts.
-    One that has a whole period already is, only where ``repeats`` allows it.
+    A realisation that lost samples is played again, at most ``spare`` times in total; the best one
+    is used. If it already has a whole period, it is repeated only where ``repeats`` allows it.
     """
     records: list[Recorded] = []
     before, count = place or (0, len(sequences))
@@ -125,7 +125,7 @@ async def _play_all(
 async def _near_home(
     axis: Axis, session: CyclicSession, settings: SweepSettings, setup: Setup, home_raw: int
 ) -> None:
-    """Back to where all began if the axis is so far away that travel may run out."""
+    """Go back to the start if the axis is so far away that the travel may not suffice."""
     away = abs((await axis.units()).position(await axis.position_raw() - home_raw))
     if away > threshold.AWAY * settings.envelope.travel_rev:
         await go_back(axis, session, home_raw, settings.envelope, setup.facts)
@@ -140,7 +140,7 @@ async def _play_one(
     home_raw: int,
     reported: Callable[[float], None],
 ) -> Recorded:
-    """One realisation: enable, play, disable."""
+    """Play one realisation: enable, play, disable."""
     limits = await bus_limits(axis, settings.envelope, home_raw)
     async with enabled(axis, session, MODE_OF[setup.loop]) as start:
         if setup.loop != "none":
@@ -151,29 +151,29 @@ async def _play_one(
 
 
 def _worth_another(tries: list[Recorded]) -> bool:
-    """Whether another try may bring more: one that has a whole period already gets one more."""
+    """Whether to repeat; a realisation that already has a whole period is repeated once at most."""
     if len(tries) > threshold.AGAIN or _whole(*tries[-1]):
         return False
     return len(tries) == 1 or all(_kept(*each)[0] == 0 for each in tries)
 
 
 def _kept(sequence: excite.Sequence, recording: Recording) -> tuple[int, int]:
-    """How many of the periods that count are without a gap, and how many samples are."""
+    """Number of evaluated periods without a gap, and number of valid samples."""
     e = sequence.excitation
     if e.segments:
         return 0, int(np.count_nonzero(recording.valid))
     n = e.period_samples
     starts = [e.first_sample + p * n for p in range(e.transient_periods, e.periods)]
-    # As the position is looked at from each sample to the next, one more.
+    # One sample more, since positions are evaluated as differences between samples.
     good = sum(bool(np.all(recording.valid[start:][: n + 1])) for start in starts)
     return good, int(np.count_nonzero(recording.valid))
 
 
 def _whole(sequence: excite.Sequence, recording: Recording) -> bool:
-    """Whether nothing was lost that matters: of the settling neither, which a late loop disturbs.
+    """Whether no relevant sample was lost; the settling counts, too, as a delayed loop disturbs it.
 
-    Play and free swings are shown by what differs between two whole periods, friction at reversals
-    by a recording without any gap.
+    Backlash and free oscillations are detected by differences between two whole periods, friction
+    at reversals by a recording without any gap.
     """
     e = sequence.excitation
     last = e.samples.size if e.segments else e.first_sample + e.periods * e.period_samples + 1
@@ -185,11 +185,11 @@ async def play_fitting(
     sequences: tuple[excite.Sequence, ...], home_raw: int, progress: Progress, spare: int = 0,
     place: tuple[int, int] | None = None, repeats: Repeats | None = None,
 ) -> Records:  # fmt: skip
-    """As `_play_all`; where the axis comes to its envelope the excitation becomes smaller.
+    """Play as `_play_all`; where the axis reaches its envelope, repeat with less excitation.
 
-    How much torque a closed loop takes depends on its gains, and how fast an axis without a loop
-    becomes on how its load swings: both are what is measured. ``place`` is how many were played
-    before, and how many there are.
+    The torque that a closed loop takes depends on its gains, and the speed of an axis without a
+    loop on its oscillating load: both are unknown before the measurement. ``place`` is the number
+    of realisations played before, and their total.
 
     Raises:
         NotAllowed: something else ended it, or even the smallest excitation is too much.
@@ -213,10 +213,10 @@ async def play_fitting(
 
 
 def _too_much(error: NotAllowed, setup: Setup) -> bool:
-    """Whether less excitation may mend it.
+    """Whether less excitation may avoid the error.
 
-    Torque is a loop's own answer; without a loop it is what was asked for. An axis that leaves its
-    travel is one that a load pulls, or whose place is too narrow.
+    Excess torque is caused by a closed loop; without a loop the torque is as commanded. An axis
+    that leaves its travel has a static load torque, or too little travel.
     """
     mendable = HaltCause.SPEED if setup.loop == "none" else HaltCause.TORQUE
     return exceeded(error) is mendable
@@ -225,10 +225,10 @@ def _too_much(error: NotAllowed, setup: Setup) -> bool:
 def _smaller(
     sequences: tuple[excite.Sequence, ...], setup: Setup, settings: SweepSettings, attempt: int
 ) -> tuple[excite.Sequence, ...]:
-    """What is played after so many attempts were too much; nothing where too little is left.
+    """The sequences after this many failed attempts; empty where too little is left.
 
-    Without a loop one torque makes excitation and base motion, which must still overcome friction:
-    both are designed again, for less speed.
+    Without a loop, one torque makes both the excitation and the base motion, which must still
+    overcome friction: both are designed again, for less speed.
     """
     if setup.loop != "none":
         return tuple(
@@ -278,7 +278,7 @@ async def _as_sent(
     sent: Play,
     start: int,
 ) -> excite.Sequence:
-    """The excitation as the rounded setpoints say; estimators must know what really went out."""
+    """The excitation as given by the rounded setpoints, as estimators need what was really sent."""
     if settings.kind == "mechanics" and not setup.by_speed:
         return sequence
     units = await axis.units()

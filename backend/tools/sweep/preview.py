@@ -1,7 +1,7 @@
-"""What a frequency response would play, before anything moves.
+"""Preview of the excitation of a frequency response, before anything moves.
 
-The axis is felt before the true excitation is made, so inertia and friction are here what the
-drive reports; the true one is scaled to what was felt and stays within the same envelope.
+The real excitation is designed after a test of the axis; here, inertia and friction are those that
+the drive reports. The real one is scaled by the test and stays within the same envelope.
 """
 
 from __future__ import annotations
@@ -22,15 +22,17 @@ from drivers.errors import OutOfRange
 from drivers.texts.message import reason_of
 
 _TURN = 2 * np.pi
-#: Points of the curve that a page draws; each is the extreme of its stretch.
+#: Points of the curve that a page draws: the extremes of each section.
 _POINTS = 800
 
 
 @dataclass(frozen=True)
 class Preview:
-    """One realisation of the excitation. ``value`` [m] over ``time_s`` [m] is thinned to what can
-    be seen, in ``unit``; ``frequency_hz`` [n] are its lines with ``amplitude`` [n] in the same
-    unit. ``duration_s`` is of all realisations together.
+    """One realisation of the excitation.
+
+    ``value`` [m] over ``time_s`` [m] is thinned to the visible extremes, in ``unit``;
+    ``frequency_hz`` [n] are its lines with ``amplitude`` [n] in the same unit. ``duration_s`` is
+    that of all realisations together.
     """
 
     unit: str
@@ -46,10 +48,10 @@ class Preview:
 
 
 async def preview(axis: Axis, settings: SweepSettings, sample_rate_hz: float) -> Preview:
-    """Design the excitation; reads facts of the drive and moves nothing.
+    """Design the excitation; reads data of the drive and moves nothing.
 
     Raises:
-        OutOfRange: the envelope leaves no room for it; says what is too small.
+        OutOfRange: the envelope does not suffice; states what is too small.
     """
     facts = await read_facts(axis, settings.rated_torque_nm)
     rated = facts.rated_torque_nm
@@ -78,14 +80,14 @@ async def preview(axis: Axis, settings: SweepSettings, sample_rate_hz: float) ->
     return _seen(sequences, unit, factor, inertia)
 
 
-#: Closed loops: unit of the reference, and what SI values are multiplied by.
+#: Closed loops: unit of the reference, and the factor from SI to it.
 _SHOWN = {"speed_loop": ("rpm", 60.0 / _TURN), "position_loop": ("rev", 1.0 / _TURN)}
 
 
 def _sequences(
     settings: SweepSettings, rate: float, band: Band, room: excite.Room, inertia: float
 ) -> tuple[excite.Sequence, ...]:
-    """As the tool makes them, with what is known before the axis was felt."""
+    """Sequences as the tool makes them, with the data known before the axis was tested."""
     waveform = settings.excitation
     if settings.kind == "mechanics" and settings.loop in ("auto", "none") and waveform != "stepped":
         return excite.torque_mode(
@@ -140,7 +142,7 @@ def _tone_peaks(samples: npt.NDArray[np.float64], e: Excitation) -> npt.NDArray[
 
 
 def _extremes(samples: npt.NDArray[np.float64], points: int) -> npt.NDArray[np.int64]:
-    """Ascending places of the smallest and largest sample of every stretch."""
+    """Ascending indices of the smallest and largest sample of every section."""
     if samples.size <= points:
         return np.arange(samples.size)
     stretch = -(-samples.size * 2 // points)

@@ -1,9 +1,10 @@
-"""Speeds with every SYNC for a drive that has no cyclic mode, and what must hold before that.
+"""Speeds with every SYNC on a drive without cyclic modes, and the conditions for it.
 
-Such a drive takes its speeds in Profile velocity. For a measurement its ramps are put out of the
-way, so that each setpoint takes effect with its SYNC; they come back on every exit. Nothing in
-the drive ends the last speed when this computer falls silent (DS_C documents no watchdog): so the
-drive's own travel limits must be active and a person must agree, for every measurement.
+Such a drive accepts its speeds in Profile velocity mode. For a measurement its ramps are set to the
+fastest, so that each setpoint takes effect with its SYNC; they are restored on every exit. Nothing
+in the drive ends the last speed when this computer stops sending (DS_C documents no watchdog):
+therefore the drive's own travel limits must be active and a person must agree, for every
+measurement.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ _WHOLE_RANGE = 2**31
 
 
 def needed(drive: Drive, link: Link) -> bool:
-    """Whether this drive takes speeds with every cycle only in Profile velocity."""
+    """Whether this drive accepts speeds in every cycle only in Profile velocity mode."""
     modes = set(drive.modes)
     target = drive.profile.by_role.get("velocity_target")
     mapped = target is not None and target.pdo in ("rx", "rxtx")
@@ -43,13 +44,17 @@ def needed(drive: Drive, link: Link) -> bool:
 
 
 def require_consent(session: CyclicSession, drive: Drive, consent: bool) -> None:
-    """Raises NotAllowed where nothing in the drive ends a speed and nobody agreed to that."""
+    """Check the consent to a motion that nothing in the drive would end.
+
+    Raises:
+        NotAllowed: the drive has no watchdog, and no person agreed.
+    """
     if not consent and session.unwatched(drive):
         raise NotAllowed("sweep.drive-no-watchdog-ends", drive=drive.name)
 
 
 async def require_travel_limits(axis: Axis) -> None:
-    """The drive itself must stop at the ends of travel.
+    """Check that the drive itself stops at the ends of the travel.
 
     Raises:
         NotAllowed: it has neither both limit switches nor active software limits.
@@ -67,7 +72,7 @@ async def require_travel_limits(axis: Axis) -> None:
 
 
 async def _limits_in_use(drive: Drive) -> bool:
-    """607Dh as CiA 402-2 has it: limits that are equal, or the whole range, are none."""
+    """Whether 607Dh limits the travel (CiA 402-2): equal limits, or the whole range, do not."""
     keys = [drive.key(role) for role in ("software_limit_min", "software_limit_max")]
     if None in keys:
         return False
@@ -79,16 +84,16 @@ async def _limits_in_use(drive: Drive) -> bool:
 async def prepared(
     axis: Axis, session: CyclicSession, envelope: Envelope, consent: bool
 ) -> AsyncIterator[None]:
-    """Around a measurement: what must hold before, and ramps and torque limit for its length.
+    """Check the conditions of a measurement, and set ramps and torque limit for its duration.
 
-    A drive with cyclic modes is only asked whether it watches the exchange, and gets the mode back
-    that it was in.
+    For a drive with cyclic modes, only the consent is checked, and its mode of operation is
+    restored.
 
     Raises:
         NotAllowed: no consent where it is needed, no travel limit in the drive, the axis is
-            enabled, or the drive takes a negative speed for something else. Nothing has moved
-            but a quarter turn at most.
-        RestoreFailed: on leaving, naming what could not be restored.
+            enabled, or the drive misinterprets a negative speed. Nothing has moved more than a
+            quarter turn.
+        RestoreFailed: on leaving, states what could not be restored.
     """
     drive = axis.drive
     await axis.require_certain_scales()
@@ -129,11 +134,11 @@ async def _prepare(
 async def interpolated(
     axis: Axis, session: CyclicSession, speed_rpm: npt.NDArray[np.float64]
 ) -> AsyncIterator[None]:
-    """Let the drive's own ramp carry it from one setpoint of a smooth move to the next.
+    """Let the drive's own ramp interpolate between the setpoints of a smooth move.
 
-    A speed that steps with every SYNC makes a torque that falls during each cycle, and samples at
-    its end miss half of that: an inertia would come out too small by half a cycle of the speed
-    gain. Nothing for drives with cyclic modes, which interpolate by themselves.
+    A speed that steps with every SYNC causes a torque that falls during each cycle, and samples at
+    its end miss half of that: an inertia would be too small by half a cycle of the speed gain. No
+    effect on drives with cyclic modes, which interpolate themselves.
     """
     steepest = float(np.max(np.abs(np.diff(speed_rpm)), initial=0.0)) / cycle_s(session)
     if axis.drive.id not in session.by_speed or not steepest:
@@ -146,7 +151,7 @@ async def interpolated(
 
 
 async def _write_ramps(axis: Axis, keys: list[str], rpm_per_s: float | None) -> None:
-    """Ramps of this rate, or as good as none."""
+    """Write ramps of this rate; None: the fastest possible."""
     drive, units = axis.drive, await axis.units()
     times = units.spec.acceleration.startswith("ms")
     for key in keys:
@@ -159,9 +164,9 @@ async def _write_ramps(axis: Axis, keys: list[str], rpm_per_s: float | None) -> 
 
 
 async def _require_signed(axis: Axis, session: CyclicSession, envelope: Envelope) -> None:
-    """A short turn backwards with a slow ramp: a drive that takes it for a high speed shows.
+    """Test a short slow turn backwards: a drive that reads it as a high speed is detected.
 
-    60FFh of DS_C is printed as an unsigned number (003:317), with which −1 would be the highest.
+    The manual of DS_C declares 60FFh as unsigned (003:317), so that −1 would be the highest speed.
     """
     drive, units = axis.drive, await axis.units()
     steps = round(threshold.TRIED_S / cycle_s(session))

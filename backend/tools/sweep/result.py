@@ -1,4 +1,4 @@
-"""What a frequency response concludes, as page, report, files and command line have it."""
+"""Result of a frequency response, as used by page, report, files and command line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class _Part(BaseModel):
 
 
 class ResonanceInfo(_Part):
-    """A row of the table of resonances; ``height_db`` is how far it rises or falls there."""
+    """A row of the table of resonances; ``height_db`` is the rise or fall of the response there."""
 
     kind: Literal["resonance", "antiresonance"]
     frequency_hz: float
@@ -46,7 +46,7 @@ class ModeInfo(_Part):
 
 
 class ModelInfo(_Part):
-    """Torque to velocity: ``gain`` is 1/J of the rigid part, ``pole_rad_s`` b/J."""
+    """Model from torque to velocity: ``gain`` is 1/J of the rigid part, ``pole_rad_s`` b/J."""
 
     gain: float
     pole_rad_s: float
@@ -54,7 +54,7 @@ class ModelInfo(_Part):
 
 
 class DetectedInfo(_Part):
-    """Median motion on lines that were left empty, as a share of that on the lines around."""
+    """Median motion on lines left empty, as a share of that on the lines around them."""
 
     even: float = Field(description="on even lines, without noise")
     odd: float = Field(description="on odd lines, without noise")
@@ -62,10 +62,10 @@ class DetectedInfo(_Part):
 
 
 class SweepAnswer(ToolResult):
-    """The response [lines] with its deviations, and what is read from it.
+    """The response [lines] with its deviations, and the figures read from it.
 
-    ``coherence`` and the deviations are next to each line; None where nothing is known of them.
-    ``margins`` hold from ``from_hz`` to ``to_hz``, each None where no crossing was measured.
+    ``coherence`` and the deviations are given for each line; None where unknown. ``margins`` are
+    valid from ``from_hz`` to ``to_hz``, each None where no crossover was measured.
     """
 
     tool: Literal["sweep"] = "sweep"
@@ -100,5 +100,5 @@ class SweepAnswer(ToolResult):
     warning_messages: tuple[MessageInfo, ...]
 
     def in_language(self, language: Language) -> Self:
-        """With ``warnings`` in this language."""
+        """The same result with ``warnings`` in this language."""
         return self.model_copy(update={"warnings": words_of(self.warning_messages, language)})

@@ -2,7 +2,7 @@
 
 *mechanics*: torque to velocity, either with no loop (CST) or by torque offsets added to a closed
 speed (CSV) or position loop (CSP), as a vertical or limited axis needs. *speed_loop* and
-*position_loop*: from the loop's own reference to what the axis does.
+*position_loop*: from the loop's own reference to the motion of the axis.
 """
 
 from __future__ import annotations
@@ -51,19 +51,22 @@ async def sweep(
     keep: Keep | None = None,
     repeats: Repeats | None = None,
 ) -> SweepResult:
-    """Measure; ``keep`` is handed the raw data before they are evaluated.
+    """Measure; ``keep`` receives the raw data.
 
-    ``repeats`` bounds when what lost samples may be played again; without it always.
+    ``repeats`` limits the time for repeating realisations that lost samples; without it they are
+    always repeated.
 
     Raises:
-        OutOfRange: settings that make no sense; nothing has moved.
-        NotAllowed: the axis cannot be measured so, or the envelope ended it; states the reason.
+        OutOfRange: invalid settings; nothing has moved.
+        NotAllowed: the axis cannot be measured in this way, or the envelope ended the motion;
+            states
+            the reason.
         LinkLost: samples were lost; nothing is concluded from the rest.
     """
     check(settings)
     await axis.require_certain_scales()
     if settings.hold is None and axis.drive.id in session.by_speed:
-        # Profile velocity without ramps: what a reference is does not change between two cycles.
+        # Profile velocity without ramps: the reference is constant between two cycles.
         settings = replace(settings, hold="zero")
     loop = {"speed_loop": "speed", "position_loop": "position"}.get(settings.kind, settings.loop)
     if loop == "auto" and (settings.excitation == "stepped" or not takes_torque(axis, session)):
@@ -95,7 +98,7 @@ async def sweep(
         try:
             setup, records = await how.measured(loop, progress)
         except NotAllowed as error:
-            # A pull that friction hides shows when the axis turns.
+            # A static load torque that friction hides appears when the axis turns.
             ran_away = exceeded(error) is HaltCause.POSITION
             if (
                 loop != "none"
@@ -129,7 +132,7 @@ async def sweep(
 
 @dataclass(frozen=True)
 class _Sweep:
-    """What was found out before a loop is chosen."""
+    """Data that is known before a loop is chosen."""
 
     axis: Axis
     session: CyclicSession
@@ -140,7 +143,7 @@ class _Sweep:
     repeats: Repeats | None
 
     async def measured(self, loop: str, progress: Progress) -> tuple[Setup, Records]:
-        """Everything that is played with one loop."""
+        """Play everything with one loop."""
         axis, session, settings, home = self.axis, self.session, self.settings, self.home
         setup = await setup_of(axis, session, settings, self.facts, loop, self.probed)
         in_loop = settings.kind == "mechanics" and setup.loop != "none" and not setup.by_speed
@@ -152,7 +155,7 @@ class _Sweep:
             sequences = await scaled_by_speed(
                 axis, session, settings, setup, sequences, home, progress
             )
-        # A stepped sine takes too long for a second time.
+        # A stepped sine takes too long to be repeated.
         spare = 0 if settings.excitation == "stepped" else len(sequences)
         return setup, await play_informative(
             axis, session, settings, setup, sequences, home, progress, spare, self.repeats
@@ -160,16 +163,17 @@ class _Sweep:
 
 
 async def filters_off(axis: Axis, settings: SweepSettings) -> dict[str, int]:
-    """Notches and the torque filter lie in the path of the torque: mechanics are measured without.
+    """Values that switch off notches and torque filter, which lie in the path of the torque.
 
-    A family without an enable bit takes a notch out by its highest frequency.
+    Mechanics are measured without them. In a family without an enable bit, a notch is switched off
+    by the value of its frequency.
     """
     if settings.kind != "mechanics" or not settings.notches_off:
         return {}
     drive, off = axis.drive, dict[str, int]()
     for number, slot in enumerate(drive.profile.notch.slots if drive.profile.notch else ()):
         if slot.enable_key is not None and slot.enable_bit is not None:
-            # The other bits switch filters that the loop is used with.
+            # The other bits switch filters that belong to the loop in operation.
             if not drive.unreachable_why(drive.parameter(slot.enable_key)):
                 before = off.get(slot.enable_key, await drive.raw(slot.enable_key))
                 off[slot.enable_key] = before & ~(1 << slot.enable_bit)
@@ -191,7 +195,7 @@ def _dc(session: CyclicSession) -> bool:
 
 
 async def run(run: Run, request: SweepRequest) -> SweepAnswer:
-    """As `sweep`, for the descriptor."""
+    """Run `sweep` for the descriptor."""
     return answer_of(
         await sweep(run.axis, run.session, request.inner, run.progress, run.keep, run.repeats)
     )

@@ -1,4 +1,4 @@
-"""What a frequency response may be asked for."""
+"""Settings of a frequency response."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from backend.tools.tool import ToolSettings
 
 
 class SweepRequest(ToolSettings):
-    """Frequency response."""
+    """Settings of a frequency response."""
 
     kind: Kind = Field(default="mechanics", description="what is measured")
     loop: Loop = Field(default="auto", description="which loop is closed meanwhile")
@@ -37,7 +37,7 @@ class SweepRequest(ToolSettings):
 
     @property
     def inner(self) -> SweepSettings:
-        """The same for the tool's own layers."""
+        """The same settings for the tool's inner layers."""
         return SweepSettings(
             self.envelope, self.kind, self.loop, self.f_min_hz, self.f_max_hz, self.share,
             self.realisations, self.base_motion, self.rated_torque_nm, excitation=self.excitation,

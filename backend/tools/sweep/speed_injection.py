@@ -1,8 +1,8 @@
-"""Mechanics on a drive that takes no torque with a closed loop: by the speed loop's reference.
+"""Mechanics by the speed loop's reference, on a drive without torque offset in a closed loop.
 
-Whatever is added to the reference becomes torque at once by the speed gain (and by the integral
-of it), just as a torque offset would; the gain is read from the recorded torque. After that the
-recording is evaluated as if the torque had been injected.
+Anything added to the reference becomes torque at once through the speed gain (and its integral), as
+a torque offset would; the gain is identified from the recorded torque. After that the recording is
+evaluated as if the torque had been injected.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from backend.tools.thresholds import sweep_speed_injection as threshold
 
 _TURN = 2 * np.pi
 FIRST_RAD_S = threshold.FIRST_RAD_S
-#: Cycles by which the torque may follow the reference.
+#: Possible delays of the torque against the reference [cycles].
 _CYCLES = np.arange(0.0, 4.01, 0.125)
 
 
@@ -33,12 +33,12 @@ def sequences(
     rate: float, band: Band, room: excite.Room, amplitude_rad_s: float, realisations: int,
     waveform: Waveform, *, base: bool, weight: FloatArray | None = None,
 ) -> tuple[excite.Sequence, ...]:  # fmt: skip
-    """All lines alike: above the loop's bandwidth that is a torque that is alike, too.
+    """Sequences with equal amplitudes of all lines, and so of the torque above the bandwidth.
 
-    ``weight`` [lines] makes them unlike each other, as `informative_weight` finds it.
+    ``weight`` [lines] changes the amplitudes, as `informative_weight` finds it.
 
     Raises:
-        ValueError: the room does not suffice.
+        ValueError: the limits do not suffice.
     """
     return excite.loop_reference(
         rate, band, room, 0.0, amplitude=amplitude_rad_s, realisations=realisations,
@@ -48,7 +48,7 @@ def sequences(
 
 @dataclass(frozen=True)
 class Size:
-    """Peaks of the excitation and of the base motion next to it, in rad/s."""
+    """Peaks of the excitation and of the base motion [rad/s]."""
 
     peak_rad_s: float
     base_rad_s: float
@@ -62,12 +62,12 @@ def fitting_size(
     *,
     watched: bool,
 ) -> Size:
-    """What makes a torque that peaks at ``torque_nm``, as far as the trial shows.
+    """Size of an excitation whose torque peaks at ``torque_nm``, estimated from a trial.
 
-    A soft loop makes little speed of its reference, so that the axis' own speed counts; the
-    setpoints stay within a share, too. Such a loop may answer the base motion with much torque,
-    as that lies near its resonance: the base motion gets what the excitation leaves. ``watched``:
-    the drive ends a motion whose setpoints stop coming.
+    A soft loop converts little of its reference into speed, so that the axis' own speed counts; the
+    setpoints stay within a share of the limit, too. Such a loop may need much torque for the base
+    motion, which lies near its resonance: the base motion gets what the excitation leaves.
+    ``watched``: the drive ends a motion whose setpoints stop arriving.
     """
     speed_share = threshold.SPEED_SHARE if watched else threshold.UNWATCHED_SPEED_SHARE
     reference_share = threshold.REFERENCE_SHARE if watched else threshold.UNWATCHED_REFERENCE_SHARE
@@ -88,10 +88,10 @@ def fitting_size(
 def informative_weight(
     records: tuple[tuple[excite.Sequence, Recording], ...], rate: float
 ) -> FloatArray:
-    """Weights of the lines [n] for further realisations: more where the first ones show less.
+    """Weights of the lines [n] for further realisations: higher where the first ones show less.
 
-    Where one amplitude has the deviation d, the sum of all variances is least with amplitudes of
-    √d. Lines that nothing will show, and those that are known, keep a share.
+    Where one amplitude has the deviation d, the sum of all variances is minimal with amplitudes of
+    √d. Lines that cannot be resolved, and those that are known, keep a share.
 
     Raises:
         ValueError: every period has a gap.
@@ -105,7 +105,7 @@ def informative_weight(
 
 @dataclass(frozen=True)
 class SpeedGain:
-    """What a speed loop makes of its reference.
+    """Response of a speed loop's torque to its reference.
 
     ``played`` are the records as if their torque had been injected, in Nm.
     """
@@ -122,12 +122,12 @@ def speed_gain(
     hold_known: bool,
     motion: SampledFit | None = None,
 ) -> SpeedGain:
-    """The gain that the recorded torque shows; ``integral_hz`` None: the recording shows it, too.
+    """Identify the gain from the recorded torque; with ``integral_hz`` None the integral, too.
 
-    ``motion`` is a fit of the mechanics where there is one already.
+    ``motion`` is a fit of the mechanics, if there is one already.
 
     Raises:
-        ValueError: nothing of the torque follows the reference.
+        ValueError: no part of the torque follows the reference.
     """
     taken = tuple(_record(s, r) for s, r in records)
     corner = None if integral_hz is None else _TURN * integral_hz
@@ -138,10 +138,10 @@ def speed_gain(
 def _as_torque(
     sequence: excite.Sequence, recording: Recording, loop: ReferenceLoop
 ) -> tuple[excite.Sequence, Recording]:
-    """A recording with the torque that the reference made in the excitation's place.
+    """The record with the torque caused by the reference as its excitation.
 
-    That torque is held, but for what the integral rises within a cycle: its mean is what moves
-    the axis, and what the samples show beyond the mean is removed from them.
+    That torque is constant within a cycle but for the rise of the integral: its mean moves the
+    axis, and what the samples show beyond the mean is removed from them.
     """
     e = sequence.excitation
     mean = np.concatenate([[0.0], np.cumsum(e.samples)[:-1]]) + 0.5 * e.samples
@@ -166,7 +166,7 @@ def _record(sequence: excite.Sequence, recording: Recording) -> Record:
 
 @dataclass(frozen=True)
 class _Upper:
-    """The upper lines of the last two periods: bins, frequencies, and which samples."""
+    """The upper lines of the last two periods: their samples, bins and frequencies."""
 
     cuts: tuple[slice, ...]
     bins: npt.NDArray[np.int64]
@@ -176,7 +176,7 @@ class _Upper:
     def of(record: Record) -> _Upper:
         e = record.excitation
         if e.segments:
-            # From rest to rest: the whole of it is one period of a longer signal.
+            # From standstill to standstill: the whole is one period of a longer signal.
             length = e.samples.size
             ends = np.round(e.line_hz[[0, -1]] * (length / e.sample_rate_hz)).astype(np.int64)
             cuts, bins = [slice(0, length)], np.arange(ends[0], ends[1])
@@ -190,15 +190,15 @@ class _Upper:
         )
 
     def spectra(self, signal: FloatArray) -> ComplexArray:
-        """Of these lines [periods, lines]."""
+        """Spectra at these lines [periods, lines]."""
         return np.array([np.fft.rfft(signal[cut])[self.bins] for cut in self.cuts])
 
 
 def _rough_gain(record: Record) -> float:
-    """Nm per rad/s, for scaling an amplitude: rather one deviation too large than too small.
+    """Gain [Nm per rad/s] for scaling an amplitude; one deviation too high rather than too low.
 
-    By what of the torque follows the reference with some delay: a coarse encoder makes more torque
-    of its steps than a small trial does.
+    It is the part of the torque that follows the reference with some delay: the steps of a coarse
+    encoder cause more torque than a small trial does.
     """
     assert record.torque is not None
     lines = _Upper.of(record)
@@ -213,10 +213,10 @@ def _rough_gain(record: Record) -> float:
 
 
 def _speed_over_peak(record: Record, gain_nms: float) -> float:
-    """Deviation of the excited speed over the peak of the excitation; 1 where nothing shows.
+    """RMS of the excited speed over the peak of the excitation; 1 where it cannot be determined.
 
     The trial itself is too small for a coarse encoder. The base motion shows the inertia: friction
-    takes torque in step with the speed, inertia a quarter of a turn before it.
+    torque is in phase with the speed, inertia torque leads it by 90 degrees.
     """
     e = record.excitation
     good, _ = good_periods(record)

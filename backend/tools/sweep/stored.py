@@ -1,4 +1,4 @@
-"""A frequency response as it is kept: raw data, what they give again, its published form."""
+"""Storage of a frequency response: raw data, their evaluation, and the published form."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from backend.tools.wire_message import wire_messages, words_of
 def raw_of(
     records: Records, setup: Setup, settings: SweepSettings, *, dc: bool
 ) -> tuple[dict[str, npt.NDArray[np.generic]], dict[str, object]]:
-    """Arrays and facts from which `reevaluated` makes the same answer again."""
+    """Arrays and facts from which `reevaluated` reproduces the result."""
     arrays: dict[str, npt.NDArray[np.generic]] = {}
     structure = []
     for number, (sequence, recording) in enumerate(records):
@@ -66,7 +66,7 @@ def raw_of(
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> SweepAnswer:
-    """The answer again as it is published, from kept raw data.
+    """Evaluate stored raw data again, in the published form.
 
     Raises:
         ValueError: not the raw data of a sweep.
@@ -75,7 +75,7 @@ def reevaluate(arrays: Arrays, meta: Meta) -> SweepAnswer:
 
 
 def reevaluated(arrays: Arrays, meta: Meta) -> SweepResult:
-    """The answer again, from kept raw data.
+    """Evaluate stored raw data again.
 
     Raises:
         ValueError: not the raw data of a sweep.
@@ -125,7 +125,7 @@ def _reevaluated(arrays: Arrays, meta: Meta) -> SweepResult:
 
 
 def answer_of(result: SweepResult) -> SweepAnswer:
-    """The result as page, report, files and command line have it."""
+    """The result in the form that page, report, files and command line use."""
     frf = result.frf
     messages = wire_messages(result.warnings)
     return SweepAnswer(
@@ -182,5 +182,5 @@ def _direct(frf: Frf) -> DirectResponse:
 
 
 def _numbers(values: FloatArray) -> tuple[float | None, ...]:
-    """JSON has no NaN."""
+    """Values with None for NaN and infinity, which JSON does not have."""
     return tuple(float(v) if np.isfinite(v) else None for v in values)

@@ -1,4 +1,4 @@
-"""The words of a frequency response, English and Chinese, and what is shown of it."""
+"""Texts of a frequency response, English and Chinese, and its section of a report."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ TEXTS: dict[str, tuple[str, str]] = {
 
 
 def report(result: SweepAnswer) -> Section:
-    """The verdict, resonances or margins, and what was noticed."""
+    """The verdict, resonances or margins, and the warnings."""
     mechanics = result.kind == "mechanics"
     grids: tuple[Grid, ...] = (resonances_grid(result) if mechanics else margins_grid(result),)
     if mechanics and not (result.trusted and result.resonances):
@@ -93,7 +93,7 @@ def report(result: SweepAnswer) -> Section:
 
 
 def resonances_grid(result: SweepAnswer) -> Grid:
-    """A row for each resonance and antiresonance."""
+    """Table with a row for each resonance and antiresonance."""
     return Grid(
         ("kind", "frequency", "damping", "height"),
         tuple(
@@ -109,7 +109,7 @@ def resonances_grid(result: SweepAnswer) -> Grid:
 
 
 def margins_grid(*results: SweepAnswer, heads: tuple[str, ...] = ("value",)) -> Grid:
-    """Bandwidths and margins of one loop, or of several next to each other."""
+    """Bandwidths and margins of one loop, or of several side by side."""
 
     def row(name: str, *shown: str) -> tuple[Cell, ...]:
         return Note(name), *shown
@@ -161,7 +161,7 @@ def _loop_verdict(result: SweepAnswer) -> Note:
 
 
 def tuned_verdict(result: SweepAnswer, verdict: VerdictInfo) -> Note:
-    """Of what was measured and what is predicted above it, the worse one."""
+    """The worse of two verdicts: of the measured band, and of the prediction above it."""
     if not verdict.stable or verdict.contradicted:
         return Note("unstable", "fault")
     worst = verdict.stated
@@ -181,14 +181,14 @@ def tuned_verdict(result: SweepAnswer, verdict: VerdictInfo) -> Note:
 
 
 def _judged(figures: tuple[float | None, ...]) -> tuple[Literal["good", "warn", "fault"], str]:
-    """Tone and word for a loop; where a figure is missing it is not called sound."""
+    """Tone and word for a loop; with a missing figure it is not called sound."""
     if _within(figures, threshold.SOUND):
         return ("warn", "incomplete") if None in figures else ("good", "good")
     return ("warn", "warn") if _within(figures, threshold.POOR) else ("fault", "fault")
 
 
 def _within(figures: tuple[float | None, ...], limits: tuple[float, float, float]) -> bool:
-    """What was not seen within the measured band breaks no limit, and keeps none either."""
+    """Whether the figures meet the limits; a missing figure neither violates nor meets one."""
     phase, gain, peak = figures
     return (
         (phase is None or phase >= limits[0])

@@ -1,8 +1,8 @@
-"""A recording's velocity as the drive reports it, or out of its positions where that is quieter.
+"""Velocity of a recording as the drive reports it, or from its positions where less noisy.
 
-A coarse encoder (2500 lines on DS_C) makes a reported speed noisy, while the positions beneath it
-are off by a fraction of an increment at most. Noise in the speed makes a regression's inertia too
-small (errors in the variables), so the quieter of the two is used.
+A coarse encoder (2500 lines on DS_C) makes the reported speed noisy, while the positions are off by
+a fraction of an increment at most. Noise in the speed makes the inertia of a regression too small
+(errors in the variables), so the less noisy of the two is used.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _TURN = 2 * np.pi
 
 
 def velocity_without_noise(recording: Recording, cutoff_hz: float) -> npt.NDArray[np.float64]:
-    """Velocity [n] in rad/s for moves whose content lies below ``cutoff_hz``."""
+    """Velocity [n] in rad/s, for moves with a bandwidth below ``cutoff_hz``."""
     reported, rate = recording.velocity_rad_s, recording.sample_rate_hz
     count = np.arange(reported.size)
     good = recording.valid
@@ -26,7 +26,7 @@ def velocity_without_noise(recording: Recording, cutoff_hz: float) -> npt.NDArra
         return reported
     position = np.interp(count, count[good], recording.position_rad[good])
     given = np.interp(count, count[good], reported[good])
-    # Noise of the position, as a speed at the cutoff.
+    # Noise of the position, expressed as a speed at the cutoff.
     from_position = _noise(position, rate) * (_TURN * cutoff_hz) ** 2
     if from_position * threshold.CLEARLY > _noise(given, rate):
         return reported
@@ -34,7 +34,7 @@ def velocity_without_noise(recording: Recording, cutoff_hz: float) -> npt.NDArra
 
 
 def _noise(signal: npt.NDArray[np.float64], rate: float) -> float:
-    """Power density of white noise; differences keep the move itself out of the window's skirts."""
+    """Power density of white noise; the differences keep leakage of the move itself small."""
     density = power_density(np.diff(signal, 2), rate, threshold.WINDOW)
     f = density.frequency_hz / rate
     use = (f >= threshold.NOISE[0]) & (f <= threshold.NOISE[1])

@@ -1,4 +1,4 @@
-"""From recordings of constant speeds to orders, frequencies and resonances. Pure."""
+"""Orders, frequencies and resonances from recordings of constant speeds. Pure."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ _RPM = 60.0 / _TURN
 
 @dataclass(frozen=True)
 class Plateaus:
-    """Raw data [n]: ``plateau`` numbers constant speeds, negative backwards, 0 is between them.
+    """Raw data [n]: ``plateau`` numbers the constant speeds, negative backwards; 0 between them.
 
-    Its hundreds are the number of the speed. ``closer`` is False where an order had a highest
-    level, but nothing was left of the time for further speeds about it.
+    Its hundreds are the number of the speed. ``closer`` is False where an order had a maximum
+    level, but no further speeds about it were measured, for lack of time.
     """
 
     sample_rate_hz: float
@@ -58,7 +58,7 @@ class Plateaus:
         by_travel: bool,
         closer: bool,
     ) -> Plateaus:
-        """One recording for each speed, with the signed number of each sample's plateau."""
+        """Join the recordings, one for each speed, with each sample's signed plateau number."""
         plateau = [
             np.sign(n) * (100 * (index + 1) * (n != 0) + np.abs(n))
             for index, n in enumerate(numbers)
@@ -74,7 +74,7 @@ class Plateaus:
         )
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
-        """For storage."""
+        """The samples as arrays for storage."""
         return {
             "position_rad": self.position_rad,
             "torque_nm": self.torque_nm,
@@ -83,7 +83,7 @@ class Plateaus:
         }
 
     def facts(self) -> dict[str, object]:
-        """For storage, with the arrays."""
+        """The scalar facts for storage, with the arrays."""
         return {
             "sample_rate_hz": self.sample_rate_hz,
             "by_travel": self.by_travel,
@@ -93,7 +93,7 @@ class Plateaus:
 
 @dataclass(frozen=True)
 class _Held:
-    """One plateau: its segment, in rpm and % of rated torque, and what stands out of it."""
+    """One plateau: its segment, in rpm and % of rated torque, and its significant sinusoids."""
 
     number: int
     sign: int
@@ -109,7 +109,7 @@ class _Held:
 class Levels:
     """Amplitudes [plateaus, components] of speed in rpm, their deviations, and of torque in %.
 
-    ``hertz`` is the frequency of each component there.
+    ``hertz`` is the frequency of each component at each plateau.
     """
 
     held: tuple[_Held, ...]
@@ -130,7 +130,7 @@ class Levels:
 
 
 def levels_of(data: Plateaus, rated_nm: float) -> Levels:
-    """Everything that is read from the plateaus themselves.
+    """Components and levels of the plateaus.
 
     Raises:
         NotAllowed: no speed was held in both directions.
@@ -153,7 +153,7 @@ def levels_of(data: Plateaus, rated_nm: float) -> Levels:
             for each in held
         ]
     ).reshape(len(held), len(found))
-    # A difference of two positions is a mean of the speed over the time between them.
+    # A difference of two positions is the mean speed between them.
     shown = np.sinc(np.clip(hertz / data.sample_rate_hz, 0.0, 0.5))
     return Levels(
         tuple(held), tuple(found), np.asarray(hertz, np.float64),
@@ -164,9 +164,9 @@ def levels_of(data: Plateaus, rated_nm: float) -> Levels:
 
 
 def closer_about(found: Levels) -> tuple[float, float] | None:
-    """Speeds in rev/s between which an order has its highest level; None where it has none.
+    """Speeds [rev/s] around the maximum level of an order; None where there is none.
 
-    The order whose level stands highest over those at the two speeds beside it.
+    The order is the one whose maximum is highest relative to the levels at the two adjacent speeds.
     """
     best: tuple[float, float, float] | None = None
     for column, component in enumerate(found.components):
@@ -184,7 +184,7 @@ def closer_about(found: Levels) -> tuple[float, float] | None:
 
 
 def evaluate(data: Plateaus, facts: AxisFacts) -> VibrationResult:
-    """The map of what was recorded.
+    """Evaluate the recordings.
 
     Raises:
         NotAllowed: no speed was held in both directions.
@@ -210,7 +210,7 @@ def evaluate(data: Plateaus, facts: AxisFacts) -> VibrationResult:
 
 
 def reevaluate(arrays: Arrays, meta: Meta) -> VibrationResult:
-    """The map again, from kept raw data.
+    """Evaluate stored raw data again.
 
     Raises:
         ValueError: not the raw data of this tool.
@@ -233,7 +233,7 @@ def reevaluate(arrays: Arrays, meta: Meta) -> VibrationResult:
 def _held(
     data: Plateaus, rated_nm: float, band: tuple[float, float]
 ) -> tuple[list[_Held], list[float], int]:
-    """Plateaus whose speed was held, slowest first; speeds that were not; how many were lost."""
+    """Plateaus with constant speed, slowest first; speeds that were not; number of lost ones."""
     held: list[_Held] = []
     uneven: set[float] = set()
     lost = 0
@@ -307,7 +307,7 @@ def _parts(held: _Held, found: Levels) -> list[VibrationPart]:
 
 
 def _by_speed(found: Levels, column: int) -> tuple[FloatArray, FloatArray]:
-    """Mean level of a component at each speed that shows it, in rev/s and rpm."""
+    """Mean level of a component at each speed that shows it [rev/s, rpm]."""
     shown = np.isfinite(found.speed[:, column])
     numbers = np.array([each.number for each in found.held])
     rps = found.rpm / 60.0
@@ -319,14 +319,14 @@ def _by_speed(found: Levels, column: int) -> tuple[FloatArray, FloatArray]:
 
 
 def _matters(found: Levels, column: int, speed_rps: float) -> bool:
-    """Whether a component is among the largest at about this speed, by its acceleration."""
+    """Whether a component is among the largest at about this speed, judged by acceleration."""
     near = np.abs(found.rpm / 60.0 / speed_rps - 1.0) < threshold.SAME_SPEED
     felt = np.nan_to_num(found.speed[near] * found.hertz[near])
     return bool(np.max(felt[:, column]) >= threshold.MATTERS * np.max(felt))
 
 
 def _largest(found: Levels, column: int) -> tuple[float, float, float]:
-    """Speed in rpm at which a component is largest, its amplitude, and that of the torque."""
+    """Speed [rpm] at which a component is largest, its amplitude [rpm], and the torque's [%]."""
     level = np.where(np.isfinite(found.speed[:, column]), found.speed[:, column], -1.0)
     at = int(np.argmax(level))
     largest, torque = float(level[at]), float(np.nan_to_num(found.torque[at, column]))
@@ -359,13 +359,13 @@ def _place(component: Component) -> Place:
     whole = round(component.value)
     if high - low > threshold.WHOLE:
         return "unknown"
-    # An order that is a whole number to this share is one, however narrow the interval is.
+    # An order within this share of a whole number counts as whole, however narrow its interval.
     near = threshold.AS_WHOLE * max(whole, 1)
     return "whole" if whole >= 1 and low - near <= whole <= high + near else "not_whole"
 
 
 def _resonances(found: Levels, orders: Sequence[int]) -> tuple[VibrationResonance, ...]:
-    """What all orders together show."""
+    """Resonances from the levels of all orders together."""
     if not orders:
         return ()
     speed, deviation = found.speed[:, orders], found.deviation[:, orders]
@@ -441,7 +441,7 @@ def _findings(
 
 
 def _rises(found: Levels, order: VibrationOrder) -> bool:
-    """Whether the level is highest at the end of the speeds, well above what it is before."""
+    """Whether the level is highest at the highest speeds, well above the levels before."""
     column = next(i for i, c in enumerate(found.components) if c.value == order.order_per_rev)
     speeds, means = _by_speed(found, column)
     at_end = speeds.size >= 3 and float(speeds[-1]) * 60.0 >= 0.95 * float(np.max(found.rpm))
@@ -451,7 +451,7 @@ def _rises(found: Levels, order: VibrationOrder) -> bool:
 
 
 def _least(found: Levels) -> float:
-    """Amplitude in rpm that would have stood out in the noisiest plateau, about."""
+    """Approximate amplitude [rpm] that would have been significant in the noisiest plateau."""
     rms = [float(np.sqrt(np.mean(e.segment.speed[e.segment.valid] ** 2))) for e in found.held]
     sizes = [int(np.count_nonzero(e.segment.valid)) for e in found.held]
     least = [2.0 * r * np.sqrt(threshold.STANDS_OUT / n) for r, n in zip(rms, sizes, strict=True)]

@@ -1,4 +1,4 @@
-"""What a map of vibration over speed states; speeds are those of the motor."""
+"""Result of a map of vibration over speed; speeds are those of the motor."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class _Part(BaseModel):
 
 
 class VibrationFinding(_Part):
-    """What the map states, or cannot state, as a code with the figure that it rests on."""
+    """A result or limitation of the map: a code and the figure that it rests on."""
 
     code: Code
     value: float | None = None
@@ -42,7 +42,7 @@ class VibrationFinding(_Part):
 
 
 class VibrationPart(_Part):
-    """One sinusoid of the speed at one speed; amplitudes."""
+    """One sinusoid at one speed: amplitudes of speed and torque."""
 
     frequency_hz: float
     order_per_rev: float
@@ -51,7 +51,7 @@ class VibrationPart(_Part):
 
 
 class VibrationSpeed(_Part):
-    """One constant speed; negative speeds turn backwards. RMS about the mean and a slow drift."""
+    """One constant speed, negative backwards. RMS about the mean and a slow drift."""
 
     speed_rpm: float
     speed_rms_rpm: float = Field(description="of the measured speed, encoder steps included")
@@ -95,7 +95,7 @@ class SpeedRange(_Part):
 
 
 class VibrationResonance(_Part):
-    """A mode of the axis with its loops as they are, excited where order · speed meets it."""
+    """A mode of the axis with its present loops, excited where order · speed matches it."""
 
     frequency_hz: float
     frequency_ci95_hz: tuple[float, float]
@@ -104,7 +104,7 @@ class VibrationResonance(_Part):
 
 
 class VibrationResult(ToolResult):
-    """The map. What lies above ``band_hz`` is folded by the sampling and is not stated."""
+    """The map. Frequencies above ``band_hz`` are aliased by the sampling and are not stated."""
 
     tool: Literal["vibration"] = "vibration"
     sample_rate_hz: float

@@ -1,4 +1,4 @@
-"""The moves of a map of vibration over speed: a ladder of constant speeds, both ways."""
+"""Moves of a map of vibration over speed: a ladder of constant speeds in both directions."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Plan:
 
 
 def planned(settings: VibrationSettings, room: Room, units: AxisUnits) -> Plan:
-    """Speeds spread evenly on a logarithmic scale.
+    """Plan speeds spaced evenly on a logarithmic scale.
 
     Raises:
         OutOfRange: the limits leave no such speeds, or no time for them.
@@ -77,7 +77,7 @@ def planned(settings: VibrationSettings, room: Room, units: AxisUnits) -> Plan:
 
 
 def stroke_of(room: Room, speed_rps: float) -> Stroke | None:
-    """Plateaus of this speed, as long as is of use; None where the travel has no room for them."""
+    """Stroke of this speed, as long as useful; None where the travel does not suffice."""
     held_s = min(threshold.LONGEST_S, room.plateau_rev(speed_rps) / speed_rps)
     if held_s < threshold.SHORT_S:
         return None
@@ -86,10 +86,10 @@ def stroke_of(room: Room, speed_rps: float) -> Stroke | None:
 
 
 async def run(run: Run, settings: VibrationSettings) -> VibrationResult:
-    """Measure; the axis ends where it began, with its settings as they were.
+    """Measure; the axis ends where it began, with its settings restored.
 
     Raises:
-        OutOfRange: the limits leave nothing to measure; nothing has moved but a short first move.
+        OutOfRange: the limits leave nothing to measure; only a short first move was made.
         NotAllowed: the envelope or a fault ended a motion; states the reason.
     """
     axis, session, envelope = run.axis, run.session, settings.envelope
@@ -129,7 +129,7 @@ def _closer(
     units: AxisUnits,
     left_s: float,
 ) -> tuple[Stroke, ...]:
-    """Further speeds inside these, as many as the time that is left allows."""
+    """Further speeds within this range, as many as the remaining time allows."""
     for count in range(settings.closer, 2, -1):
         inside = np.geomspace(*about, count + 2)[1:-1]
         speeds = representable(np.asarray(inside, np.float64), units)
@@ -141,7 +141,7 @@ def _closer(
 
 @dataclass(frozen=True)
 class _Measured:
-    """What has been recorded so far."""
+    """Recordings made so far."""
 
     run: Run
     settings: VibrationSettings
@@ -150,7 +150,7 @@ class _Measured:
     taken: list[tuple[Recording, FloatArray]]
 
     async def strokes(self, strokes: tuple[Stroke, ...], low: float, high: float) -> None:
-        """Play these, each from where all began; progress goes from low to high."""
+        """Play these strokes, each from the start; progress goes from ``low`` to ``high``."""
         run, envelope = self.run, self.settings.envelope
         total_s, done_s = sum(one.duration_s for one in strokes), 0.0
         slow_rps = threshold.POSITIONING * envelope.speed_rpm / 60.0
@@ -172,7 +172,7 @@ class _Measured:
             done_s += stroke.duration_s
 
     def plateaus(self, plan: Plan, *, closer: bool = True) -> Plateaus:
-        """All of it."""
+        """All recordings as raw data for the evaluation."""
         return Plateaus.of(
             [recording for recording, _ in self.taken],
             [numbers for _, numbers in self.taken],

@@ -1,4 +1,4 @@
-"""What a map of vibration over speed may be asked with."""
+"""Settings of a map of vibration over speed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from backend.tools.tool import ToolSettings
 
 
 class VibrationSettings(ToolSettings):
-    """Speeds of the map; the time limit is that of all moves together."""
+    """Speeds of the map; the time limit applies to all moves together."""
 
     time_limit_s: float = Field(
         default=180.0, gt=0, le=300, description="longest time of all moves together, in s"

@@ -1,4 +1,4 @@
-"""The words of a map of vibration over speed, English and Chinese, and what a report shows."""
+"""Texts of a map of vibration over speed, English and Chinese, and its section of a report."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ _TONES: dict[Code, Literal["good", "warn"]] = {
 
 
 def report(result: VibrationResult) -> Section:
-    """Findings, resonances and orders with their intervals, speeds, and levels over the speed."""
+    """Findings, resonances and orders with their intervals, speeds, and levels over speed."""
     rows = [
         Row("resonance", each.frequency_hz, "Hz", each.frequency_ci95_hz)
         for each in result.resonances
