@@ -70,11 +70,11 @@ class JobInfo(Message):
     id: str
     kind: str
     drive: str | None
-    title: str = Field(description="in English")
+    title: str = Field(description="in the language of the request")
     title_message: MessageInfo
     state: Literal["running", "done", "failed", "cancelled"]
     progress: float = Field(ge=0, le=1)
-    step: str = Field(description="in English")
+    step: str = Field(description="in the language of the request")
     step_message: MessageInfo
     started: datetime
     ended: datetime | None

@@ -257,7 +257,7 @@ class Accounts:
                 "people.cannot-give-token",
                 limit=", ".join(sorted(RIGHTS[account.role])),
                 account=account.name,
-                beyond=", ".join(sorted(beyond)) or "no scope",
+                beyond=", ".join(sorted(beyond)) or text("people.no-scope"),
             )
         if not timedelta(0) < lifetime <= LONGEST_TOKEN:
             raise NotAllowed(

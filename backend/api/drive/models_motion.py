@@ -18,7 +18,9 @@ class MoveRequest(Message):
     mode: Literal["PP", "PV", "PT"]
     target: Finite
     relative: bool = False
-    immediate: bool = True
+    immediate: Literal[True] = Field(
+        default=True, description="a drive gets one target at a time: moves are not queued"
+    )
     speed: Positive | None = None
     acceleration: Positive | None = None
     deceleration: Positive | None = None

@@ -48,7 +48,7 @@ from backend.tools.moves import homing, move, procedures
 from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 from drivers.texts.states import state_text
 from profiles.schema import Parameter, Raw
 
@@ -74,7 +74,7 @@ async def transition(
     """Drive the power state machine. Enabling sets the setpoint to the actual position first."""
     goal = State(request.goal)
     mode = None if request.mode is None else _mode(connected, request.mode)
-    await _alone(bench, connected, goal.value, lambda: connected.axis.transition(goal, mode))
+    await _alone(bench, connected, state_text(goal), lambda: connected.axis.transition(goal, mode))
     bench.journal.add(
         text("journal.power-state", drive=connected.drive.name, state=state_text(goal)),
         drive=connected.drive.id,
@@ -83,7 +83,7 @@ async def transition(
 
 
 async def _alone(
-    bench: Bench, connected: ConnectedDrive, title: str, work: Callable[[], Awaitable[object]]
+    bench: Bench, connected: ConnectedDrive, title: Text, work: Callable[[], Awaitable[object]]
 ) -> None:
     """Change the power state as a motion job: no other motion can begin, and STOP cancels it.
 
@@ -134,7 +134,7 @@ def _mode(connected: ConnectedDrive, number: int) -> Mode:
 @router.post("/fault-reset")
 async def fault_reset(bench: TheBench, connected: Controlled) -> AxisState:
     """Reset faults whose cause is gone."""
-    await _alone(bench, connected, "Fault reset", connected.axis.reset_fault)
+    await _alone(bench, connected, text("api-drive.fault-reset"), connected.axis.reset_fault)
     bench.journal.add(
         text("journal.fault-reset", drive=connected.drive.name), drive=connected.drive.id
     )
@@ -191,10 +191,10 @@ async def write_parameter(
     return convert.reading(connected.drive, reading.key)
 
 
-def _choose(known: Iterable[str]) -> str:
+def _choose(known: Iterable[str]) -> Text:
     """Remedy for an unknown name: the names that exist."""
     there = ", ".join(known)
-    return f"choose one of: {there}" if there else "this drive has none: use another way"
+    return text("api-drive.choose-one", names=there) if there else text("api-drive.has-none")
 
 
 def _require_known(connected: ConnectedDrive, key: str) -> None:

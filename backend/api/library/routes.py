@@ -80,7 +80,7 @@ async def search_library(
     serial: Annotated[int | None, Query(ge=0, lt=1 << 63)] = None,
     since: datetime | None = None,
     until: datetime | None = None,
-    deleted: Annotated[bool, Query(description="only what was put aside")] = False,
+    deleted: Annotated[bool, Query(description="only deleted entries")] = False,
     limit: Annotated[int, Query(ge=1, le=500)] = 100,
     offset: Annotated[int, Query(ge=0, le=1_000_000)] = 0,
 ) -> LibraryPage:

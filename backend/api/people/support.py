@@ -23,6 +23,7 @@ from backend.api.people.record import TheRecord
 from backend.api.security.gate import require_right
 from backend.api.security.own_session import address_of, with_cookie
 from backend.people.errors import Forbidden, NotLoggedIn
+from backend.people.rights import Right
 from drivers.texts.message import text
 
 router = APIRouter()
@@ -103,7 +104,7 @@ async def invite(
     secret, made = people.support.invite(
         me.person, body.guest, frozenset(body.allowed), body.minutes * 60.0
     )
-    allowed = ", ".join(sorted(made.allowed)) or "look only"
+    allowed = ", ".join(sorted(made.allowed))
     record.note(
         "invitation",
         "made",
@@ -112,10 +113,10 @@ async def invite(
             person=me.person,
             guest=made.guest,
             minutes=f"{body.minutes:g}",
-            allowed=allowed,
+            allowed=allowed or text("people.look-only"),
         ),
         target=made.guest,
-        new=f"{allowed}, {body.minutes:g} min",
+        new=f"{allowed or Right.LOOK.value}, {body.minutes:g} min",
         level="warning",
         person=me.person,
     )
@@ -154,16 +155,21 @@ async def grant(
         require_right(people, me, right, body.drive)
     if body.drive is not None:
         live.bench.connected(body.drive)
-    rights = f"{', '.join(sorted(body.rights))} for {body.minutes:g} min"
+    rights, minutes = ", ".join(sorted(body.rights)), f"{body.minutes:g}"
     granted = people.support.grant(
         invitation_id, me.person, frozenset(body.rights), body.minutes * 60.0, body.drive
     )
     record.note(
         "invitation",
         "granted",
-        text("journal.granted", person=me.person, guest=granted.guest, rights=rights),
+        text(
+            "journal.granted",
+            person=me.person,
+            guest=granted.guest,
+            rights=text("people.rights-for", rights=rights, minutes=minutes),
+        ),
         target=granted.guest,
-        new=rights,
+        new=f"{rights}, {minutes} min",
         level="warning",
         drive=body.drive,
         person=me.person,

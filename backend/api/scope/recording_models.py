@@ -38,7 +38,9 @@ class StartRecording(Message):
 
     name: str = Field(default="", max_length=100, description="empty: the date and time")
     channels: list[RecordChannel] = Field(min_length=1, max_length=64)
-    period_s: float = Field(default=0.0, ge=0, le=10, description="polled signals; 0: as fast as")
+    period_s: float = Field(
+        default=0.0, ge=0, le=10, description="of polled signals; 0: as fast as the bus allows"
+    )
     duration_s: float | None = Field(default=None, gt=0, le=7 * 86400)
     pre_s: float = Field(default=0.0, ge=0, le=60, description="kept from before the trigger")
     trigger: RecordTrigger | None = None

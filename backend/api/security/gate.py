@@ -258,7 +258,8 @@ class Gate:
         if need.right == "public":
             return
         if identity is None:
-            what = "make the first account" if self._people.setup_needed else "log in"
+            setup = self._people.setup_needed
+            what = "api-security.make-first-account" if setup else "api-security.log-in"
             raise NotLoggedIn("api-security.nobody-logged", remedy=what)
         if not isinstance(need.right, Right):
             return

@@ -78,7 +78,7 @@ async def compare_eeprom(
     link = opened_segment(bench, url)
     if profile is not None:
         image = await link.eeprom.read(station, _unheard)
-        found = against_profile(image, load_profile(profile))
+        found = against_profile(image, _imported(profile))
         return _comparison(image, found)
     saved = Image(await _body(request))
     problem = saved.problem()

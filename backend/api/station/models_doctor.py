@@ -51,7 +51,6 @@ class StationDiagnosis(Message):
 
     station: int
     reached: bool
-    refusal: str | None = None
     causes: list[DoctorCause]
     trials: list[DoctorTrial] = Field(
         default_factory=list, description="for a connected drive; the likeliest first"

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
+from drivers.texts.message import text
 
 FILE = "accounts.json"
 _KEY_BYTES = 32
@@ -93,7 +94,7 @@ class AccountsMarker:
         if found is None or set_up:
             return
         folder = self.path.parent
-        since = f" since {found.since}" if found.since else ""
+        since = text("people.since", time=found.since) if found.since else ""
         raise AccountsMissing(
             "people.station-accounts-database-no",
             value=str(database),

@@ -1,13 +1,16 @@
 api-drive_back-forth = Reciprocating move: { $member_drive }
 api-drive_cancelled-during = { $drive }: cancelled during “{ $title }”: { $why }
     .remedy = try again when it is safe
+api-drive_choose-one = choose one of: { $names }
 api-drive_commands-motion-axis-enabled = { $drive }: { $parameter } commands motion and the axis is enabled
     .remedy = use the Motion page, which sets limits and a dead-man timeout; or disable the axis
 api-drive_cyclic-exchange-not-run = { $drive }: the cyclic exchange does not run
     .remedy = start it on the Connect page
 api-drive_detail = { $shape } in { $mode }: { $member_drive }
+api-drive_fault-reset = Fault reset
 api-drive_give-either-raw-value = { $drive }: { $parameter }: give either raw or value
     .remedy = send exactly one of the two
+api-drive_has-none = this drive has none: use another way
 api-drive_home-method = Home { $member_drive } (method { $method })
 api-drive_identification-drive = Identification by the drive: { $member_drive }
 api-drive_load = Load { $file } into { $member_drive }

@@ -1,13 +1,16 @@
 api-drive_back-forth = 往复运动：{ $member_drive }
 api-drive_cancelled-during = { $drive }：在“{ $title }”期间被取消：{ $why }
     .remedy = 请在安全时重试
+api-drive_choose-one = 请选择其中之一：{ $names }
 api-drive_commands-motion-axis-enabled = { $drive }：{ $parameter } 用于指令运动，而轴已使能
     .remedy = 请使用“运动”页面，其中设有限值和失效保护超时；或断使能
 api-drive_cyclic-exchange-not-run = { $drive }：周期通信未运行
     .remedy = 请在“连接”页面启动
 api-drive_detail = { $mode } 中的 { $shape }：{ $member_drive }
+api-drive_fault-reset = 故障复位
 api-drive_give-either-raw-value = { $drive }：{ $parameter }：只能给出 raw 或 value 之一
     .remedy = 请只发送两者之一
+api-drive_has-none = 本驱动器没有此项：请用其他方法
 api-drive_home-method = { $member_drive } 回零（方式 { $method }）
 api-drive_identification-drive = 由驱动器辨识：{ $member_drive }
 api-drive_load = 将 { $file } 载入 { $member_drive }

@@ -12,7 +12,14 @@ store_contents-damaged = { $place } 的内容 { $name }… 已损坏
     .remedy = 请从备份恢复
 store_contents-missing = { $place } 缺少内容 { $name }…
     .remedy = 请从备份恢复
-store_contents-not = 无法在 { $value } { $what }内容：{ $error }
+store_contents-not = 无法在 { $value } { $what ->
+        [stored] 存储
+        [fetched] 读取
+        [listed] 列出
+        [found] 找到
+        [deleted] 删除
+       *[other] 处理
+    }内容：{ $error }
     .remedy = 请检查可用空间、权限；若为 S3，还请检查地址和密钥
 store_database-address-not-url = 数据库地址不是 URL
     .remedy = 请写成 postgresql://user:password@host/name 或 sqlite:////folder/file.db
