@@ -76,11 +76,11 @@ class LoopVerdict:
     ``last_crossover_hz`` is the highest crossover of all possible loops. ``coverage``: all
     crossings are measured; or those beyond the band are bounded by a measurement with the gain
     raised by ``shown_gain_db``; or they are only predicted, with which no design is kept.
-    ``stated`` are the worst figures of both bands, ``worst`` the ends of their intervals; None
-    where no crossing is known. ``delay_s`` and ``gain_db`` are the corrections of the prediction by
-    the measured lines. ``designed`` is `predicted` for the plants of the design alone; it decides
-    whether the design is kept. ``contradicted``: the loop was stable with a raised gain at which
-    none of the possible ones is, so that nothing is known beyond the band.
+    ``stated`` are the worst figures of both bands, ``worst`` the ends of their intervals;
+    60 dB and 90° where no crossing is known. ``delay_s`` and ``gain_db`` are the corrections of the
+    prediction by the measured lines. ``designed`` is `predicted` for the plants of the design
+    alone; it decides whether the design is kept. ``contradicted``: the loop was stable with a
+    raised gain at which none of the possible ones is, so that nothing is known beyond the band.
     """
 
     measured: BandVerdict | None

@@ -142,7 +142,8 @@ def estimate_periodic(
     )
     size, turn = np.abs(uncertainty.real), np.abs(uncertainty.imag)
     if reported:
-        # What the balance leaves is no share of what friction did: it may turn a line as well.
+        # The error of the torque balance is not a share of the friction effect: it may also turn
+        # a line.
         size = turn = threshold.EACH_BY_BALANCE * np.abs(g / plain - 1.0)
     power = np.asarray(sum(np.abs(r.mean(axis=0)) ** 2 for r in s.sent))
     noise_var, total_var, freedom = _variances(s, inputs, g, smooth_lines)
