@@ -73,9 +73,7 @@ def alternative_of(profile: Profile, parameter: Parameter) -> Alternative:
 
 
 def refused(drive: str, profile: Profile, parameter: Parameter) -> NotGranted:
-    """Return the error for a write of this object without a grant, with the permitted page and
-    route.
-    """
+    """Return the error for a write of this object without a grant, naming the page and route."""
     door = alternative_of(profile, parameter)
     error = NotGranted(
         "motion.put-energy-motor-not",

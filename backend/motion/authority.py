@@ -36,9 +36,7 @@ _held: ContextVar[tuple[Grant, ...]] = ContextVar("grants", default=())
 
 @dataclass(slots=True, eq=False)
 class _Record:
-    """A grant that was issued and not yet returned. ``why``: reason for its end, None
-    while live.
-    """
+    """A grant that was issued and not yet returned. ``why`` it ended; None while it is live."""
 
     grant: Grant
     ended: Ended | None
@@ -74,9 +72,7 @@ class MotionAuthority:
         return live[-1] if live else None
 
     def drives_of(self, session: str) -> set[str]:
-        """Return the axes for which this session, token or invitation has a live
-        grant of any kind.
-        """
+        """Return the axes of which this session, token or invitation has any live grant."""
         if not session:
             return set()
         return {
@@ -98,9 +94,7 @@ class MotionAuthority:
         return None
 
     def outermost(self, drive: str) -> Grant | None:
-        """Return the first grant of this axis that the calling work holds: that of the whole
-        motion.
-        """
+        """Return the first grant of this axis that the calling work holds: the whole motion's."""
         known = {record.grant for record in self._records.get(drive, ())}
         return next((grant for grant in _held.get() if grant in known), None)
 

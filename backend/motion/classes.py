@@ -17,7 +17,7 @@ def motion_of(parameter: Parameter) -> MotionClass:
 
 
 def held_still(parameter: Parameter) -> bool:
-    """Whether the object may be written only while the motor has no power and nothing moves the
-    axis.
+    """Whether the object may be written only without motor power and with nothing
+    moving the axis.
     """
     return motion_of(parameter) == "at_enable" and not parameter.safe_in_motion

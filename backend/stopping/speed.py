@@ -149,9 +149,7 @@ class SpeedWatch:
         return pair is not None and pair[1] < pair[0] * 0.995 - 0.2
 
     def time_to_standstill_s(self, over_s: float = 0.25) -> float:
-        """Return the time to standstill [s] if the axis keeps decelerating as now;
-        else infinity.
-        """
+        """Return the time to standstill [s] at the present deceleration; infinity if none."""
         pair = self._then_and_now(over_s)
         if pair is None or not self.slows(over_s):
             return math.inf
@@ -192,9 +190,7 @@ class SpeedWatch:
         return next((s for s in reversed(self._samples) if sample.at_s - s.at_s >= WINDOW_S), None)
 
     def _by_position(self, sample: Sample) -> float | None:
-        """Return the magnitude in rpm, or in increments per second where the
-        resolution is unknown.
-        """
+        """Return the magnitude in rpm, or in increments/s if the resolution is unknown."""
         earlier, moved = self._earlier(sample), self._moved(sample)
         if earlier is None or moved is None:
             return None
@@ -216,9 +212,7 @@ def _difference(new: int, old: int) -> int:
 
 
 async def units_of(axis: Axis) -> AxisUnits | None:
-    """Return the known units, else read them from the drive; None where the drive
-    does not answer.
-    """
+    """Return the known units, else read them; None where the drive does not answer."""
     known = axis.known_units
     if known is not None:
         return known

@@ -94,9 +94,7 @@ class StopWatch:
         return await self._follow(problem)
 
     async def _read_ramp(self) -> None:
-        """Read the ramp settings that were not read before the motion; the stop word
-        has been sent.
-        """
+        """Read the ramp settings not read before the motion; the stop word has been sent."""
         axis = self._axis
         if known_settings(axis.drive).ramp_raw() is None:
             try:
@@ -121,9 +119,7 @@ class StopWatch:
         return Sample(time.monotonic() - ago_s, state, position.raw, None)
 
     def _stood(self, before: Sample, now: Sample) -> bool:
-        """Whether the axis had no power and stood before STOP, and still does: no longer watch
-        needed.
-        """
+        """Whether the axis was without power and at standstill before STOP, and still is."""
         if now.state in _POWERED:
             return False
         self._watch.take(replace(before, velocity=now.velocity))
@@ -141,9 +137,7 @@ class StopWatch:
         )
 
     async def _silent(self, problem: Text) -> AxisStop:
-        """Retry after a failed first sample; unreachable if the drive stays silent
-        for `_SILENT_S`.
-        """
+        """Retry after a failed first sample; unreachable after `_SILENT_S` without answer."""
         while time.monotonic() - self._began_s < _SILENT_S:
             await asyncio.sleep(_LOOK_EVERY_S)
             try:
@@ -183,9 +177,7 @@ class StopWatch:
                 return self._moving(sample, problem)
 
     def _allowed_s(self) -> float | None:
-        """Return the time [s] that the active ramp needs from the measured speed;
-        None if unknown.
-        """
+        """Return the time [s] of the active ramp from the measured speed; None if unknown."""
         watch = self._watch
         speed = watch.speed()
         if speed is None or not watch.certain or watch.units is None:
@@ -196,9 +188,7 @@ class StopWatch:
         return min(max(speed / ramp * _MORE + _LAG_S, SHORTEST_S), LONGEST_S)
 
     async def _without_power(self, sample: Sample) -> None:
-        """Clear the drive's own motion triggers for an axis that turns although it is
-        not enabled.
-        """
+        """Clear the drive's own motion triggers for an axis that turns without power."""
         now, speed = time.monotonic(), self._watch.speed() or 0.0
         if sample.state in (*_POWERED, State.FAULT) or not self._watch.turns:
             self._unpowered_since = None
@@ -301,9 +291,7 @@ class StopWatch:
         return answers
 
     async def _settle(self, sample: Sample) -> None:
-        """At standstill: restore 605Ah, and quick-stop an axis that was only halted, to remove
-        power.
-        """
+        """At standstill: restore 605Ah, and quick-stop an axis that was only halted."""
         axis, before = self._axis, self._axis.option_before
         halted = any(step.code is StepCode.HALT for step in axis.stop_steps)
         try:

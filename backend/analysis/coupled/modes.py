@@ -102,8 +102,8 @@ def find_modes(response: CoupledResponse) -> CoupledModes:
 
 @dataclass(frozen=True)
 class _Fit:
-    """Lines [n]: whitened real rows of the entries, and the factor [n, 4, 3] from the symmetric
-    entries to them.
+    """Lines [n]: whitened real rows of the entries, and the matrix [n, 4, 3] from the entries 11,
+    12 and 22 to them.
     """
 
     f: FloatArray
@@ -172,9 +172,7 @@ class _Fit:
         return slopes
 
     def _jacobian(self, x: FloatArray) -> FloatArray:
-        """Jacobian of `residuals` by Kaufman's approximation (1975): without what the matrices
-        absorb.
-        """
+        """Jacobian of `residuals` by Kaufman's approximation (1975), matrices projected out."""
         a, solution = self._regression(x)
         q, _ = np.linalg.qr(a / np.linalg.norm(a, axis=0))
         slopes = self._slopes(x, solution)
@@ -205,9 +203,7 @@ class _Fit:
         return np.asarray(found.x)
 
     def candidates(self, x: FloatArray) -> list[FloatArray]:
-        """Return starts with one more mode: where it explains most, and with each
-        found mode split.
-        """
+        """Return starts with one more mode: where it explains most, or splitting a known one."""
         grid = np.geomspace(1.02 * self.f[0], self.f[-1] / 1.02, threshold.PLACES)
         costs = [
             self.cost(np.concatenate([x, [np.log(hz), np.log(threshold.TRIED_DAMPING)]]))

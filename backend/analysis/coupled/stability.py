@@ -82,9 +82,7 @@ def shows_coupling(ratio: FloatArray, half: FloatArray) -> bool:
 def joint_margins(
     response: CoupledResponse, controllers: ComplexArray, factor: float = 1.0
 ) -> JointMargins:
-    """Return the margins of the pair; ``controllers`` [n, 2] from speed error to
-    torque per axis.
-    """
+    """Return the margins of the pair; ``controllers`` [n, 2]: speed error to torque per axis."""
     f = response.frequency_hz
     c = factor * controllers
     loop = response.response * c[:, None, :]

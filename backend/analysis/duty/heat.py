@@ -53,9 +53,7 @@ class Heat:
 
 @dataclass(frozen=True)
 class _Losses:
-    """Losses of one motor variant, in units of the rated losses: in the winding [n],
-    and elsewhere.
-    """
+    """Losses of one motor variant over the rated losses: in the winding [n], and elsewhere."""
 
     share: float
     winding: FloatArray
@@ -154,9 +152,7 @@ def _one(
 
 
 class _Bodies:
-    """Winding and housing, with thermal resistances such that the rated load gives a
-    rise of one.
-    """
+    """Winding and housing, with thermal resistances for which the rated load gives a rise of 1."""
 
     def __init__(self, losses: _Losses, winding: float, tau_w: float, spacing_s: float) -> None:
         whole = winding * (1.0 - losses.share) + (1.0 - winding)

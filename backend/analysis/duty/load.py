@@ -84,9 +84,7 @@ class Power:
 
 @dataclass(frozen=True)
 class Budget:
-    """I²t budget: ``used`` is the highest share of it; ``trip_s`` is None if it is
-    never exceeded.
-    """
+    """I²t budget: ``used`` is the highest share of it; ``trip_s`` None if never exceeded."""
 
     used: float
     trip_s: float | None

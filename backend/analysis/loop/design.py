@@ -141,9 +141,7 @@ def described(
     f: FloatArray, plant: ComplexArray, fixed: ComplexArray, gains: Gains, guaranteed: Goals, *,
     notches: tuple[Notch, ...], filters: LoopFilters,
 ) -> Candidate:  # fmt: skip
-    """Return prediction and step response of a loop on a plant; ``fixed`` is the loop but its
-    gains.
-    """
+    """Return prediction and step of a loop on a plant; ``fixed`` is the loop except its gains."""
     loop = speed_loop(f, plant, fixed, gains)
     closed = closed_from_open(loop)
     time, value = step_of_closed_loop(f, closed)

@@ -27,9 +27,7 @@ class Goals:
     ms: float
 
     def with_reserve(self) -> Goals:
-        """Return the goals of a design whose measurement must still show these
-        despite its errors.
-        """
+        """Return the goals with reserve: a measurement then still shows these despite errors."""
         db, deg, factor = RESERVE
         return Goals(self.gain_margin_db + db, self.phase_margin_deg + deg, self.ms / factor)
 
@@ -108,9 +106,7 @@ def sensitivity_peak(loops: ComplexArray) -> float:
 
 
 def stable(loops: ComplexArray) -> BoolArray:
-    """Apply the Nyquist criterion per row: 1 + L must not encircle the origin, followed from the
-    top.
-    """
+    """Apply the Nyquist criterion per row: followed from the top, 1 + L must not encircle 0."""
     real, imag = 1.0 + loops.real, loops.imag
     # Followed upwards, each passage left of the origin counts as a whole turn.
     above = imag >= 0.0

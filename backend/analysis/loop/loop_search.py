@@ -45,9 +45,7 @@ class Shape:
 
     @property
     def price(self) -> float:
-        """The share of a bandwidth that is left after the cost of the notches and the filter
-        choice.
-        """
+        """Share of a bandwidth left after the cost of the notches and the filter choice."""
         return 1.0 - threshold.PRICE * (len(self.notches) + self.choice)
 
 
@@ -91,8 +89,8 @@ class LoopSearch:
         )
 
     def fixed(self, shape: Shape) -> ComplexArray | None:
-        """Return filters, notches, current loop and delay; None where the drive cannot realise
-        them.
+        """Return filters, notches, current loop and delay; None if the drive cannot
+        realise them.
         """
         total = self._fixed[shape.choice]
         for notch in shape.notches:
@@ -157,9 +155,7 @@ class LoopSearch:
         return low if self._safe(fixed, low, goals) else float(levels[good])
 
     def best(self, goals: Goals, slots: int) -> list[Found]:
-        """Return the best loops with no notch, one, two, … as long as each notch is
-        an improvement.
-        """
+        """Return the best loops with no notch, one, two, … as long as each is an improvement."""
         best = self._wider(Found(Shape(), 0.0, 0.0), goals)
         kept = [best] if best.bandwidth_hz else []
         for count in range(1, slots + 1):

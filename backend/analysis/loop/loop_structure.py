@@ -82,9 +82,7 @@ class Gains:
 def speed_loop(
     frequency_hz: FloatArray, plant: ComplexArray, fixed: ComplexArray, gains: Gains
 ) -> ComplexArray:
-    """Return the open speed loop; ``fixed`` contains all filters, notches, current
-    loop and delay.
-    """
+    """Return the open speed loop; ``fixed`` is all filters, notches, current loop and delay."""
     s = 1j * TURN * frequency_hz
     pi = gains.speed_nms * (1.0 + TURN * gains.integral_hz / s)
     return np.asarray(pi * fixed * plant)
@@ -93,9 +91,7 @@ def speed_loop(
 def step_of_closed_loop(
     frequency_hz: FloatArray, closed: ComplexArray, *, duration_s: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the unit step response (time, value) of a closed loop given by its
-    frequency response.
-    """
+    """Return the unit step response (time, value) of a closed loop from its frequency response."""
     resolution = 0.5 / duration_s
     top = float(frequency_hz[-1])
     f = np.arange(0.0, top, resolution)

@@ -147,9 +147,7 @@ def _short(band: BandVerdict | None, end: End, guaranteed: Goals) -> list[Missed
 
 @dataclass(frozen=True)
 class Lines:
-    """A measured closed loop [n]; ``deviation`` is one standard deviation of its logarithm, per
-    component.
-    """
+    """A measured closed loop [n]; ``deviation`` (one sigma) of its logarithm, per component."""
 
     frequency_hz: FloatArray
     closed: ComplexArray
@@ -255,8 +253,8 @@ def _measured(lines: Lines) -> BandVerdict:
 
 
 def _least(margins: list[Interval]) -> Interval | None:
-    """Smallest of several margins, separately for value and both ends: the lowest end may belong to
-    another margin than the lowest value.
+    """Smallest of several margins, for value and interval ends separately: the lowest end need not
+    belong to the lowest value.
     """
     if not margins:
         return None
@@ -271,9 +269,7 @@ def _share(before: float, after: float) -> float:
 
 
 def _known(found: tuple[float, float] | None, least: float, unseen: float) -> Interval:
-    """Interval of a value from its deviation, at least ``least`` wide; unknown: up to
-    ``unseen``.
-    """
+    """Interval of a value from its deviation, at least ``least``; without a value, ``unseen``."""
     if found is None:
         return Interval(0.0, -least, unseen)
     value, std = found

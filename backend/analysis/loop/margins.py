@@ -30,8 +30,8 @@ def sensitivity(loop: ComplexArray) -> ComplexArray:
 
 @dataclass(frozen=True)
 class Bandwidth:
-    """Frequencies at which a closed loop first falls by 3 dB and first lags by 90°; None beyond the
-    data.
+    """Frequencies of a closed loop's first fall by 3 dB and first lag of 90°; None
+    beyond the data.
     """
 
     minus_3db_hz: float | None

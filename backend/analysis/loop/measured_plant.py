@@ -37,8 +37,8 @@ class MeasuredPlant:
     """Responses [m, lines] of the axis under other conditions."""
 
     def response(self, frequency_factor: float = 1.0, damping_factor: float = 1.0) -> ComplexArray:
-        """Return the response with all modes shifted; the measured deviation from the model is
-        kept.
+        """Return the response with all modes shifted; keeps the measured deviation
+        from the model.
         """
         moved = self.model.perturbed(1.0, damping_factor)
         modes = tuple(

@@ -112,9 +112,7 @@ def coefficient_values(raw: NotchCoefficients) -> tuple[float, float, float, flo
 
 
 def is_stable(raw: NotchCoefficients) -> bool:
-    """Check Jury's conditions on z² + b1·z + b2, in integers so that rounding cannot
-    hide a pole.
-    """
+    """Check Jury's conditions on z² + b1·z + b2, in integers to exclude rounding errors."""
     b1, b2 = raw.b1 - COEFFICIENT_OFFSET, raw.b2 - COEFFICIENT_OFFSET
     one = COEFFICIENT_SCALE
     return abs(b2) < one and one + b1 + b2 > 0 and one - b1 + b2 > 0

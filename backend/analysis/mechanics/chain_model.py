@@ -31,8 +31,8 @@ def loads_of(x: FloatArray) -> FloatArray:
 def chain_response_and_slopes(
     x: FloatArray, frequency_hz: FloatArray
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Return the response torque to velocity [...] and its slopes [n parameters, ...] (zero for the
-    path).
+    """Return the response from torque to velocity [...] and its slopes [n parameters, ...] (zero
+    for the path).
 
     Calculated from the far end towards the motor by impedances: an inertia is sJ, a coupling k/s +
     d in series with everything behind it.
@@ -114,9 +114,7 @@ def _mode(p: complex, q: complex, a: complex, b: complex) -> Mode:
 
 
 def modal_start(x: FloatArray) -> FloatArray:
-    """Return the parameters of the free modal form
-    (:func:`mechanical_model.model_of`) of a chain.
-    """
+    """Return a chain's parameters in the modal form (:func:`mechanical_model.model_of`)."""
     model = model_of_chain(x)
     out = [np.log(model.gain), np.log(max(model.pole_rad_s, 1e-6)), *x[2:RIGID_PARAMETERS]]
     for m in model.modes:

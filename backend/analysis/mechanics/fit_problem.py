@@ -125,9 +125,7 @@ class Problem:
     anchor: FloatArray | None = None
     """Delays and filter that a search stays near to while the mechanics are incomplete."""
     inertia: KnownInertia | None = None
-    """Inertia from moves; where friction hides the lowest lines it is the only
-    information on it.
-    """
+    """Inertia from moves; the only information on it where friction hides the low lines."""
 
     @cached_property
     def _frequencies(self) -> FloatArray:

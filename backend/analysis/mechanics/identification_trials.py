@@ -75,9 +75,7 @@ class Task:
         motion: SampledFit | None = None,
         start: Solution | None = None,
     ) -> Trial:
-        """Return estimates and fit with one path; ``motion`` is an earlier fit, for image
-        correction.
-        """
+        """Return estimates and fit with one path; ``motion``: an earlier fit, to correct images."""
         if self.quantity == "closed_loop":
             raise ValueError("mechanics are identified from torque, not from a loop's reference")
         views = self.views(path, coulomb_nm)
@@ -104,9 +102,7 @@ class Task:
         return sorted(tried, key=rank)
 
     def at_cycles(self, path: SignalPath, hold: Hold) -> Trial:
-        """Return the fit with this hold and the number of whole cycles that leaves
-        the least delay.
-        """
+        """Return the fit with this hold and the whole cycles that leave the least delay."""
         rate = path.sample_rate_hz
         # A path that is too early shows as a remaining delay; one that is too late may not.
         cycles = max(math.floor(path.command_delay_s * rate - 0.25), 0)

@@ -64,8 +64,8 @@ class Identification:
     ``direct`` is the estimate with only hold, current loop and delay divided out, and its band
     (0.25 of the sample rate); ``corrected`` has the folded images removed as well and is valid up
     to 0.4; ``fit`` is the model used for that. When no model fits (``trusted`` False), both are the
-    plain estimate with a band of 0.1 of the sample rate. Where ``distortion`` shows backlash, both
-    are the direct estimate, without the lines beyond its band.
+    plain estimate with a band of 0.1 of the sample rate. Where ``distortion`` shows backlash, the
+    model is not trusted either: both are the direct estimate, without the lines beyond its band.
     """
 
     direct: Frf
@@ -80,9 +80,7 @@ class Identification:
     torque_unexplained: bool = False
     """Whether hold, delay and one lag do not explain the reported torque."""
     by_place: InertiaByPlace | None = None
-    """The position-dependent part of the inertia; the band covers the responses at
-    all positions.
-    """
+    """The position-dependent part of the inertia; the band covers all positions."""
 
 
 def identify_mechanics(

@@ -358,9 +358,7 @@ def _reasons(
 
 
 def _looks_like_backlash(a: FloatArray, b: FloatArray, residual: FloatArray) -> bool:
-    """Whether few residuals are far above all others, as impacts cause them (excess
-    of the tails).
-    """
+    """Whether few residuals are far above all others, as impacts cause them."""
     scale = 1.4826 * float(np.median(np.abs(residual)))
     span = float(np.std(b))
     if scale <= 0 or span <= 0 or float(np.std(a[:, 0])) <= 0:

@@ -41,9 +41,7 @@ class InertiaByPlace:
         return np.asarray(self.amplitude_kgm2 * turn)
 
     def charged(self, frf: Frf) -> Frf:
-        """Return the band widened for other positions: two positions differ by twice
-        the amplitude.
-        """
+        """Return the band widened for other positions: two differ by up to twice the amplitude."""
         share = self.share(frf)
         return replace(
             frf,

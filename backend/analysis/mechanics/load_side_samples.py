@@ -176,9 +176,7 @@ def table_of(sides: TwoSides, shape: ErrorShape, error_counts: FloatArray) -> Ta
 def _settled(
     sides: TwoSides, scale: float, low: Callable[[FloatArray], FloatArray], moves: BoolArray
 ) -> BoolArray:
-    """Samples [n] of the moves in whose window the load neither crosses the backlash
-    nor bounces.
-    """
+    """Samples [n] of the moves whose window contains no crossing of the backlash and no bounce."""
     twist = (sides.load_counts - sides.load_counts[0]) / scale
     twist -= sides.angle_rad - sides.angle_rad[0]
     twist -= np.median(twist)

@@ -51,9 +51,7 @@ def lag_of_load(acceleration: FloatArray, swing: Swing, sample_rate_hz: float) -
 def lag_slopes(
     acceleration: FloatArray, swing: Swing, sample_rate_hz: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the derivatives of `lag_of_load` by the logarithms of frequency and
-    damping, [n] each.
-    """
+    """Return the derivatives [n] of `lag_of_load` by log frequency and by log damping."""
 
     def at(frequency: float, damping: float) -> FloatArray:
         moved = Swing(swing.frequency_hz * frequency, swing.damping * damping)

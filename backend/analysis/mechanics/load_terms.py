@@ -75,9 +75,7 @@ class Terms:
         return np.column_stack(parts)
 
     def may_hide(self, before: Terms) -> bool:
-        """Return whether the additional term over ``before`` is also accepted at a level near the
-        noise.
-        """
+        """Return whether the term added to ``before`` is also accepted near the noise level."""
         if self.static_rad_s != before.static_rad_s:
             return False
         return self.periods_rad == before.periods_rad or self.periods_rad[-1] > COGGING_RAD

@@ -80,9 +80,7 @@ class MechanicalModel:
         return tuple(sorted((float(f), float(d)) for f, d in pairs))
 
     def perturbed(self, frequency_factor: float, damping_factor: float) -> MechanicalModel:
-        """Return the model with all modes changed in frequency (stiffness) and damping, not in
-        inertia.
-        """
+        """Return the model with all modes scaled in frequency (stiffness) and damping only."""
         return replace(
             self,
             modes=tuple(
@@ -129,9 +127,7 @@ def model_of(x: FloatArray) -> MechanicalModel:
 def response_and_slopes(
     x: FloatArray, frequency_hz: FloatArray
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Return the response [...] of `model_of` (x), and its slopes [n parameters, ...] (zero for the
-    path).
-    """
+    """Return the response [...] of `model_of` (x), and its slopes [n, ...], 0 for the path."""
     s = 1j * TURN * np.asarray(frequency_hz, dtype=np.float64)
     gain, pole = np.exp(x[0]), np.exp(x[1])
     rigid = gain / (s + pole)

@@ -120,9 +120,7 @@ def views_of(
     loop: LoopModel,
     use: BoolArray | None = None,
 ) -> tuple[View, ...]:
-    """Return the estimates as the fit uses them, all lines; those not in ``use`` have
-    weight zero.
-    """
+    """Return the estimates as the fit uses them; lines not in ``use`` have weight zero."""
     given = [part for part in (frf, from_position) if part is not None]
     if use is None:
         use = np.ones(given[0].frequency_hz.size, dtype=np.bool_)

@@ -88,9 +88,7 @@ class SpeedModel:
         return self.best.speed, float(min(speeds) / half), float(max(speeds) * half)
 
     def misfit(self) -> float:
-        """Return the largest relative torque error of a point beyond chance; 0 where
-        there is none.
-        """
+        """Return the largest relative torque error of a point beyond chance; 0 if none."""
         off = np.abs(self.torque - self.best.at(self.speed))
         size = np.abs(self.torque)
         beyond = off > np.maximum(threshold.BEYOND * self.half, threshold.SHARE * size)

@@ -205,8 +205,8 @@ class _Way:
         own: ComplexArray | float,
         friction: ComplexArray,
     ) -> _Seen:
-        """Return the motion; ``own`` [periods, bins] is that by the loop's torque, ``friction`` by
-        it.
+        """Return the spectra; ``own`` [periods, bins]: motion by the loop's torque, ``friction``:
+        motion by friction.
         """
         if self.placed:
             moved = velocity_from_position(record, between, good, path.sample_rate_hz)
@@ -244,9 +244,7 @@ def _steps(record: Record, f: FloatArray) -> FloatArray:
 def _at_reversals(
     record: Record, good: list[int], bins: IntArray, torque: ComplexArray
 ) -> tuple[float, float]:
-    """Shares of the power of a torque on these bins, and of the time, near reversals
-    of the speed.
-    """
+    """Shares of a torque's power on these bins, and of the time, near reversals of speed."""
     e = record.excitation
     n = e.period_samples
     speed = np.mean([record.response[e.first_sample + p * n :][:n] for p in good], axis=0)

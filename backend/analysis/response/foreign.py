@@ -34,8 +34,8 @@ LEAST_SAMPLES = threshold.LEAST_SAMPLES
 
 
 class NoResponse(ValueError):
-    """Raised if the recording supports no response. ``code`` is the violated rule, ``facts`` its
-    figures.
+    """Raised if no response can be estimated. ``code`` is the violated rule,
+    ``facts`` its figures.
     """
 
     def __init__(self, code: str, **facts: float) -> None:
@@ -117,7 +117,7 @@ class EmptyLines:
         return found[0], found[1]
 
     def scatter_at(self, f: FloatArray) -> FloatArray:
-        """Return the scatter per component at the lines ``f``, from the nearest empty lines of the
+        """Return the scatter per component at the lines ``f``: that of nearby empty lines of the
         parity with the larger one.
         """
         out = np.zeros(f.size)

@@ -89,9 +89,7 @@ def path_covariance(
 
 
 def torque_left(records: tuple[Record, ...], path: SignalPath) -> float:
-    """Return the share (RMS) of the reported torque that a path does not explain,
-    without a loop.
-    """
+    """Return the share (RMS) of the reported torque that a path leaves unexplained, no loop."""
     fit = PathFit.of(records, path, False, None)
     rest = fit.rest(path)
     whole = fit.torque * fit.weight
@@ -225,9 +223,7 @@ class PathFit:
         return end.x, 2.0 * float(end.cost) / threshold.SCALE**2
 
     def _path_of(self, x: FloatArray, hold: Hold) -> SignalPath:
-        """Path of the parameters: cycles of delay and, where it is not known, the log of the
-        corner.
-        """
+        """Path of the parameters: cycles of delay, and log of the corner if it is not known."""
         late_s = command_delay_s(float(x[0]), hold, self.path.sample_rate_hz)
         known = self.path.current_bandwidth_hz
         corner = float(np.exp(x[1])) if known is None else known

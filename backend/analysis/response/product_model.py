@@ -54,9 +54,7 @@ class ProductModel:
 
 @dataclass(frozen=True)
 class ProductFit:
-    """A fit; ``covariance`` is that of `vector_of` the model, ``scatter`` that of the residuals per
-    component.
-    """
+    """A fit: ``covariance`` of the parameters (`vector_of`), ``scatter`` per component."""
 
     model: ProductModel
     covariance: FloatArray
@@ -65,9 +63,7 @@ class ProductFit:
 
 
 def vector_of(model: ProductModel) -> FloatArray:
-    """Return log|gain|, delay in ms, log corners, then log frequency and log damping
-    of each pair.
-    """
+    """Return log|gain|, delay in ms, log corners, then log frequency and damping per pair."""
     head = [np.log(abs(model.gain)), model.delay_s * 1e3, *np.log(model.poles_hz)]
     pairs = [v for p in model.pairs for v in (np.log(p.frequency_hz), np.log(p.damping))]
     return np.asarray([*head, *pairs], dtype=np.float64)

@@ -57,9 +57,7 @@ def commanded(path: SignalPath) -> bool:
 
 
 def current_uncertainty(frequency_hz: FloatArray) -> ComplexArray:
-    """Return the log response of an ordinary current loop that no recording shows,
-    less its delay.
-    """
+    """Return the log response of an ordinary, unrecorded current loop, without its delay."""
     return _without_delay(frequency_hz, np.log(lag_response(frequency_hz, threshold.USUAL_HZ)))
 
 

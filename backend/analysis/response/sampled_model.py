@@ -124,8 +124,8 @@ class Sampler:
         return replace(self, **small)
 
     def shown(self, plants: ComplexArray, further: ComplexArray | None = None) -> ComplexArray:
-        """Return the estimate as `seen`, for many plants [n, images, lines], without slopes: [n,
-        lines].
+        """Return the estimate [n, lines] as `seen`, for many plants [n, images,
+        lines], no slopes.
         """
         seen_as = self.seen_as if further is None else self.seen_as * further
         driven = self.torque / (1.0 + self.controller * plants)
@@ -213,9 +213,7 @@ class SampledFit:
         return np.asarray(seen / true, dtype=np.complex128)
 
     def loop_image_factor(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Return the sampled ratio of the loop's own torque to the velocity, relative to the true
-        one.
-        """
+        """Return the sampled over the true ratio of the loop's own torque to the velocity."""
         sampler = Sampler.of(frequency_hz, self.path, self.loop)
         plant = self.model.response(sampler.frequency_hz) * delay_response(
             sampler.frequency_hz, self.delay_s

@@ -141,9 +141,7 @@ def rising_command(sent: FloatArray, path: SignalPath) -> FloatArray:
 
 
 def sampled_integral_response(frequency_hz: FloatArray, path: SignalPath) -> ComplexArray:
-    """Return the response [s] from the sent sequence to the samples of its integral,
-    as a torque.
-    """
+    """Return the response [s] from the sent sequence to its sampled integral, as a torque."""
     f = np.asarray(frequency_hz, dtype=np.float64)
     mean = -0.5j / path.sample_rate_hz / np.tan(np.pi * f / path.sample_rate_hz)
     rises = np.zeros_like(mean)

@@ -109,8 +109,8 @@ def _better(one: Frf, other: Frf) -> Frf:
 
 
 def widened(frf: Frf, factor: ComplexArray, share: float, uncertainty: ComplexArray) -> Frf:
-    """Return the response with a share of the image factor, the uncertainty and the smallest error
-    added to its band.
+    """Return the response with its band widened by a share of the image factor, the uncertainty and
+    the smallest error.
     """
     image = np.log(factor)
     uncertainty_db = 20 / np.log(10) * np.hypot(image.real * share, uncertainty.real)

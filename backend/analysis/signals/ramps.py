@@ -32,9 +32,7 @@ def settled_ramp(ramp: FloatArray, integrations: int, targets: tuple[float, floa
 def ramped_periods(
     period: FloatArray, periods: int, ramp_samples: int, integrations: int
 ) -> FloatArray:
-    """Return ramp in, ``periods`` repetitions, ramp out; the axis ends at standstill
-    at its start.
-    """
+    """Return ramp in, ``periods`` repetitions, ramp out; the axis ends where it began."""
     n = period.size
     if ramp_samples == 0:
         return np.tile(period, periods)

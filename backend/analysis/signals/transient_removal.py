@@ -30,8 +30,9 @@ class _Difference:
 
 
 def settled(records: tuple[Record, ...]) -> tuple[Record, ...]:
-    """Return the records without free oscillations; unchanged where periods are missing or none is
-    found.
+    """Return the records without free oscillations.
+
+    A record is unchanged where none is found, or where evaluated periods are missing.
     """
     poles = _poles(records)
     if poles.size == 0:

@@ -36,9 +36,7 @@ class Followed:
         return float(np.degrees(np.arcsin(min(share, 1.0))))
 
     def _half(self, harmonic: int, along: complex) -> float:
-        """Half the interval of the part along the mean (1) or across it (1j), with the correlation
-        of neighbouring blocks.
-        """
+        """Half the interval of the part along (1) or across (1j) the mean, for correlated blocks."""
         column = self.blocks[:, harmonic]
         if column.size < 3:
             return float("inf")

@@ -28,9 +28,7 @@ class LevelPeak:
     """Numbers of the orders used for it."""
 
     def half_level_hz(self) -> tuple[float, float]:
-        """Return the range of frequencies [Hz] in which the level may exceed half the
-        peak level.
-        """
+        """Return the frequencies [Hz] between which the level may exceed half the peak."""
         width = np.sqrt(3.0) * self.damping
         low, high = self.frequency_ci95_hz
         return low * (1.0 - width), high * (1.0 + width)
@@ -115,9 +113,7 @@ def _clearest(points: _Points, taken: list[float]) -> float | None:
 
 
 def _enough(near: _Points, centre: float) -> bool:
-    """Whether there are more points than fitted parameters, with some on both sides
-    of the centre.
-    """
+    """Whether there are more points than parameters, with some on both sides of the centre."""
     fitted = np.unique(near.order).size + 3
     below, above = np.count_nonzero(near.f < centre), np.count_nonzero(near.f > centre)
     return bool(
@@ -156,9 +152,7 @@ def _described(points: _Points, about: float) -> LevelPeak | None:
 
 
 class _Across:
-    """Residuals of weighted levels that the sizes of the orders and a common slope do
-    not explain.
-    """
+    """Residuals of weighted levels after fitting the orders' sizes and a common slope."""
 
     def __init__(self, near: _Points, centre: float) -> None:
         linear = near.linear(centre)
@@ -195,9 +189,7 @@ class _Solved:
 
 
 def _solved(near: _Points, across: _Across, about: float, zero: float) -> _Solved:
-    """Fit the best mode near a frequency; its zero starts at the share ``zero`` of
-    that frequency.
-    """
+    """Fit the best mode near a frequency; its zero starts at ``zero`` times that frequency."""
 
     def left(p: FloatArray) -> FloatArray:
         f, z, zero_f, zero_z = (float(v) for v in np.exp(p))

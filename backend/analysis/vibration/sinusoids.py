@@ -40,9 +40,7 @@ class Segment:
         return float(self.turns[-1] - self.turns[0]) / ((self.turns.size - 1) / self.rate_hz)
 
     def clock(self, *, by_angle: bool) -> FloatArray:
-        """Return time [n] in s, or turns over the mean speed, on which an order has a fixed
-        frequency.
-        """
+        """Return time [n] in s, or turns over mean speed, in which an order is a frequency."""
         if by_angle:
             return np.asarray((self.turns - self.turns[0]) / self.speed_rps)
         return np.arange(self.turns.size) / self.rate_hz
