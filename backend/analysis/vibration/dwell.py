@@ -36,7 +36,7 @@ class Followed:
         return float(np.degrees(np.arcsin(min(share, 1.0))))
 
     def _half(self, harmonic: int, along: complex) -> float:
-        """Half the interval of the part along (1) or across (1j) the mean, for correlated blocks."""
+        """Half the interval of the part along (1) or across (1j) the mean, blocks correlated."""
         column = self.blocks[:, harmonic]
         if column.size < 3:
             return float("inf")
